@@ -1,0 +1,45 @@
+"""The contract every emulated device keeps."""
+
+from __future__ import annotations
+
+from typing import Final, Protocol, TypeVar
+
+NEVER: Final = 2**63 - 1
+"""A time that does not come: `due_us` of a device that waits for input alone."""
+
+W = TypeVar("W")  # one tick's traffic: bytes on a line, tuple[CanFrame, ...] on CAN
+
+
+class Device(Protocol[W]):
+    """A Mealy machine on a tick: traffic in, traffic out, one step a tick."""
+
+    @property
+    def tick_us(self) -> int:
+        """The control period in microseconds; ticks fall on its multiples."""
+        ...
+
+    @property
+    def due_us(self) -> int:
+        """The earliest time at which anything would happen without input.
+
+        A rig in virtual time jumps to it. It may be in the past (the next tick
+        then does the work) or `NEVER`. A tick before it, without traffic, must
+        change nothing that anybody could ever see.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Power-on reset: forget all but the configuration and the physical inputs."""
+
+    def tick(self, now_us: int, rx: W, /) -> W:
+        """Advance by one tick.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: what arrived since the last tick, in wire order.
+
+        Returns:
+            What the device sends in this tick, in wire order. Bad input is
+            answered as the real device answers it; it never raises.
+        """
+        ...

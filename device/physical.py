@@ -1,0 +1,122 @@
+"""The physical side of a device: named inputs and outputs with units.
+
+Scenario files, the control socket, panels and tests all use these names, and
+nothing else reaches into a device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+
+class Kind(Enum):
+    """What a physical input is."""
+
+    LEVEL = "level"  # a quantity: a stick, a voltage, a load
+    BUTTON = "button"  # 1 while pressed
+    FAULT = "fault"  # 1 while the physical fault is present
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A physical input.
+
+    Attributes:
+        name: what scenario files and panels call it.
+        text: what it is, for people.
+        kind: level, button or fault.
+        low: smallest value.
+        high: largest value.
+        unit: unit of the value, empty for a plain number.
+        initial: value at the start of the rig.
+    """
+
+    name: str
+    text: str
+    kind: Kind = Kind.LEVEL
+    low: int = 0
+    high: int = 1
+    unit: str = ""
+    initial: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A physical output: what an observer would see on the device."""
+
+    name: str
+    text: str
+    unit: str = ""
+
+
+class Physical(Protocol):
+    """A device that can be touched and looked at between ticks."""
+
+    @property
+    def inputs(self) -> InputBank:
+        """What the world does to the device."""
+        ...
+
+    @property
+    def outputs(self) -> Mapping[str, Output]:
+        """What the world sees of the device."""
+        ...
+
+    def read(self, name: str, /) -> int | str:
+        """Return the present value of one output; KeyError if there is none."""
+        ...
+
+
+class InputBank:
+    """The values of a device's physical inputs.
+
+    A change takes effect at the device's next tick.
+
+    Attributes:
+        table: the inputs by name, in order of declaration.
+        groups: names of several inputs that are set together, as `stick`.
+        changed: whether anything was set since the device last looked.
+    """
+
+    __slots__ = ("_values", "changed", "groups", "table")
+
+    def __init__(
+        self, table: Iterable[Input], groups: Mapping[str, tuple[str, ...]] | None = None
+    ) -> None:
+        self.table: Mapping[str, Input] = {item.name: item for item in table}
+        self.groups: Mapping[str, tuple[str, ...]] = dict(groups or {})
+        self._values = {name: item.initial for name, item in self.table.items()}
+        self.changed = True
+
+    def __getitem__(self, name: str) -> int:
+        """Return the present value of an input."""
+        return self._values[name]
+
+    def set(self, name: str, value: int) -> None:
+        """Set an input.
+
+        Raises:
+            ValueError: no such input, or a value out of its range.
+        """
+        item = self.find(name)
+        if not item.low <= value <= item.high:
+            unit = f" {item.unit}" if item.unit else ""
+            raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
+        self._values[name] = value
+        self.changed = True
+
+    def find(self, name: str, kind: Kind | None = None) -> Input:
+        """Return the description of an input.
+
+        Raises:
+            ValueError: no such input, or none of this kind.
+        """
+        item = self.table.get(name)
+        if item is None or kind not in (None, item.kind):
+            wanted = kind.value if kind else "input"
+            known = [i.name for i in self.table.values() if kind in (None, i.kind)]
+            raise ValueError(f"no {wanted} {name!r}; known: {', '.join(known) or 'none'}")
+        return item

@@ -1,0 +1,1 @@
+"""Devices put onto buses and ptys: rig, clocks, wires, faults, command lines."""

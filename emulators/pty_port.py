@@ -1,0 +1,96 @@
+"""The master side of a pseudo-terminal, under a name that stays."""
+
+from __future__ import annotations
+
+import os
+import tty
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.core import NEVER
+
+READ_BYTES: Final = 4_096
+
+
+class PtyPort:
+    """A `Port[bytes]` whose other side any serial program can open.
+
+    The emulator keeps the other side open too, so hosts may come and go. What
+    nobody reads is kept up to `buffer_bytes` here and some 4 KiB in the kernel;
+    after that whole sends are dropped and counted.
+
+    Args:
+        link: path of a symbolic link to the terminal; none if not given. A link
+            that is left over from a killed emulator is replaced.
+        buffer_bytes: bytes kept for a host that does not read.
+
+    Attributes:
+        path: the terminal, as `/dev/pts/7`.
+        lost: bytes dropped because nobody read.
+
+    Raises:
+        FileExistsError: `link` exists and is not a dead symbolic link.
+        OSError: no pseudo-terminal is to be had, or no link can be made there.
+    """
+
+    def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self.lost = 0
+        self._buffer_bytes, self._unsent = buffer_bytes, b""
+        self._link: Path | None = None
+        if link is not None:
+            try:
+                self._make_link(link)
+            except OSError:
+                self.close()
+                raise
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the host."""
+        return NEVER
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Read without waiting."""
+        self._flush()
+        try:
+            return os.read(self._master, READ_BYTES)
+        except BlockingIOError:
+            return b""
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Write as much as fits; keep the rest for later."""
+        if len(self._unsent) + len(traffic) > self._buffer_bytes:
+            self.lost += len(traffic)
+        else:
+            self._unsent += traffic
+        self._flush()
+
+    def close(self) -> None:
+        """Give the pseudo-terminal back and remove the link."""
+        if self._link is not None and self._links_here(self._link):
+            self._link.unlink()
+        self._link = None
+        for fd in (self._master, self._slave):
+            if fd >= 0:
+                os.close(fd)
+        self._master = self._slave = -1
+
+    def _flush(self) -> None:
+        if self._unsent:
+            try:
+                self._unsent = self._unsent[os.write(self._master, self._unsent) :]
+            except BlockingIOError:
+                return
+
+    def _make_link(self, link: Path) -> None:
+        if link.is_symlink() and not link.exists():
+            link.unlink()
+        link.symlink_to(self.path)
+        self._link = link
+
+    def _links_here(self, link: Path) -> bool:
+        return link.is_symlink() and os.readlink(link) == self.path

@@ -1,0 +1,141 @@
+"""An asynchronous serial line in memory, with its baud rate and finite buffers."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from tickrig.device.core import NEVER
+
+
+class SerialLine:
+    """Two ends joined by two independent directions.
+
+    A byte is delivered when its stop bit has passed. What is sent while the
+    line is busy waits its turn; what finds a buffer full is lost and counted.
+    Not emulated: parity and framing errors, break, modem control lines.
+
+    Args:
+        baud: bit rate in bit/s.
+        frame_bits: bits of a byte on the line, 10 for 8N1.
+        buffer_bytes: size of each sender's and each receiver's buffer.
+
+    >>> line = SerialLine(baud=115_200)
+    >>> line.a.send(0, b"OK:beep")
+    >>> line.b.poll(100), line.b.poll(10_000)
+    (b'O', b'K:beep')
+    """
+
+    def __init__(
+        self, baud: int = 115_200, frame_bits: int = 10, buffer_bytes: int = 4_096
+    ) -> None:
+        if min(baud, frame_bits, buffer_bytes) < 1:
+            raise ValueError("baud rate, frame bits and buffer size must be at least 1")
+        there = _Direction(baud, frame_bits * 1_000_000, buffer_bytes)
+        back = _Direction(baud, frame_bits * 1_000_000, buffer_bytes)
+        self.a = LineEnd(back, there)
+        self.b = LineEnd(there, back)
+
+
+class LineEnd:
+    """One end of a `SerialLine`; a `Port[bytes]`."""
+
+    __slots__ = ("_in", "_out")
+
+    def __init__(self, incoming: _Direction, outgoing: _Direction) -> None:
+        self._in, self._out = incoming, outgoing
+
+    @property
+    def due_us(self) -> int:
+        """When the next byte will have arrived here."""
+        return self._in.first_us
+
+    @property
+    def idle_us(self) -> int:
+        """When the last byte that is on its way here will have arrived."""
+        return self._in.last_us
+
+    @property
+    def lost(self) -> int:
+        """Bytes from the other end that found a buffer full."""
+        return self._in.lost
+
+    def room(self, now_us: int) -> int:
+        """Return how many bytes `send` takes at `now_us` without loss."""
+        return self._out.room(now_us)
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Take the bytes that have arrived by `now_us`."""
+        return self._in.take(now_us)
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Queue bytes behind those that are still being sent."""
+        if traffic:
+            self._out.put(now_us, traffic)
+
+
+class _Burst:
+    """Bytes sent back to back."""
+
+    __slots__ = ("data", "start_us", "taken")
+
+    def __init__(self, start_us: int, data: bytes) -> None:
+        self.start_us, self.data, self.taken = start_us, data, 0
+
+
+class _Direction:
+    """One direction of the line."""
+
+    __slots__ = ("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "first_us", "last_us", "lost")
+
+    def __init__(self, baud: int, byte_cost: int, buffer_bytes: int) -> None:
+        self._baud, self._byte_cost, self._buffer_bytes = baud, byte_cost, buffer_bytes
+        self._bursts: deque[_Burst] = deque()
+        self.first_us = self.last_us = NEVER
+        self.lost = 0
+
+    def put(self, now_us: int, data: bytes) -> None:
+        room = self.room(now_us)
+        self.lost += max(0, len(data) - room)
+        data = data[:room]
+        if not data:
+            return
+        if self._bursts and now_us < self.last_us:
+            self._bursts[-1].data += data
+        else:
+            self._bursts.append(_Burst(now_us, data))
+        self._note_due()
+
+    def take(self, now_us: int) -> bytes:
+        if now_us < self.first_us:
+            return b""
+        taken = []
+        while self._bursts:
+            burst = self._bursts[0]
+            arrived = self._arrived(burst, now_us)
+            taken.append(burst.data[burst.taken : arrived])
+            burst.taken = arrived
+            if arrived < len(burst.data):
+                break
+            self._bursts.popleft()
+        self._note_due()
+        data = b"".join(taken)
+        self.lost += max(0, len(data) - self._buffer_bytes)
+        return data[: self._buffer_bytes]
+
+    def room(self, now_us: int) -> int:
+        waiting = sum(len(b.data) - self._arrived(b, now_us) for b in self._bursts)
+        return self._buffer_bytes - waiting
+
+    def _arrived(self, burst: _Burst, now_us: int) -> int:
+        return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)
+
+    def _arrival_us(self, burst: _Burst, count: int) -> int:
+        return burst.start_us - (-count * self._byte_cost // self._baud)
+
+    def _note_due(self) -> None:
+        if not self._bursts:
+            self.first_us = self.last_us = NEVER
+            return
+        first, last = self._bursts[0], self._bursts[-1]
+        self.first_us = self._arrival_us(first, first.taken + 1)
+        self.last_us = self._arrival_us(last, len(last.data))

@@ -1,0 +1,1 @@
+"""Host-side proxies and monitors: hardware or emulator, they cannot tell."""

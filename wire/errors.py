@@ -1,0 +1,25 @@
+"""What a codec says about bytes it cannot read.
+
+WireError (ValueError)
+ +-- FramingError     no message here: bad name, length or terminator
+ +-- ChecksumError    a whole message, but its check does not match
+ +-- FieldError       a sound message with a field out of range
+"""
+
+from __future__ import annotations
+
+
+class WireError(ValueError):
+    """Bytes that are not a message of this protocol."""
+
+
+class FramingError(WireError):
+    """No message here: bad name, length or terminator."""
+
+
+class ChecksumError(WireError):
+    """A whole message, but its check does not match."""
+
+
+class FieldError(WireError):
+    """A sound message with a field out of range."""

@@ -1,0 +1,38 @@
+"""Cut a byte stream into LF-terminated lines."""
+
+from __future__ import annotations
+
+
+class LineSplitter:
+    r"""Collects bytes and gives whole lines; chunking makes no difference.
+
+    Args:
+        max_bytes: a line that grows longer is given out in pieces, so that
+            noise without LF cannot fill the memory.
+
+    >>> splitter = LineSplitter()
+    >>> splitter.push(b"OK:be"), splitter.push(b"ep\r\nEV:")
+    ([], [b'OK:beep'])
+    """
+
+    def __init__(self, max_bytes: int = 1_024) -> None:
+        self._tail = b""
+        self._max_bytes = max_bytes
+
+    def push(self, data: bytes) -> list[bytes]:
+        """Take bytes in; give whole lines out, without LF and one CR before it."""
+        *lines, tail = (self._tail + data).split(b"\n")
+        out = []
+        for line in lines:
+            *pieces, last = self._pieces(line)
+            out += [*pieces, last.removesuffix(b"\r")]
+        *pieces, self._tail = self._pieces(tail)
+        return out + pieces
+
+    def _pieces(self, line: bytes) -> list[bytes]:
+        size = self._max_bytes
+        return [line[at : at + size] for at in range(0, max(1, len(line)), size)]
+
+    def clear(self) -> None:
+        """Forget a line that has only begun."""
+        self._tail = b""

@@ -1,0 +1,295 @@
+r"""Commands from the host to the RRC (RRC manual, list of commands host to RRC).
+
+>>> Output(v_pct=30, w_pct=-1).encode()
+b'output1eff\n'
+>>> Output(v_pct=30, w_pct=0).encode(check=True)
+b'output1e007\n'
+>>> parse_command(b"statusA1")
+Status(on=1)
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields
+from typing import ClassVar, Final, NamedTuple
+
+from tickrig.wire.errors import FieldError, FramingError
+from tickrig.wire.rrc.check import check_digit
+from tickrig.wire.rrc.hexdigits import read_hex, read_signed
+
+
+class Parameter(NamedTuple):
+    """One parameter of a command: how many digits, and which values are allowed."""
+
+    width: int
+    low: int
+    high: int
+
+    def read(self, digits: bytes) -> int:
+        """Read the parameter from its digits; FieldError for a bad digit or value."""
+        value = read_signed(digits) if self.low < 0 else read_hex(digits)
+        return self.checked(value)
+
+    def write(self, value: int) -> bytes:
+        """Write the parameter in lower case, as the manual's samples do."""
+        return b"%0*x" % (self.width, value & 0xFF)
+
+    def checked(self, value: int) -> int:
+        """Return the value; FieldError if it is out of range."""
+        if not self.low <= value <= self.high:
+            raise FieldError(f"{value} is not in {self.low}..{self.high}")
+        return value
+
+
+PERCENT: Final = Parameter(2, 0, 100)
+SIGNED_PERCENT: Final = Parameter(2, -100, 100)
+BYTE: Final = Parameter(2, 0, 255)
+ANGLE: Final = Parameter(2, 0, 90)
+NIBBLE: Final = Parameter(1, 0, 15)
+FLAG: Final = Parameter(1, 0, 1)
+SPEED_MODE: Final = Parameter(1, 1, 5)
+REVERSE_MODE: Final = Parameter(1, 0, 3)
+
+
+class UnknownCommand(FramingError):  # noqa: N818 - the manual's word: CommandUnknown
+    """No command begins like this."""
+
+
+class BadParameters(FieldError):  # noqa: N818 - what came
+    """A known command with a wrong number of digits, a bad digit or a bad value.
+
+    Attributes:
+        name: the command's name.
+    """
+
+    def __init__(self, name: bytes, reason: str) -> None:
+        super().__init__(f"{name.decode()}: {reason}")
+        self.name = name
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Base of all commands: a name, and parameters of fixed width."""
+
+    name: ClassVar[bytes]
+    literal: ClassVar[bytes] = b""  # what stands between the name and the parameters
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse values that do not fit; BadParameters says which."""
+        values = self.values()
+        if len(values) != len(self.parameters):
+            raise BadParameters(self.name, f"{len(values)} values, not {len(self.parameters)}")
+        for number, (parameter, value) in enumerate(zip(self.parameters, values, strict=True), 1):
+            try:
+                parameter.checked(value)
+            except FieldError as error:
+                raise BadParameters(self.name, f"#{number} {error}") from error
+
+    def values(self) -> tuple[int, ...]:
+        """Return the parameters #1, #2, ... in order."""
+        return tuple(getattr(self, item.name) for item in fields(self))
+
+    def encode(self, *, check: bool = False) -> bytes:
+        """Write the line with its LF, and with CHECK where stablemode wants it."""
+        digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
+        message = self.name + self.literal + b"".join(digits)
+        return message + (check_digit(message) if check else b"") + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Limit(Command):
+    """Let the stick drive, within limits.
+
+    Attributes:
+        v_pct: #1, translation input limit, 0..100 %.
+        w_pct: #2, rotation input limit, 0..100 %.
+        sum_pct: #3, limit of |v| + |w|, 0..255 %.
+        product_pct: #4, limit of |v| * |w| / 100, 0..255 %.
+        radius_pct: #5, limit of the root of v² + w², 0..255 %.
+    """
+
+    name = b"limit"
+    parameters = (PERCENT, PERCENT, BYTE, BYTE, BYTE)
+
+    v_pct: int
+    w_pct: int
+    sum_pct: int = 255
+    product_pct: int = 255
+    radius_pct: int = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Output(Command):
+    """Let the host drive: translation (forward) and rotation (right), -100..100 %."""
+
+    name = b"output"
+    parameters = (SIGNED_PERCENT, SIGNED_PERCENT)
+
+    v_pct: int
+    w_pct: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceName(Command):
+    """Ask for the device name."""
+
+    name = b"device"
+
+
+@dataclass(frozen=True, slots=True)
+class Version(Command):
+    """Ask for the version."""
+
+    name = b"version"
+
+
+@dataclass(frozen=True, slots=True)
+class Date(Command):
+    """Ask for the date and time of compilation."""
+
+    name = b"date"
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedMode(Command):
+    """Choose the speed mode, 1 (slowest) to 5; `locked` = 1 locks the speed buttons."""
+
+    name = b"speedmode"
+    parameters = (SPEED_MODE, FLAG)
+
+    mode: int
+    locked: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Joystick(Command):
+    """Shape the stick. The defaults are those of the emulator (DECISION R15).
+
+    Attributes:
+        v_low_pct: #1, translation that counts as 0; below `v_high_pct`.
+        w_low_pct: #2, rotation that counts as 0; below `w_high_pct`.
+        v_high_pct: #3, translation that counts as 100.
+        w_high_pct: #4, rotation that counts as 100.
+        v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
+        w_exponent: #6, 0..15.
+        reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change turned round.
+        neutral_pct: #8, neutral radius, 0..100 %.
+        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back.
+        fade_deg: #10, where the backward gear begins to fade, 0..90 from straight back.
+    """
+
+    name = b"joystick"
+    parameters = (*[PERCENT] * 4, NIBBLE, NIBBLE, REVERSE_MODE, PERCENT, ANGLE, ANGLE)
+
+    v_low_pct: int = 0
+    w_low_pct: int = 0
+    v_high_pct: int = 100
+    w_high_pct: int = 100
+    v_exponent: int = 0
+    w_exponent: int = 0
+    reverse_mode: int = 0
+    neutral_pct: int = 5
+    switch_deg: int = 30
+    fade_deg: int = 45
+
+    def __post_init__(self) -> None:
+        """Refuse a dead zone that is upside down, too."""
+        Command.__post_init__(self)
+        if self.v_low_pct >= self.v_high_pct or self.w_low_pct >= self.w_high_pct:
+            raise BadParameters(self.name, "lower dead zone is not below the upper one")
+
+
+@dataclass(frozen=True, slots=True)
+class Watchdog(Command):
+    """Stop VR2 after this time without a correct command: 0..255 x 10 ms, 0 is off."""
+
+    name = b"watchdog"
+    parameters = (BYTE,)
+
+    time_10ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class StableMode(Command):
+    """Switch stablemode: CHECK wanted on each line, and no OK lines."""
+
+    name = b"stablemode"
+    parameters = (FLAG,)
+
+    on: int
+
+
+@dataclass(frozen=True, slots=True)
+class Status(Command):
+    """Switch the stream of SA lines (type A is the only one of version 1.0)."""
+
+    name = b"status"
+    literal = b"A"
+    parameters = (FLAG,)
+
+    on: int
+
+
+@dataclass(frozen=True, slots=True)
+class PowerOff(Command):
+    """Stop VR2 by force."""
+
+    name = b"poweroff"
+
+
+@dataclass(frozen=True, slots=True)
+class Beep(Command):
+    """Sound the buzzer: five pairs of on and off times, 0..255 x 10 ms each."""
+
+    name = b"beep"
+    parameters = (BYTE,) * 10
+
+    times_10ms: tuple[int, ...]
+
+    def values(self) -> tuple[int, ...]:
+        """Return the ten times."""
+        return self.times_10ms
+
+
+COMMANDS: Final[dict[bytes, type[Command]]] = {
+    kind.name: kind
+    for kind in (
+        *(Limit, Output, DeviceName, Version, Date, SpeedMode),
+        *(Joystick, Watchdog, StableMode, Status, PowerOff, Beep),
+    )
+}
+
+_NAME: Final = re.compile(b"|".join(COMMANDS))  # no name is a prefix of another
+
+
+def parse_command(message: bytes) -> Command:
+    """Read a command without line end and CHECK.
+
+    Raises:
+        UnknownCommand: no command has this name; names are lower case.
+        BadParameters: wrong number of digits, a bad digit, a value out of range.
+    """
+    match = _NAME.match(message)
+    if match is None:
+        raise UnknownCommand(f"{message!r} is none of {', '.join(n.decode() for n in COMMANDS)}")
+    kind = COMMANDS[match[0]]
+    values = _read_parameters(kind, message[match.end() :])
+    return Beep(values) if kind is Beep else kind(*values)
+
+
+def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:
+    """Cut the text behind the name into parameters; BadParameters if it does not fit."""
+    at = len(kind.literal)
+    size = at + sum(p.width for p in kind.parameters)
+    if len(text) != size or not text.startswith(kind.literal):
+        raise BadParameters(kind.name, f"{text!r} is not {size} characters of its grammar")
+    values = []
+    for number, parameter in enumerate(kind.parameters, 1):
+        try:
+            values.append(parameter.read(text[at : at + parameter.width]))
+        except FieldError as error:
+            raise BadParameters(kind.name, f"#{number} {error}") from error
+        at += parameter.width
+    return tuple(values)

@@ -1,0 +1,173 @@
+"""Lines from the RRC to the host (RRC manual, list of commands RRC to host).
+
+>>> status = parse_reply(b"SA:64003200A1000F")
+>>> status.in_v_pct, status.out_v_pct, status.gauge
+(100, 50, 10)
+>>> parse_reply(b"EV:PowerOnTrigger").kind
+<EventKind.POWER_ON: 'PowerOn'>
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from tickrig.wire.errors import FieldError, FramingError
+from tickrig.wire.rrc.check import check_digit, strip_check
+from tickrig.wire.rrc.hexdigits import read_hex, read_signed
+
+COMMAND_CHECKSUM: Final = "CommandChecksum"
+COMMAND_UNKNOWN: Final = "CommandUnknown"
+RECEIVE_BUFFER_OVERFLOW: Final = "ReceiveBufferOverflow"
+
+
+class EventKind(StrEnum):
+    """The 16 events of the manual."""
+
+    INITIALIZED = "Initialized"
+    POWER_ON = "PowerOn"
+    POWER_ON_SUCCESS = "PowerOnSuccess"
+    POWER_ON_ERROR1 = "PowerOnError1"
+    POWER_ON_ERROR2 = "PowerOnError2"
+    POWER_ON_TIMEOUT = "PowerOnTimeout"
+    BY_BUTTON = "PowerOffWaitByButton"
+    BY_COMMUNICATION_ERROR = "PowerOffWaitByCommunicationError"
+    BY_JOYSTICK_MODULE_ERROR = "PowerOffWaitByJoystickModuleError"
+    BY_POWER_MODULE_ERROR = "PowerOffWaitByPowerModuleError"
+    BY_SYSTEM_ERROR = "PowerOffWaitBySystemError"
+    BY_HOST = "PowerOffWaitByHost"
+    BY_WATCHDOG = "PowerOffWaitByWatchdog"
+    BY_OVER_TIME = "PowerOffWaitByOverTime"
+    BY_NO_COMMUNICATION = "PowerOffWaitByNoCommunication"
+    POWER_OFF_FINISHED = "PowerOffFinished"
+
+
+POWER_ON_TRIGGER: Final = "PowerOnTrigger"
+"""What devices in the field send for `PowerOn` (DECISION R7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ok:
+    """`OK:name`: the command was carried out."""
+
+    name: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"OK:%b\n" % self.name.encode("ascii")
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """`ER:reason`: a command's name, or what was wrong with the line."""
+
+    reason: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"ER:%b\n" % self.reason.encode("ascii")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`EV:name`: the state of RRC or VR2 changed. The name may be a newer firmware's."""
+
+    name: str
+
+    @property
+    def kind(self) -> EventKind | None:
+        """Which of the manual's events this is; None for one it does not list."""
+        if self.name == POWER_ON_TRIGGER:
+            return EventKind.POWER_ON
+        try:
+            return EventKind(self.name)
+        except ValueError:
+            return None
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"EV:%b\n" % self.name.encode("ascii")
+
+
+@dataclass(frozen=True, slots=True)
+class StatusA:
+    """`SA:`: the state of RRC and VR2, once a period of 10 ms.
+
+    Attributes:
+        in_v_pct: #1, translation of the stick, -100..100 %.
+        in_w_pct: #2, rotation of the stick.
+        out_v_pct: #3, translation that goes to the power module.
+        out_w_pct: #4, rotation that goes to the power module.
+        gauge: #5, voltage gauge, 1..10.
+        speed_mode: #6, 1..5.
+        speed_up_count: #7, 0..15; odd while the button is pressed.
+        speed_down_count: #8.
+        alarm_count: #9.
+    """
+
+    in_v_pct: int
+    in_w_pct: int
+    out_v_pct: int
+    out_w_pct: int
+    gauge: int
+    speed_mode: int
+    speed_up_count: int
+    speed_down_count: int
+    alarm_count: int
+
+    def encode(self) -> bytes:
+        """Write the line with CHECK and LF."""
+        message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
+            *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
+            *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),
+            *(self.gauge, self.speed_mode),
+            *(self.speed_up_count, self.speed_down_count, self.alarm_count),
+        )
+        return message + check_digit(message) + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Any other line: the answer of `device`, `version`, `date`, or a newer firmware's."""
+
+    text: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return self.text.encode("latin-1") + b"\n"
+
+
+Reply = Ok | Refusal | Event | StatusA | Text
+
+_BY_PREFIX: Final[dict[bytes, type[Ok] | type[Refusal] | type[Event]]] = {
+    b"OK:": Ok,
+    b"ER:": Refusal,
+    b"EV:": Event,
+}
+
+
+def parse_reply(line: bytes) -> Reply:
+    """Read a line without its LF.
+
+    Raises:
+        FramingError: an SA line of a wrong length.
+        ChecksumError: an SA line whose CHECK does not match.
+        FieldError: an SA line with a bad digit or a value out of range.
+    """
+    prefix = line[:3]
+    if prefix == b"SA:":
+        return _parse_status(line)
+    kind = _BY_PREFIX.get(prefix)
+    return Text(line.decode("latin-1")) if kind is None else kind(line[3:].decode("latin-1"))
+
+
+def _parse_status(line: bytes) -> StatusA:
+    if len(line) != 17:
+        raise FramingError(f"{line!r} has {len(line)} characters, an SA line has 17")
+    message = strip_check(line)
+    percents = [read_signed(message[at : at + 2]) for at in (3, 5, 7, 9)]
+    gauge, speed_mode, *counts = (read_hex(message[at : at + 1]) for at in range(11, 16))
+    if max(map(abs, percents)) > 100 or not 1 <= gauge <= 10 or not 1 <= speed_mode <= 5:
+        raise FieldError(f"{line!r}: a percentage, gauge or speed mode is out of range")
+    return StatusA(*percents, gauge, speed_mode, *counts)
