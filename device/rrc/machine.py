@@ -1,0 +1,281 @@
+"""The RRC: what it does in each period of 10 ms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.device.physical import InputBank, Output
+from tickrig.device.rrc.buzzer import Buzzer
+from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.rrc.controller import chosen_mode, look_at_buttons
+from tickrig.device.rrc.drive import Drive
+from tickrig.device.rrc.interpreter import read_line
+from tickrig.device.rrc.load import LoadAccount
+from tickrig.device.rrc.power import PowerSequence
+from tickrig.device.rrc.receive_buffer import ReceiveBuffer
+from tickrig.device.rrc.settings import Settings
+from tickrig.device.rrc.states import NEXT_STATE, POWERED_ON, Move, RrcState
+from tickrig.device.rrc.terminals import OUTPUTS, new_inputs
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, EventKind, Ok, Refusal, Text
+from tickrig.wire.rrc.replies import StatusA as Status
+
+TICK_US: Final = 10_000
+"""The RRC's internal command period (RRC manual, notes)."""
+
+LINES_A_TICK: Final = 2
+"""Lines worked on in a tick while VR2 runs; elsewhere one in two ticks (DECISION R27)."""
+
+MOVES: Final[dict[type[cmd.Command], Move]] = {
+    cmd.Limit: Move.LIMIT,
+    cmd.Output: Move.OUTPUT,
+    cmd.PowerOff: Move.FORCED,
+}
+
+
+@dataclass(slots=True)
+class Rrc:
+    """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
+
+    Not emulated: the traffic on the VR2 bus itself, how fast the vehicle drives
+    in which speed mode, what the alarm button's horn sounds like, the USB
+    serial driver.
+
+    Attributes:
+        config: durations, names and sizes.
+        inputs: what the world does to it, see `terminals.INPUTS`.
+        state: where it is in the manual's state diagram.
+    """
+
+    config: RrcConfig = field(default_factory=RrcConfig)
+    inputs: InputBank = field(default_factory=new_inputs)
+    state: RrcState = field(default=RrcState.OFF, init=False)
+    _settings: Settings = field(init=False)
+    _buffer: ReceiveBuffer = field(init=False)
+    _power: PowerSequence = field(init=False)
+    _drive: Drive = field(init=False)
+    _buzzer: Buzzer = field(init=False)
+    _load: LoadAccount = field(init=False)
+    _renewed: int = field(default=0, init=False)  # tick of the latest correct command
+    _due_us: int = field(default=0, init=False)
+    _sent: list[bytes] = field(default_factory=list, init=False)
+    _commands: int = field(default=0, init=False)
+    _replies: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        """Begin without power."""
+        self.reset()
+
+    @property
+    def tick_us(self) -> int:
+        """The internal period."""
+        return TICK_US
+
+    @property
+    def due_us(self) -> int:
+        """When anything would happen without a command."""
+        return 0 if self.inputs.changed else self._due_us
+
+    @property
+    def outputs(self) -> dict[str, Output]:
+        """What `read` knows."""
+        return OUTPUTS
+
+    def reset(self) -> None:
+        """Forget everything but configuration and physical inputs, as a power cut does."""
+        self.state = RrcState.OFF
+        self._buffer = ReceiveBuffer(self.config.buffer_bytes)
+        self._power = PowerSequence(self.config)
+        self._wipe()
+        self._due_us = 0
+
+    def read(self, name: str, /) -> int | str:
+        """Return one of `outputs` as it was left by the latest tick; KeyError if unknown."""
+        return {
+            "state": self.state.value,
+            "vr2_power": int(self.state in POWERED_ON),
+            "error_led": int(self.state is RrcState.POWER_OFF_BY_OTHERS),
+            "out_v_pct": self._drive.out_pct[0],
+            "out_w_pct": self._drive.out_pct[1],
+            "speed_mode": self._settings.speed_mode,
+            "gear": self._drive.gearbox.gear.value,
+            "buzzer": int(self._buzzer.sounding),
+            "backlog_pct": self._load.backlog_pct,
+        }[name]
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        """Run one period, in the order of DECISION R28."""
+        tick = now_us // TICK_US
+        self.inputs.changed = False
+        if not self.inputs["rrc_power"]:
+            self.reset()
+            self._due_us = NEVER
+            return b""
+        if self.state is RrcState.OFF:
+            self._boot(tick)
+        self._sent, self._commands, self._replies = [], 0, 0
+        self._receive(rx)
+        self._look(tick)
+        self._work(tick)
+        self._watch(tick)
+        self._drive.step(tick, self.state, self._settings, self.inputs)
+        self._report_and_account(tick)
+        self._buzzer.tick(tick, self._drive.alarm_since)
+        self._due_us = self._next_due(tick) * TICK_US
+        return b"".join(self._sent)
+
+    def _boot(self, tick: int) -> None:
+        """Make transition 1 in the tick before, so that this one ends Initialize."""
+        self.state = RrcState.INITIALIZE
+        self._power.enter(self.state, tick - 1)
+
+    def _receive(self, rx: bytes) -> None:
+        for _ in range(self._buffer.push(rx) if rx else 0):
+            self._reply(Refusal(RECEIVE_BUFFER_OVERFLOW))
+
+    def _look(self, tick: int) -> None:
+        """Take notice of buttons, faults and time."""
+        if self.state in POWERED_ON and look_at_buttons(self.inputs, self._settings):
+            self._choose_drive()
+        event, move = self._power.step(self.state, tick, self.inputs)
+        if event is not None:
+            self._sent.append(Event(event).encode())
+        if move is not None:
+            self._move(move, tick)
+
+    def _choose_drive(self) -> None:
+        """Let the stick drive in Standby as the held buttons say (DECISION R8)."""
+        mode = chosen_mode(self.inputs)
+        if self.state is RrcState.STANDBY and mode != self._settings.button_mode:
+            self._settings.button_mode = mode
+            self._drive.gearbox.reset()
+
+    def _work(self, tick: int) -> None:
+        """Work on as many lines as the period allows."""
+        quota = LINES_A_TICK if self.state in POWERED_ON else 1 - tick % 2
+        while self._commands < quota and self._buffer:
+            self._commands += 1
+            self._answer(self._buffer.pop(), tick)
+
+    def _answer(self, line: bytes, tick: int) -> None:
+        """Do what a line asks for; the reply keeps to the mode it came in (DECISION R21)."""
+        stable = self._settings.stable
+        request = read_line(line, check_wanted=stable)
+        if request is None:
+            return
+        if isinstance(request, Refusal):
+            if request.reason == "beep":  # it silences even when it is in error (DECISION R9)
+                self._buzzer.silence()
+            self._reply(request)
+        elif self._obey(request, tick):
+            self._renewed = tick
+            if not stable:
+                self._reply(Ok(request.name.decode()))
+            self._follow_up(request)
+        else:
+            self._reply(Refusal(request.name.decode()))
+
+    def _obey(self, command: cmd.Command, tick: int) -> bool:
+        """Carry out a command; False if it is not allowed in this state (DECISION R10)."""
+        move = MOVES.get(type(command))
+        if move is not None and not self._move(move, tick):
+            return False
+        if isinstance(command, cmd.Beep):
+            self._buzzer.play(tick, command.times_10ms)
+        if self._changes_reverse_mode(command):
+            self._drive.gearbox.reset()
+        self._settings.store(command)
+        return True
+
+    def _changes_reverse_mode(self, command: cmd.Command) -> bool:
+        now = self._settings.joystick.reverse_mode
+        return isinstance(command, cmd.Joystick) and command.reverse_mode != now
+
+    def _follow_up(self, command: cmd.Command) -> None:
+        """Send what follows the OK line (DECISION R12, R26)."""
+        match command:
+            case cmd.DeviceName():
+                self._reply(Text(self.config.device_name))
+            case cmd.Version():
+                self._reply(Text(self.config.version))
+            case cmd.Date():
+                self._reply(Text(self.config.date))
+            case cmd.PowerOff():
+                self._sent.append(Event(EventKind.BY_HOST).encode())
+            case _:
+                return
+
+    def _watch(self, tick: int) -> None:
+        """Trip the watchdog (DECISION R20)."""
+        ticks = self._settings.watchdog_ticks
+        if ticks and self.state in POWERED_ON and tick - self._renewed >= ticks:
+            self._stop_by_force(EventKind.BY_WATCHDOG, tick)
+
+    def _stop_by_force(self, cause: EventKind, tick: int) -> None:
+        self._move(Move.FORCED, tick)
+        self._sent.append(Event(cause).encode())
+
+    def _report_and_account(self, tick: int) -> None:
+        """Send the SA line, then see whether the period was long enough for it all."""
+        status = self._settings.status and self.state in POWERED_ON
+        if status:
+            self._sent.append(self._status().encode())
+        extra_pct = self.inputs["extra_load_pct"]
+        self._load.spend(self._commands, self._replies, status=status, extra_pct=extra_pct)
+        if self.config.overtime and self._load.too_far_behind and self.state in POWERED_ON:
+            self._stop_by_force(EventKind.BY_OVER_TIME, tick)
+
+    def _status(self) -> Status:
+        settings, inputs = self._settings, self.inputs
+        return Status(
+            inputs["stick_v_pct"],
+            inputs["stick_w_pct"],
+            *self._drive.out_pct,
+            inputs["gauge"],
+            settings.speed_mode,
+            settings.speed_up_count,
+            settings.speed_down_count,
+            settings.alarm_count,
+        )
+
+    def _reply(self, reply: Ok | Refusal | Text) -> None:
+        self._replies += 1
+        self._sent.append(reply.encode())
+
+    def _move(self, move: Move, tick: int) -> bool:
+        """Change the state; False if there is no such transition."""
+        state = NEXT_STATE.get((self.state, move))
+        if state is None:
+            return False
+        if state is RrcState.LIMIT and self.state is not RrcState.LIMIT:
+            self._drive.gearbox.reset()
+        if not {self.state, state} <= POWERED_ON:
+            self._power.enter(state, tick)
+        if state is RrcState.STANDBY:
+            self._renewed = tick
+        self.state = state
+        if state is RrcState.POWER_OFF_FINISHED:
+            self._move(Move.RESTART, tick)
+        if state is RrcState.INITIALIZE:
+            self._wipe()
+        return True
+
+    def _wipe(self) -> None:
+        """Reset what Initialize resets (RRC manual, state description; DECISION R5)."""
+        self._settings = Settings()
+        self._drive, self._buzzer, self._load = Drive(), Buzzer(), LoadAccount()
+
+    def _next_due(self, tick: int) -> int:
+        """Return the next tick at which something happens without input."""
+        settings, running = self._settings, self.state in POWERED_ON
+        if self._buffer or self._load.backlog_pct or (settings.status and running):
+            return tick + 1
+        due = self._power.due_tick(self.state)
+        for changes_at in (self._buzzer.changes_at, self._drive.changes_at):
+            if changes_at is not None:
+                due = min(due, changes_at)
+        if running and settings.watchdog_ticks:
+            due = min(due, self._renewed + settings.watchdog_ticks)
+        return min(due, NEVER // TICK_US)

@@ -1,0 +1,57 @@
+"""The RRC's receive buffer and what happens when it is full."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+
+@dataclass(slots=True)
+class ReceiveBuffer:
+    """Bytes that wait to be worked on, cut into lines (DECISION R27).
+
+    The byte that does not fit drops all that waits; it and what follows are
+    ignored up to the next LF.
+
+    Attributes:
+        size: bytes it holds, line ends included.
+    """
+
+    size: int
+    _lines: deque[bytes] = field(default_factory=deque, init=False)
+    _used: int = field(default=0, init=False)
+    _begun: bytes = field(default=b"", init=False)
+    _ignoring: bool = field(default=False, init=False)
+
+    def __bool__(self) -> bool:
+        """Whether a whole line waits."""
+        return bool(self._lines)
+
+    def push(self, data: bytes) -> int:
+        """Take bytes from the line; return how often the buffer overflowed."""
+        overflows = 0
+        *lines, tail = data.split(b"\n")
+        for line in lines:
+            overflows += self._push(line + b"\n")
+            if not self._ignoring:
+                self._lines.append(self._begun[:-1])
+            self._begun, self._ignoring = b"", False
+        return overflows + self._push(tail)
+
+    def pop(self) -> bytes:
+        """Take the oldest whole line, without its LF."""
+        line = self._lines.popleft()
+        self._used -= len(line) + 1
+        return line
+
+    def _push(self, piece: bytes) -> bool:
+        """Append a piece of one line; True if that was too much."""
+        if self._ignoring:
+            return False
+        if self._used + len(piece) > self.size:
+            self._lines.clear()
+            self._used, self._begun, self._ignoring = 0, b"", True
+            return True
+        self._used += len(piece)
+        self._begun += piece
+        return False

@@ -1,0 +1,65 @@
+"""The physical side of the RRC and of the VR2 around it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.wire.rrc.replies import EventKind
+
+BUTTON: Final = Kind.BUTTON
+FAULT: Final = Kind.FAULT
+
+INPUTS: Final = (
+    Input("rrc_power", "supply of the RRC, from the VR2 battery or USB", initial=1),
+    Input("power_button", "power button of the controller", BUTTON),
+    Input("alarm_button", "alarm button of the controller", BUTTON),
+    Input("speed_up_button", "speed mode up, on the controller", BUTTON),
+    Input("speed_down_button", "speed mode down, on the controller", BUTTON),
+    Input("stick_v_pct", "stick, forward is positive", low=-100, high=100, unit="%"),
+    Input("stick_w_pct", "stick, right is positive", low=-100, high=100, unit="%"),
+    Input("gauge", "voltage gauge of the battery", low=1, high=10, initial=10),
+    Input("extra_load_pct", "work of the RRC beside its own, per period", high=1_000, unit="%"),
+    Input("bus_noise", "noise on the VR2 bus", FAULT),
+    Input("joystick_fault", "the joystick module says nonsense", FAULT),
+    Input("power_module_fault", "the power module says nonsense", FAULT),
+    Input("vr2_fault", "VR2 has an error of its own, as a motor without its cable", FAULT),
+    Input("bus_unplugged", "a connector of the VR2 bus is out", FAULT),
+)
+
+RUNNING_FAULTS: Final = {
+    "bus_noise": EventKind.BY_COMMUNICATION_ERROR,
+    "joystick_fault": EventKind.BY_JOYSTICK_MODULE_ERROR,
+    "power_module_fault": EventKind.BY_POWER_MODULE_ERROR,
+    "vr2_fault": EventKind.BY_SYSTEM_ERROR,
+    "bus_unplugged": EventKind.BY_NO_COMMUNICATION,
+}
+"""What each fault is called once it has lasted (condition 8, DECISION R25)."""
+
+POWER_ON_FAULTS: Final = {
+    "bus_noise": EventKind.POWER_ON_ERROR1,
+    "joystick_fault": EventKind.POWER_ON_ERROR1,
+    "power_module_fault": EventKind.POWER_ON_ERROR2,
+    "vr2_fault": EventKind.POWER_ON_ERROR2,
+}
+"""What each fault does to a power-on. The manual names two causes without saying which."""
+
+OUTPUTS: Final = {
+    output.name: output
+    for output in (
+        Output("state", "state of the RRC"),
+        Output("vr2_power", "1 while VR2 runs"),
+        Output("error_led", "1 while the controller's LED blinks an error"),
+        Output("out_v_pct", "translation to the power module", "%"),
+        Output("out_w_pct", "rotation to the power module", "%"),
+        Output("speed_mode", "speed mode of VR2, 1 to 5"),
+        Output("gear", "imitated gear: N, F or R"),
+        Output("buzzer", "1 while the RRC's buzzer sounds"),
+        Output("backlog_pct", "work that the RRC is behind, in per cent of a period", "%"),
+    )
+}
+
+
+def new_inputs() -> InputBank:
+    """Return the inputs of a fresh RRC: supplied, everything at rest, battery full."""
+    return InputBank(INPUTS, groups={"stick": ("stick_v_pct", "stick_w_pct")})
