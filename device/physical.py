@@ -101,12 +101,16 @@ class InputBank:
         Raises:
             ValueError: no such input, or a value out of its range.
         """
+        self.check(name, value)
+        self._values[name] = value
+        self.changed = True
+
+    def check(self, name: str, value: int) -> None:
+        """Raise ValueError unless the input can be set to this value."""
         item = self.find(name)
         if not item.low <= value <= item.high:
             unit = f" {item.unit}" if item.unit else ""
             raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
-        self._values[name] = value
-        self.changed = True
 
     def find(self, name: str, kind: Kind | None = None) -> Input:
         """Return the description of an input.
