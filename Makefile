@@ -1,0 +1,28 @@
+# Everything on a fresh machine: Python 3.11 or newer and make are enough.
+#   make test   lint, types, import contracts, wheel, tests, coverage
+#   make demo   an emulated RRC on a pty, driven by the host client
+PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
+VENV   ?= .venv
+READY  := $(VENV)/.ready
+
+.PHONY: test demo bench clean
+
+test: $(READY)
+	PATH="$(abspath $(VENV))/bin:$$PATH" tools/check
+
+demo: $(READY)
+	$(VENV)/bin/tickrig demo rrc
+
+bench: $(READY)
+	$(VENV)/bin/python tools/bench
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "tickrig needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.12"; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --upgrade pip
+	$(VENV)/bin/python -m pip install --quiet --editable '.[tui]' --group dev
+	@touch $(READY)
+
+clean:
+	rm -rf $(VENV) build dist src/*.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache

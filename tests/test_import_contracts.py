@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+VIOLATIONS = {
+    "device reads a clock": ("device/core.py", "import time"),
+    "wire does I/O": ("wire/errors.py", "import os"),
+    "device knows the host": ("device/core.py", "import tickrig.host.link"),
+    "host knows the device": ("host/link.py", "import tickrig.device.core"),
+    "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.clock"),
+}
+
+
+def lint(tree: Path) -> subprocess.CompletedProcess[str]:
+    program = "import sys; from importlinter.cli import lint_imports_command as c; c()"
+    command = [
+        sys.executable,
+        "-c",
+        program,
+        "--config",
+        str(ROOT / "pyproject.toml"),
+        "--no-cache",
+    ]
+    env = {"PYTHONPATH": str(tree), "PATH": ""}
+    return subprocess.run(command, cwd=tree, env=env, capture_output=True, text=True, check=False)
+
+
+def copied(tmp_path: Path) -> Path:
+    shutil.copytree(ROOT / "src" / "tickrig", tmp_path / "tickrig", symlinks=False)
+    return tmp_path
+
+
+def test_contracts_hold(tmp_path: Path) -> None:
+    done = lint(copied(tmp_path))
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("name", VIOLATIONS)
+def test_a_seeded_violation_breaks_a_contract(name: str, tmp_path: Path) -> None:
+    path, line = VIOLATIONS[name]
+    module = copied(tmp_path) / "tickrig" / path
+    source = module.read_text("utf-8")
+    module.write_text(source.replace("import annotations\n", f"import annotations\n{line}\n", 1))
+    done = lint(tmp_path)
+    assert done.returncode != 0
+    assert "broken" in done.stdout.lower()
