@@ -83,26 +83,30 @@ class _Burst:
 
 
 class _Direction:
-    """One direction of the line."""
+    """One direction of the line: only the latest burst can still be on its way."""
 
-    __slots__ = ("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "first_us", "last_us", "lost")
+    __slots__ = (
+        *("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "_held"),
+        *("first_us", "last_us", "lost"),
+    )
 
     def __init__(self, baud: int, byte_cost: int, buffer_bytes: int) -> None:
         self._baud, self._byte_cost, self._buffer_bytes = baud, byte_cost, buffer_bytes
         self._bursts: deque[_Burst] = deque()
+        self._held = 0  # bytes in all bursts that are not taken
         self.first_us = self.last_us = NEVER
         self.lost = 0
 
     def put(self, now_us: int, data: bytes) -> None:
-        room = self.room(now_us)
-        self.lost += max(0, len(data) - room)
-        data = data[:room]
-        if not data:
+        accepted = data[: self.room(now_us)]
+        self.lost += len(data) - len(accepted)
+        if not accepted:
             return
+        self._held += len(accepted)
         if self._bursts and now_us < self.last_us:
-            self._bursts[-1].data += data
+            self._bursts[-1].data += accepted
         else:
-            self._bursts.append(_Burst(now_us, data))
+            self._bursts.append(_Burst(now_us, accepted))
         self._note_due()
 
     def take(self, now_us: int) -> bytes:
@@ -117,14 +121,19 @@ class _Direction:
             if arrived < len(burst.data):
                 break
             self._bursts.popleft()
-        self._note_due()
         data = b"".join(taken)
+        self._held -= len(data)
+        self._note_due()
         self.lost += max(0, len(data) - self._buffer_bytes)
         return data[: self._buffer_bytes]
 
     def room(self, now_us: int) -> int:
-        waiting = sum(len(b.data) - self._arrived(b, now_us) for b in self._bursts)
-        return self._buffer_bytes - waiting
+        """Return what the sender's buffer takes; the receiver's may overflow later."""
+        unsent = 0
+        if self._bursts and now_us < self.last_us:
+            burst = self._bursts[-1]
+            unsent = len(burst.data) - self._arrived(burst, now_us)
+        return min(self._buffer_bytes - unsent, 2 * self._buffer_bytes - self._held)
 
     def _arrived(self, burst: _Burst, now_us: int) -> int:
         return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)

@@ -251,7 +251,7 @@ class Rrc:
             return False
         if state is RrcState.LIMIT and self.state is not RrcState.LIMIT:
             self._drive.gearbox.reset()
-        if not {self.state, state} <= POWERED_ON:
+        if self.state not in POWERED_ON or state not in POWERED_ON:
             self._power.enter(state, tick)
         if state is RrcState.STANDBY:
             self._renewed = tick

@@ -34,7 +34,7 @@ class Move(Enum):
     RESTART = auto()
 
 
-POWERED_ON: Final = frozenset({RrcState.STANDBY, RrcState.LIMIT, RrcState.OUTPUT})
+POWERED_ON: Final = (RrcState.STANDBY, RrcState.LIMIT, RrcState.OUTPUT)
 """The "PowerOnSuccess period" of the manual: VR2 runs."""
 
 NEXT_STATE: Final[dict[tuple[RrcState, Move], RrcState]] = {

@@ -11,25 +11,38 @@ Status(on=1)
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
-from typing import ClassVar, Final, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, Final
 
 from tickrig.wire.errors import FieldError, FramingError
 from tickrig.wire.rrc.check import check_digit
-from tickrig.wire.rrc.hexdigits import read_hex, read_signed
+from tickrig.wire.rrc.hexdigits import all_digits, read_hex, read_signed
 
 
-class Parameter(NamedTuple):
-    """One parameter of a command: how many digits, and which values are allowed."""
+class Parameter:
+    """One parameter of a command: how many digits, and which values are allowed.
 
-    width: int
-    low: int
-    high: int
+    Attributes:
+        width: number of hex digits, 1 or 2.
+        low: smallest value; below 0 for two's complement.
+        high: largest value.
+        values: value by digits, in either case, for all that is allowed.
+    """
+
+    __slots__ = ("high", "low", "values", "width")
+
+    def __init__(self, width: int, low: int, high: int) -> None:
+        self.width, self.low, self.high = width, low, high
+        read = read_signed if low < 0 else read_hex
+        numbers = {digits: read(digits) for digits in all_digits(width)}
+        self.values = {d: value for d, value in numbers.items() if low <= value <= high}
 
     def read(self, digits: bytes) -> int:
         """Read the parameter from its digits; FieldError for a bad digit or value."""
-        value = read_signed(digits) if self.low < 0 else read_hex(digits)
-        return self.checked(value)
+        value = self.values.get(digits)
+        if value is None:
+            return self.checked(read_signed(digits) if self.low < 0 else read_hex(digits))
+        return value
 
     def write(self, value: int) -> bytes:
         """Write the parameter in lower case, as the manual's samples do."""
@@ -75,21 +88,27 @@ class Command:
     name: ClassVar[bytes]
     literal: ClassVar[bytes] = b""  # what stands between the name and the parameters
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    size: ClassVar[int] = 0  # characters behind the name
+
+    def __init_subclass__(cls) -> None:
+        """Count what stands behind the name."""
+        cls.size = len(cls.literal) + sum(p.width for p in cls.parameters)
 
     def __post_init__(self) -> None:
         """Refuse values that do not fit; BadParameters says which."""
         values = self.values()
         if len(values) != len(self.parameters):
             raise BadParameters(self.name, f"{len(values)} values, not {len(self.parameters)}")
-        for number, (parameter, value) in enumerate(zip(self.parameters, values, strict=True), 1):
-            try:
-                parameter.checked(value)
-            except FieldError as error:
-                raise BadParameters(self.name, f"#{number} {error}") from error
+        try:
+            for number, value in enumerate(values):
+                self.parameters[number].checked(value)
+        except FieldError as error:
+            raise BadParameters(self.name, f"#{number + 1} {error}") from error
 
     def values(self) -> tuple[int, ...]:
         """Return the parameters #1, #2, ... in order."""
-        return tuple(getattr(self, item.name) for item in fields(self))
+        names: tuple[str, ...] = self.__match_args__
+        return tuple([getattr(self, name) for name in names])
 
     def encode(self, *, check: bool = False) -> bytes:
         """Write the line with its LF, and with CHECK where stablemode wants it."""
@@ -282,14 +301,14 @@ def parse_command(message: bytes) -> Command:
 def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:
     """Cut the text behind the name into parameters; BadParameters if it does not fit."""
     at = len(kind.literal)
-    size = at + sum(p.width for p in kind.parameters)
+    size = kind.size
     if len(text) != size or not text.startswith(kind.literal):
         raise BadParameters(kind.name, f"{text!r} is not {size} characters of its grammar")
-    values = []
-    for number, parameter in enumerate(kind.parameters, 1):
-        try:
+    values: list[int] = []
+    try:
+        for parameter in kind.parameters:
             values.append(parameter.read(text[at : at + parameter.width]))
-        except FieldError as error:
-            raise BadParameters(kind.name, f"#{number} {error}") from error
-        at += parameter.width
+            at += parameter.width
+    except FieldError as error:
+        raise BadParameters(kind.name, f"#{len(values) + 1} {error}") from error
     return tuple(values)

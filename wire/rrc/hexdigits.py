@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Final
 
 from tickrig.wire.errors import FieldError
 
 UPPER_DIGITS: Final = tuple(b"%X" % n for n in range(16))
 HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcdef")
+
+
+def all_digits(width: int) -> list[bytes]:
+    """Return all numbers of so many hex digits, in every mixture of cases."""
+    return [b"".join(digits) for digits in product(sorted(HEX_DIGITS), repeat=width)]
 
 
 def read_hex(digits: bytes) -> int:

@@ -166,8 +166,9 @@ def _parse_status(line: bytes) -> StatusA:
     if len(line) != 17:
         raise FramingError(f"{line!r} has {len(line)} characters, an SA line has 17")
     message = strip_check(line)
-    percents = [read_signed(message[at : at + 2]) for at in (3, 5, 7, 9)]
-    gauge, speed_mode, *counts = (read_hex(message[at : at + 1]) for at in range(11, 16))
-    if max(map(abs, percents)) > 100 or not 1 <= gauge <= 10 or not 1 <= speed_mode <= 5:
-        raise FieldError(f"{line!r}: a percentage, gauge or speed mode is out of range")
-    return StatusA(*percents, gauge, speed_mode, *counts)
+    v_in, w_in, v_out, w_out = (read_signed(message[at : at + 2]) for at in (3, 5, 7, 9))
+    gauge, mode, up, down, alarm = (read_hex(message[at : at + 1]) for at in range(11, 16))
+    sound = max(map(abs, (v_in, w_in, v_out, w_out))) <= 100 and 1 <= gauge <= 10 and 1 <= mode <= 5
+    if not sound:
+        raise FieldError(f"{line!r}: a percentage, the gauge or the speed mode is out of range")
+    return StatusA(v_in, w_in, v_out, w_out, gauge, mode, up, down, alarm)
