@@ -1,0 +1,8 @@
+"""RRC: a synchronous client for the Robotic Relay Communicator, on any link."""
+
+from tickrig.host.rrc.client import RrcClient
+from tickrig.host.rrc.errors import RrcRefused, RrcStopped
+from tickrig.host.rrc.inbox import Arrival
+from tickrig.host.rrc.refusals import OnRefusals
+
+__all__ = ["Arrival", "OnRefusals", "RrcClient", "RrcRefused", "RrcStopped"]
