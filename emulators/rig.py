@@ -26,7 +26,9 @@ class Station(Generic[W]):
         """Return the first tick after `now_us` at which this station has work."""
         first = now_us - now_us % self.tick_us + self.tick_us
         due = min(self.device.due_us, self.port.due_us)
-        return first if due <= first else -(-due // self.tick_us) * self.tick_us
+        if due <= first:
+            return first
+        return NEVER if due >= NEVER else -(-due // self.tick_us) * self.tick_us
 
 
 class Rig:
