@@ -29,11 +29,11 @@ def test_silence_lasts_exactly_the_timeout() -> None:
 
 def test_a_long_send_waits_until_it_fits() -> None:
     line, echo = SerialLine(buffer_bytes=200), Echo()
-    link = SimLink(Rig(Station(echo, line.a)), line.b)
+    rig = Rig(Station(echo, line.a))
+    link = SimLink(rig, line.b)
     link.send(b"x" * 1_000)
     assert link.now_us >= 800 * 86  # four buffers have left, at 86.8 us a byte
-    link.receive(100_000)
-    link.receive(100_000)
+    rig.run_for(100_000)
     assert echo.heard == b"x" * 1_000
 
 
