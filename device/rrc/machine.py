@@ -59,6 +59,7 @@ class Rrc:
     _buzzer: Buzzer = field(init=False)
     _load: LoadAccount = field(init=False)
     _renewed: int = field(default=0, init=False)  # tick of the latest correct command
+    _moved: int = field(default=0, init=False)  # tick of the latest transition
     _due_us: int = field(default=0, init=False)
     _sent: list[bytes] = field(default_factory=list, init=False)
     _commands: int = field(default=0, init=False)
@@ -255,7 +256,7 @@ class Rrc:
             self._power.enter(state, tick)
         if state is RrcState.STANDBY:
             self._renewed = tick
-        self.state = state
+        self.state, self._moved = state, tick
         if state is RrcState.POWER_OFF_FINISHED:
             self._move(Move.RESTART, tick)
         if state is RrcState.INITIALIZE:
@@ -270,7 +271,8 @@ class Rrc:
     def _next_due(self, tick: int) -> int:
         """Return the next tick at which something happens without input."""
         settings, running = self._settings, self.state in POWERED_ON
-        if self._buffer or self._load.backlog_pct or (settings.status and running):
+        busy = self._buffer or self._load.backlog_pct or (settings.status and running)
+        if busy or self._moved == tick:  # a new state looks at buttons from the next tick on
             return tick + 1
         due = self._power.due_tick(self.state)
         for changes_at in (self._buzzer.changes_at, self._drive.changes_at):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tickrig.device.rrc.machine import TICK_US, Rrc
@@ -61,6 +61,7 @@ def play(
 
 
 @settings(deadline=None, max_examples=150)
+@example(False, [(0, ("speed_up_button", 1)), (10_000, ("power_button", 1))])
 @given(st.booleans(), acts)
 def test_dense_and_sparse_runs_are_the_same(begin: bool, session: list[Act]) -> None:
     session = powered_on() + session if begin else session
