@@ -6,7 +6,7 @@ its answer proves that the command was processed; an ER before it is the refusal
 
 >>> exchange = Exchange(Watchdog(100), stable=True)
 >>> exchange.lines
-(b'watchdog64B\n', b'device4\n')
+(b'watchdog64B\n', b'device0\n')
 >>> exchange.take(Text("RRC")), exchange.done
 (True, True)
 """

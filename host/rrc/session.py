@@ -185,6 +185,7 @@ class Session:
         """
         events = self._inbox.events
         until_us = self._link.now_us + timeout_us
+        self._channel.step(self._link.now_us)
         while not any(arrival.value.kind is kind for arrival in events):
             if self._link.now_us >= until_us:
                 others = ", ".join(arrival.value.name for arrival in events) or "no event"
@@ -197,6 +198,7 @@ class Session:
 
     def _drain(self, queue: deque[Arrival[T]], timeout_us: int) -> Iterator[Arrival[T]]:
         until_us = self._link.now_us + timeout_us
+        self._channel.step(self._link.now_us)
         while queue or self._link.now_us < until_us:
             if queue:
                 yield queue.popleft()
