@@ -165,7 +165,8 @@ def test_line_feed_ends_an_overflow() -> None:
 
 @pytest.mark.parametrize("row", VECTORS["limit"])
 def test_limits(row: dict[str, Any]) -> None:
-    assert list(apply_limits(*row["stick"], Limit(*row["limit"]))) == row["out"]
+    v_pct, w_pct = row["stick"]
+    assert list(apply_limits(v_pct, w_pct, Limit(*row["limit"]))) == row["out"]
 
 
 @pytest.mark.parametrize("row", VECTORS["shape"])

@@ -1,0 +1,224 @@
+"""Buttons, buzzer, watchdog, stablemode and status: the rules between the vectors."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.device.rrc.bench import RrcBench
+
+
+def sounds(bench: RrcBench, ticks: int) -> str:
+    """Return one character a tick: # while the buzzer sounds."""
+    heard = ""
+    for _ in range(ticks):
+        bench.step()
+        heard += "#" if bench.rrc.read("buzzer") else "."
+    return heard
+
+
+def out(bench: RrcBench) -> tuple[int | str, int | str]:
+    return bench.rrc.read("out_v_pct"), bench.rrc.read("out_w_pct")
+
+
+def test_a_beep_begins_in_the_tick_after_its_command() -> None:
+    bench = RrcBench().power_on()
+    bench.step("beep02010300000000000200")
+    assert bench.rrc.read("buzzer") == 0
+    assert sounds(bench, 10) == "##.#####.."  # a zero time skips its phase
+
+
+def test_a_new_beep_replaces_the_one_that_plays() -> None:
+    bench = RrcBench().power_on()
+    bench.step("beepff000000000000000000")
+    assert sounds(bench, 2) == "##"
+    bench.step("beep01000000000000000000")
+    assert bench.rrc.read("buzzer") == 0
+    assert sounds(bench, 3) == "#.."
+
+
+@pytest.mark.parametrize("line", ["beep00000000000000000000", "beep6464", "beepxx"])
+def test_silence_and_a_wrong_beep_stop_the_sound_at_once(line: str) -> None:
+    bench = RrcBench().power_on()
+    bench.step("beepff000000000000000000")
+    assert sounds(bench, 2) == "##"
+    bench.step(line)
+    assert bench.rrc.read("buzzer") == 0
+
+
+def test_a_beep_with_a_wrong_check_does_not_touch_the_sound() -> None:
+    bench = RrcBench().power_on()
+    bench.step("beepff000000000000000000")
+    bench.step("stablemode1")
+    assert bench.step("beep00000000000000000000F") == ["ER:CommandChecksum"]
+    assert bench.rrc.read("buzzer") == 1
+
+
+def test_gear_r_sounds_half_a_second_on_and_off() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.step("joystick00006464002051e2d")
+    bench.set(stick_v_pct=-50)
+    assert sounds(bench, 151) == "#" * 50 + "." * 50 + "#" * 50 + "."
+
+
+def test_a_beep_of_the_host_comes_before_the_alarm() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.step("joystick00006464002051e2d")
+    bench.set(stick_v_pct=-50)
+    bench.step("beep000a0000000000000000")  # ten ticks of silence
+    assert sounds(bench, 12) == "." * 10 + "##"
+
+
+@pytest.mark.parametrize(
+    ("held", "out_pct"),
+    [
+        ((), (-60, 20)),
+        (("speed_down_button",), (0, 20)),
+        (("speed_up_button",), (-60, 20)),
+        (("speed_down_button", "speed_up_button"), (-60, -20)),
+    ],
+)
+def test_held_buttons_and_alarm_choose_the_drive(
+    held: tuple[str, ...], out_pct: tuple[int, int]
+) -> None:
+    bench = RrcBench().power_on()
+    bench.set(stick_v_pct=-60, stick_w_pct=20, **dict.fromkeys(held, 1))
+    bench.step()
+    assert out(bench) == (0, 0)
+    bench.tap("alarm_button")
+    assert out(bench) == out_pct
+    assert bench.state == "Standby"
+
+
+def test_the_buttons_drive_is_gone_after_vr2_was_off() -> None:
+    bench = RrcBench().power_on()
+    bench.tap("alarm_button")
+    bench.tap("power_button")
+    bench.run(60)
+    bench.power_on()
+    bench.set(stick_v_pct=100)
+    bench.step()
+    assert out(bench) == (0, 0)
+
+
+def test_alarm_in_limit_mode_does_not_change_the_drive() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.set(stick_v_pct=-60, speed_down_button=1)
+    bench.tap("alarm_button")
+    assert out(bench) == (-60, 0)
+
+
+def test_speed_buttons_step_the_mode_from_1_to_5() -> None:
+    bench = RrcBench().power_on()
+    for mode in (2, 3, 4, 5, 5):
+        bench.tap("speed_up_button")
+        assert bench.rrc.read("speed_mode") == mode
+    for mode in (4, 3, 2, 1, 1):
+        bench.tap("speed_down_button")
+        assert bench.rrc.read("speed_mode") == mode
+
+
+def test_the_lock_stops_the_buttons_but_not_their_counters() -> None:
+    bench = RrcBench().power_on()
+    bench.step("speedmode31")
+    bench.step("statusA1")
+    bench.set(speed_up_button=1)
+    assert bench.step() == ["SA:00000000A31003"]
+    bench.set(speed_up_button=0)
+    assert bench.step() == ["SA:00000000A32004"]
+
+
+def test_a_counter_goes_from_15_to_0() -> None:
+    bench = RrcBench().power_on()
+    bench.step("statusA1")
+    for _ in range(7):
+        bench.tap("alarm_button")
+    bench.set(alarm_button=1)
+    assert bench.step()[0][13:16] == "00F"
+    bench.set(alarm_button=0)
+    assert bench.step()[0][13:16] == "000"
+
+
+def test_the_watchdog_runs_only_while_vr2_does() -> None:
+    bench = RrcBench().boot()
+    bench.align()
+    bench.step("watchdog05")
+    assert bench.run(1_000) == []
+    bench.power_on()
+    assert "EV:PowerOffWaitByWatchdog" in bench.run(10)
+
+
+def test_entering_standby_renews_the_watchdog() -> None:
+    bench = RrcBench().boot()
+    bench.align()
+    bench.step("watchdog05")
+    bench.set(power_button=1)
+    bench.run(31)
+    assert bench.state == "Standby"
+    assert bench.run(4) == []
+    assert bench.step() == ["EV:PowerOffWaitByWatchdog"]
+
+
+def test_a_wrong_check_does_not_renew_the_watchdog() -> None:
+    bench = RrcBench().power_on()
+    bench.step("stablemode1")
+    bench.step("watchdog034")
+    assert bench.step("output00002") == ["ER:CommandChecksum"]
+    assert bench.step("output00002") == ["ER:CommandChecksum"]
+    assert bench.step("output00002") == ["ER:CommandChecksum", "EV:PowerOffWaitByWatchdog"]
+
+
+def test_lines_in_one_tick_are_worked_on_two_at_a_time() -> None:
+    bench = RrcBench().power_on()
+    assert bench.step(*["device"] * 3) == ["OK:device", "RRC"] * 2
+    assert bench.step() == ["OK:device", "RRC"]
+
+
+def test_before_power_on_one_line_in_two_ticks_is_worked_on() -> None:
+    bench = RrcBench().boot()
+    bench.align()
+    sent = [bench.step(*["stablemode0"] * 3), *(bench.step() for _ in range(4))]
+    assert [len(lines) for lines in sent] == [1, 0, 1, 0, 1]
+
+
+def test_stablemode_is_asked_for_by_the_line_after_it_in_the_same_tick() -> None:
+    bench = RrcBench().power_on()
+    assert bench.step("stablemode1", "output0000") == ["OK:stablemode", "ER:CommandChecksum"]
+
+
+def test_status_lines_stop_with_the_powered_period() -> None:
+    bench = RrcBench().power_on()
+    bench.step("statusA1")
+    assert len(bench.run(5)) == 5
+    assert bench.step("poweroff") == ["OK:poweroff", "EV:PowerOffWaitByHost"]
+    assert bench.run(5) == []
+
+
+def test_limit_mode_begins_without_a_gear() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.step("joystick00006464002051e2d")
+    bench.set(stick_v_pct=-50)
+    bench.step()
+    assert bench.rrc.read("gear") == "R"
+    bench.step("output0000")
+    bench.set(stick_v_pct=50)
+    bench.step("limit6464ffffff")
+    assert (bench.rrc.read("gear"), out(bench)) == ("F", (50, 0))
+
+
+def test_a_repeated_limit_keeps_the_gear() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.step("joystick00006464002051e2d")
+    bench.set(stick_v_pct=-50)
+    bench.step()
+    bench.set(stick_v_pct=50)
+    bench.step("limit6464ffffff")
+    assert (bench.rrc.read("gear"), out(bench)) == ("R", (0, 0))
+
+
+def test_a_joystick_command_takes_effect_at_once_in_limit_mode() -> None:
+    bench = RrcBench().enter("Limit")
+    bench.set(stick_v_pct=-50)
+    bench.step()
+    assert out(bench) == (-50, 0)
+    bench.step("joystick00006464001051e2d")
+    assert out(bench) == (0, 0)

@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import pytest
+
+from tickrig.device.physical import Input, InputBank, Kind
+
+
+def bank() -> InputBank:
+    level = Input("level_v", "a level", low=-5, high=5, unit="V", initial=1)
+    return InputBank([level, Input("key", "a key", Kind.BUTTON), Input("gauge", "", high=9)])
+
+
+def test_an_input_begins_at_its_initial_value() -> None:
+    assert bank()["level_v"] == 1
+
+
+def test_a_change_is_noticed() -> None:
+    inputs = bank()
+    inputs.changed = False
+    inputs.set("level_v", -5)
+    assert (inputs["level_v"], inputs.changed) == (-5, True)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("level_v", 6, "level_v 6 is not in -5..5 V"),
+        ("gauge", -1, "gauge -1 is not in 0..9"),
+        ("smell", 1, "no input 'smell'; known: level_v, key, gauge"),
+    ],
+)
+def test_a_wrong_input_says_what_is_allowed(name: str, value: int, reason: str) -> None:
+    inputs = bank()
+    inputs.changed = False
+    with pytest.raises(ValueError, match=reason):
+        inputs.set(name, value)
+    assert not inputs.changed
+
+
+def test_an_input_of_another_kind_is_not_found() -> None:
+    assert bank().find("key", Kind.BUTTON).name == "key"
+    with pytest.raises(ValueError, match="no button 'level_v'; known: key"):
+        bank().find("level_v", Kind.BUTTON)
+    with pytest.raises(ValueError, match="no fault 'key'; known: none"):
+        bank().find("key", Kind.FAULT)
