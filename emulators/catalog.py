@@ -1,0 +1,13 @@
+"""The devices that can be built by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from tickrig.emulators.emulated import Emulated
+from tickrig.emulators.rrc.build import NAME as RRC
+from tickrig.emulators.rrc.build import build_rrc
+from tickrig.emulators.trace import Config
+
+DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {RRC: build_rrc}

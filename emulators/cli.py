@@ -1,0 +1,30 @@
+"""The command `tickrig`."""
+
+from __future__ import annotations
+
+import click
+
+from tickrig import __version__
+from tickrig.emulators.ctl_cli import ctl
+from tickrig.emulators.replay_cli import replay_command
+
+
+@click.group()
+@click.version_option(__version__, message="%(prog)s %(version)s")
+def main() -> None:
+    """Work with emulated devices.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
+    tickrig replay run.trace                      replay a recorded run
+
+    \b
+    Completion of commands and options in the shell:
+    eval "$(_TICKRIG_COMPLETE=bash_source tickrig)"      in ~/.bashrc
+    eval "$(_TICKRIG_COMPLETE=zsh_source tickrig)"       in ~/.zshrc
+    _TICKRIG_COMPLETE=fish_source tickrig | source       in fish's configuration
+    """  # noqa: D301 - click wants the backspace
+
+
+main.add_command(ctl)
+main.add_command(replay_command)

@@ -1,0 +1,62 @@
+"""A fault in one word: `NAME[=RATE][@FROM[-TO]]`, as command lines and scenarios write it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.duration import parse_time_us
+
+_SPEC: Final = re.compile(r"(\w+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSpec:
+    """Which fault, how often, and when.
+
+    Attributes:
+        name: a fault of the wire, or a physical fault of the device.
+        rate: probability per bit or byte; None if the fault is just there.
+        from_us: when it begins, in the rig's time.
+        to_us: when it ends; `NEVER` if it stays.
+    """
+
+    name: str
+    rate: float | None = None
+    from_us: int = 0
+    to_us: int = NEVER
+
+    def __post_init__(self) -> None:
+        """Refuse a time span that is empty."""
+        if self.to_us <= self.from_us:
+            raise ValueError(f"fault {self.name} ends before it begins")
+
+
+def parse_fault_spec(text: str) -> FaultSpec:
+    """Read a fault.
+
+    Raises:
+        ValueError: not of the form.
+
+    >>> parse_fault_spec("flip=0.001@5s-7s")
+    FaultSpec(name='flip', rate=0.001, from_us=5000000, to_us=7000000)
+    """
+    match = _SPEC.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not a fault: write NAME[=RATE][@FROM[-TO]], as cut@5s-7s")
+    name, rate, start, stop = match.groups()
+    return FaultSpec(
+        name,
+        None if rate is None else _parse_rate(rate),
+        parse_time_us(start) if start is not None else 0,
+        parse_time_us(stop) if stop is not None else NEVER,
+    )
+
+
+def _parse_rate(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None

@@ -1,0 +1,18 @@
+"""What a command line says when it cannot do what was asked."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import click
+
+
+class Refused(click.ClickException):
+    """One line on standard error, and exit status 2."""
+
+    exit_code = 2
+
+
+def refuse_path(what: str, error: OSError) -> NoReturn:
+    """Say that a path cannot be used, and why."""
+    raise Refused(f"{what} {error.filename2 or error.filename}: {error.strerror}") from error

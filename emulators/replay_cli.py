@@ -1,0 +1,56 @@
+"""The command `tickrig replay`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tickrig.emulators.byte_text import escape
+from tickrig.emulators.catalog import DEVICES
+from tickrig.emulators.duration import format_time
+from tickrig.emulators.emulated import Emulated
+from tickrig.emulators.refused import Refused, refuse_path
+from tickrig.emulators.replay import Difference, read_recording, replay
+from tickrig.emulators.trace import Header
+
+
+@click.command("replay")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.pass_context
+def replay_command(context: click.Context, /, file: Path) -> None:
+    """Replay the trace FILE on a fresh device; exit status 1 if it says anything else.
+
+    \b
+    rrc-emu --link /tmp/rrc --trace run.trace
+    tickrig replay run.trace
+    """  # noqa: D301 - click wants the backspace
+    try:
+        recording = read_recording(file.read_bytes())
+        difference = replay(recording, _build(recording.header))
+    except OSError as error:
+        refuse_path("trace", error)
+    except ValueError as error:
+        raise Refused(f"trace {file}: {error}") from None
+    if not recording.ended:
+        click.echo(f"{file}: no end line (killed?); its last tick is left out", err=True)
+    if difference is None:
+        click.echo(f"identical: {recording.ticks} ticks")
+    else:
+        click.echo(_describe(difference, file))
+        context.exit(1)
+
+
+def _build(header: Header) -> Emulated[bytes]:
+    if header.device not in DEVICES:
+        known = ", ".join(DEVICES)
+        raise ValueError(f"recorded on {header.device!r}; this program knows {known}")
+    return DEVICES[header.device](header.config)
+
+
+def _describe(difference: Difference, file: Path) -> str:
+    place = f" ({file}:{difference.line})" if difference.line else ""
+    then = escape(difference.recorded) if difference.recorded else "(nothing)"
+    now = escape(difference.replayed) if difference.replayed else "(nothing)"
+    at = format_time(difference.at_us)
+    return f"different at {at}{place}\n  recorded < {then}\n  replayed < {now}"

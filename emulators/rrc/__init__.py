@@ -1,0 +1,1 @@
+"""The RRC emulator: its command and its panel."""
