@@ -1,0 +1,113 @@
+"""An emulated RRC in real time, in a thread of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from queue import SimpleQueue
+from typing import TypeVar
+
+from tickrig.device.core import NEVER
+from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.bridge import Bridge
+from tickrig.emulators.clock import RealClock
+from tickrig.emulators.port import Port
+from tickrig.emulators.pty_port import PtyPort
+from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.serial_line import SerialLine
+
+JOIN_S = 5.0
+T = TypeVar("T")
+
+
+class LiveRrc:
+    """A running emulator; what is done to its device is done in its own thread."""
+
+    def __init__(self, outside: Port[bytes]) -> None:
+        line, self._rrc = SerialLine(), Rrc()
+        bridge = Bridge(line.b, outside)
+        self._rig = Rig(Station(self._rrc, line.a), bridges=[bridge], clock=RealClock())
+        self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def set(self, name: str, value: int) -> None:
+        """Set an input."""
+        self._ask(lambda: self._rrc.inputs.set(name, value))
+
+    def read(self, name: str) -> int | str:
+        """Read an output."""
+        return self._ask(lambda: self._rrc.read(name))
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stop.set()
+        self._thread.join(JOIN_S)
+        assert not self._thread.is_alive()
+
+    def _ask(self, question: Callable[[], T]) -> T:
+        answer: SimpleQueue[T] = SimpleQueue()
+        self._calls.put(lambda: answer.put(question()))
+        return answer.get(timeout=JOIN_S)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            while not self._calls.empty():
+                self._calls.get()()
+            self._rig.step()
+
+
+@contextlib.contextmanager
+def live_rrc(outside: Port[bytes]) -> Iterator[LiveRrc]:
+    """Run an emulator for the length of a `with`."""
+    live = LiveRrc(outside)
+    live.start()
+    try:
+        yield live
+    finally:
+        live.stop()
+
+
+@contextlib.contextmanager
+def pty() -> Iterator[PtyPort]:
+    """Make a pseudo-terminal and give it back."""
+    port = PtyPort()
+    try:
+        yield port
+    finally:
+        port.close()
+
+
+class TcpPort:
+    """A `Port[bytes]` that takes one connection on the loopback interface."""
+
+    due_us = NEVER
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.setblocking(False)
+        self._connection: socket.socket | None = None
+        self.number: int = self._listener.getsockname()[1]
+
+    def poll(self, now_us: int, /) -> bytes:
+        with contextlib.suppress(BlockingIOError):
+            if self._connection is None:
+                self._connection, _ = self._listener.accept()
+                self._connection.setblocking(False)
+                self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return self._connection.recv(4_096)
+        return b""
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        if self._connection is not None:
+            with contextlib.suppress(ConnectionError):  # the host hung up
+                self._connection.sendall(traffic)
+
+    def close(self) -> None:
+        self._listener.close()
+        if self._connection is not None:
+            self._connection.close()
