@@ -74,7 +74,7 @@ class Emulator:
 
     @property
     def touch_us(self) -> int:
-        """When what is done now takes effect: now in an action of the agenda, else the next tick."""
+        """When what is done now takes effect: at once in an action, else at the next tick."""
         if self._acting_us is not None:
             return self._acting_us
         now_us, tick_us = self.rig.now_us, self.device.tick_us
@@ -85,10 +85,8 @@ class Emulator:
         next_us = self.rig.next_us
         if self._outside is None:
             next_us = min(next_us, self._line.b.due_us)
-        if self.agenda.due_us <= next_us:
-            due_us = max(self.agenda.due_us, self.rig.now_us)
-            self.rig.run_to(due_us - 1)
-            self._act(due_us)
+        if self.agenda.due_us <= min(next_us, NEVER - 1):
+            self._act(max(self.agenda.due_us, self.rig.now_us))
         elif next_us < NEVER:
             self.rig.run_to(next_us)
         if self._outside is None and (data := self._line.b.poll(self.rig.now_us)):
@@ -97,6 +95,8 @@ class Emulator:
             look(self.rig.now_us)
 
     def _act(self, now_us: int) -> None:
+        """Do what is due at `now_us`, before the tick of that time."""
+        self.rig.run_to(now_us - 1)
         self._acting_us = now_us
         self.agenda.run(now_us)
         self._acting_us = None

@@ -1,0 +1,141 @@
+"""`tickrig demo rrc`: an RRC on a pty, driven by the host client, with what is on the wire."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
+
+from tickrig.emulators.child import running
+from tickrig.emulators.control_client import ControlClient
+from tickrig.host.link import Link
+from tickrig.host.rrc import RrcClient
+from tickrig.host.serial_link import SerialLink
+from tickrig.wire.lines import LineSplitter
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.replies import EventKind
+
+Echo = Callable[[str], None]
+
+STATUS_SHOWN: Final = 2
+"""So many status lines in a row are printed; the rest is counted."""
+
+
+class Sample(NamedTuple):
+    """One of the nine sample commands of the manual's test procedure."""
+
+    command: cmd.Command
+    effect: str
+
+
+SAMPLES: Final = (
+    Sample(cmd.Limit(50, 50), "the stick drives, at most 50 %"),
+    Sample(cmd.Output(30, 0), "the host drives, forward at 30 %"),
+    Sample(cmd.SpeedMode(4), "speed mode 4, its buttons not locked"),
+    Sample(cmd.Joystick(reverse_mode=3), "stick shaping, backing toward the stick"),
+    Sample(cmd.Watchdog(100), "VR2 stops after 1 s without a correct command"),
+    Sample(cmd.Status(1), "a status line each 10 ms from now on"),
+    Sample(
+        cmd.StableMode(1), "CHECK wanted from now on, and no OK: 'device' behind a line confirms it"
+    ),
+    Sample(cmd.PowerOff(), "VR2 is stopped by force"),
+    Sample(cmd.Beep((100,) * 4 + (10,) * 6), "two beeps of 1 s, three of 0.1 s"),
+)
+
+MEANING: Final = {
+    "EV:PowerOnTrigger": "the power button was seen",
+    "EV:PowerOnSuccess": "VR2 runs; the RRC is in Standby",
+    "EV:PowerOffWaitByHost": "VR2 stopped because the host said so",
+    "EV:PowerOffWaitByWatchdog": "VR2 stopped: no command for 300 ms",
+    "EV:PowerOffFinished": "VR2 is off",
+    "EV:Initialized": "all settings are wiped, stablemode too",
+    "ER:CommandUnknown": "refused",
+    "RRC": "the device name",
+}
+
+
+class Transcript:
+    """A `Link[bytes]` that prints each line that passes through another."""
+
+    def __init__(self, link: Link[bytes], echo: Echo) -> None:
+        self._link, self._echo, self._start_us = link, echo, link.now_us
+        self._sent, self._received, self._statuses = LineSplitter(), LineSplitter(), 0
+
+    @property
+    def now_us(self) -> int:
+        """Time on the link below."""
+        return self._link.now_us
+
+    def send(self, traffic: bytes, /) -> None:
+        """Send and print."""
+        self._link.send(traffic)
+        for line in self._sent.push(traffic):
+            self._print(">", line.decode("latin-1"))
+
+    def receive(self, timeout_us: int, /) -> bytes:
+        """Receive and print; of many status lines only the first."""
+        data = self._link.receive(timeout_us)
+        for line in self._received.push(data):
+            self._statuses = self._statuses + 1 if line.startswith(b"SA:") else 0
+            if self._statuses <= STATUS_SHOWN:
+                self._print("<", line.decode("latin-1"))
+        return data
+
+    def close(self) -> None:
+        """Close the link below."""
+        self._link.close()
+
+    def _print(self, mark: str, line: str) -> None:
+        time_s = (self._link.now_us - self._start_us) / 1e6
+        meaning = MEANING.get(line, "") if mark == "<" else ""
+        self._echo(f"  {time_s:7.3f} {mark} {line:<28} {meaning}".rstrip())
+
+
+def run_demo(echo: Echo) -> None:
+    """Run the demonstration; it takes about five seconds.
+
+    Raises:
+        RuntimeError: the emulator does not start.
+        LinkError, DeviceRefused: something went wrong on the way.
+    """
+    with running("tickrig.emulators.rrc.cli") as child, ControlClient(child.control) as hand:
+        echo(f"An RRC runs on {child.link.resolve()}, in a process of its own.")
+        echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
+        transcript = Transcript(SerialLink(str(child.link)), echo)
+        with RrcClient(transcript) as rrc:
+            for title in _chapters(rrc, transcript, hand, echo):
+                echo(f"\n{title}")
+        status = hand.ask("status")
+        echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
+
+
+def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo) -> Iterator[str]:
+    """Give the title of each chapter, then play it."""
+    yield "Begin as the manual advises: a dummy command, a pause, then talk."
+    rrc.start()
+    yield "The operator presses the power button."
+    _switch_on(rrc, hand)
+    yield "The nine sample commands of the manual's test procedure."
+    for sample in SAMPLES:
+        echo(f"  # {sample.effect}")
+        rrc.command(sample.command)
+    yield "The operator switches VR2 off and on again."
+    hand.ask("press", name="power_button")
+    rrc.wait_for(EventKind.INITIALIZED, 2_000_000)
+    rrc.run_for(300_000)
+    _switch_on(rrc, hand)
+    yield "Output mode: the slowest speed mode first, then 30 % forward; the status shows it (1E)."
+    rrc.status()
+    rrc.drive_by_host(30, 0)
+    rrc.run_for(50_000)
+    yield "A watchdog of 300 ms. The client renews it while the program lives ..."
+    rrc.watchdog(300_000)
+    rrc.run_for(500_000)
+    yield "... and now the program hangs for half a second."
+    hung_us = link.now_us
+    while link.now_us < hung_us + 500_000:
+        link.receive(500_000)
+
+
+def _switch_on(rrc: RrcClient, hand: ControlClient) -> None:
+    hand.ask("press", name="power_button")
+    rrc.wait_for(EventKind.POWER_ON_SUCCESS, 2_000_000)
