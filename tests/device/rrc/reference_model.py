@@ -2,6 +2,10 @@
 
 It shares no code with the device: no table, no codec, no type. It is slow and plain on purpose,
 counts in exact numbers where the digest gives real ones, and visits every tick of 10 ms.
+
+Three readings are not forced by the digest; the model reads them as the device does: a press of the
+power button in the tick that ends Initialize is lost; while the bus is unplugged, a power-on test
+sees no other fault; the automatic alarm asks whether the stick drove when the outputs were set.
 """
 
 import math
@@ -159,6 +163,7 @@ class ReferenceRrc:
         self.backlog = 0
         self.out_v = 0
         self.out_w = 0
+        self.by_stick = False
         self.buzzer = 0
         self.trigger_tick = -1
         self.entry_tick = -1
@@ -233,7 +238,7 @@ class ReferenceRrc:
         if self.state == "Initialize":
             self.state = "WaitPowerOn"
             self.sent.append("EV:Initialized")
-        if self.state == "WaitPowerOn":
+        elif self.state == "WaitPowerOn":
             self.wait_power_on(edge)
         elif self.state in DRIVING:
             if edge:
@@ -260,14 +265,14 @@ class ReferenceRrc:
         age = self.now - self.trigger_tick
         if age < 30:
             return
-        if self.inputs["joystick_fault"] or self.inputs["bus_noise"]:
-            result = "Error1"
-        elif self.inputs["power_module_fault"] or self.inputs["vr2_fault"]:
-            result = "Error2"
-        elif self.inputs["bus_unplugged"]:
+        if self.inputs["bus_unplugged"]:
             if age < 300:
                 return
             result = "Timeout"
+        elif self.inputs["joystick_fault"] or self.inputs["bus_noise"]:
+            result = "Error1"
+        elif self.inputs["power_module_fault"] or self.inputs["vr2_fault"]:
+            result = "Error2"
         else:
             result = "Success"
             self.state = "Standby"
@@ -419,6 +424,7 @@ class ReferenceRrc:
         return self.state == "Limit" or (self.state == "Standby" and self.button_mode >= 0)
 
     def drive(self) -> None:
+        self.by_stick = self.stick_drives()
         if self.state == "Output":
             self.out_v, self.out_w = self.output
         elif self.state == "Limit":
@@ -493,7 +499,7 @@ class ReferenceRrc:
             self.buzzer = 0
         elif position < len(self.pattern):
             self.buzzer = self.pattern[position]
-        elif self.gear == "R" and self.stick_drives():
+        elif self.gear == "R" and self.by_stick:
             self.buzzer = 1 if (self.now - self.gear_tick) % 100 < 50 else 0
         else:
             self.buzzer = 0
