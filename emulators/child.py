@@ -20,14 +20,16 @@ class Child:
     """A running emulator.
 
     Attributes:
-        process: the process; what it says comes out of its stderr.
+        process: the process.
         link: the terminal that it serves.
         control: its control socket.
+        log: what it said so far.
     """
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[bytes]
     link: Path
     control: Path
+    log: Path
 
 
 @contextmanager
@@ -35,30 +37,28 @@ def running(module: str, *options: str) -> Iterator[Child]:
     """Run the emulator whose command is `main` of a module; end it on the way out.
 
     Raises:
-        RuntimeError: it does not come up; the text is what it said.
+        RuntimeError: it does not come up; the text is the last line that it said.
     """
-    with tempfile.TemporaryDirectory(prefix="tickrig-") as folder:
-        link, control = Path(folder, "tty"), Path(folder, "control")
+    with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
+        link, control, log = (Path(name, part) for part in ("tty", "control", "log"))
         program = f"from {module} import main; main()"
-        paths = ["--link", str(link), "--control", str(control)]
-        process = subprocess.Popen(
-            [sys.executable, "-c", program, *paths, *options],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        command = [sys.executable, "-c", program, "--link", link, "--control", control, *options]
+        with log.open("wb") as said:
+            process = subprocess.Popen(command, stdout=said, stderr=said)
         try:
-            _wait_until_up(process, link, control)
-            yield Child(process, link, control)
+            child = Child(process, link, control, log)
+            _wait_until_up(child)
+            yield child
         finally:
             process.terminate()
-            process.communicate()
+            process.wait()
 
 
-def _wait_until_up(process: subprocess.Popen[str], *paths: Path) -> None:
+def _wait_until_up(child: Child) -> None:
     deadline = time.monotonic() + START_S
-    while not all(path.exists() for path in paths):
-        if process.poll() is not None or time.monotonic() > deadline:
-            process.kill()
-            raise RuntimeError(f"the emulator did not start: {process.communicate()[1].strip()}")
+    while not (child.link.exists() and child.control.exists()):
+        if child.process.poll() is not None or time.monotonic() > deadline:
+            said = child.log.read_text("utf-8", "replace").split("\n")
+            last = next((line for line in reversed(said) if line), "it said nothing")
+            raise RuntimeError(f"the emulator did not start: {last}")
         time.sleep(0.01)

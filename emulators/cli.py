@@ -6,6 +6,7 @@ import click
 
 from tickrig import __version__
 from tickrig.emulators.ctl_cli import ctl
+from tickrig.emulators.demo_cli import demo
 from tickrig.emulators.replay_cli import replay_command
 
 
@@ -17,6 +18,7 @@ def main() -> None:
     \b
     tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
     tickrig replay run.trace                      replay a recorded run
+    tickrig demo rrc                              see a device and a host at work
 
     \b
     Completion of commands and options in the shell:
@@ -27,4 +29,5 @@ def main() -> None:
 
 
 main.add_command(ctl)
+main.add_command(demo)
 main.add_command(replay_command)

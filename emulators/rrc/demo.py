@@ -87,7 +87,7 @@ class Transcript:
     def _print(self, mark: str, line: str) -> None:
         time_s = (self._link.now_us - self._start_us) / 1e6
         meaning = MEANING.get(line, "") if mark == "<" else ""
-        self._echo(f"  {time_s:7.3f} {mark} {line:<28} {meaning}".rstrip())
+        self._echo(f"  {time_s:7.3f} {mark} {line or '(LF)':<28} {meaning}".rstrip())
 
 
 def run_demo(echo: Echo) -> None:
