@@ -42,7 +42,8 @@ def running(module: str, *options: str) -> Iterator[Child]:
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))
         program = f"from {module} import main; main()"
-        command = [sys.executable, "-c", program, "--link", link, "--control", control, *options]
+        paths = ["--link", str(link), "--control", str(control)]
+        command = [sys.executable, "-c", program, *paths, *options]
         with log.open("wb") as said:
             process = subprocess.Popen(command, stdout=said, stderr=said)
         try:
