@@ -86,13 +86,14 @@ class Emulator:
         if self._outside is None:
             next_us = min(next_us, self._line.b.due_us)
         if self.agenda.due_us <= min(next_us, NEVER - 1):
-            self._act(max(self.agenda.due_us, self.rig.now_us))
+            next_us = max(self.agenda.due_us, self.rig.now_us)
+            self._act(next_us)
         elif next_us < NEVER:
             self.rig.run_to(next_us)
         if self._outside is None and (data := self._line.b.poll(self.rig.now_us)):
             self.log.hear(self.rig.now_us, Mark.FROM_DEVICE, data)
         for look in self.after_step:
-            look(self.rig.now_us)
+            look(next_us)
 
     def _act(self, now_us: int) -> None:
         """Do what is due at `now_us`, before the tick of that time."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from typing import Any, Final
 
 from tickrig.device.rrc.config import FailTarget, RrcConfig
@@ -25,9 +25,12 @@ def build_rrc(config: Config) -> Rrc:
     """
     settings: dict[str, Any] = dict(config)
     settings.pop("seed", None)  # of the wire's faults: what came through is in the trace
-    known = {item.name for item in fields(RrcConfig)}
-    if unknown := [name for name in settings if name not in known]:
-        raise ValueError(f"an RRC has no setting {unknown[0]!r}; known: {', '.join(sorted(known))}")
+    defaults = config_to_trace(RrcConfig())
+    for name, value in settings.items():
+        if name not in defaults:
+            raise ValueError(f"an RRC has no setting {name!r}; known: {', '.join(defaults)}")
+        if type(value) is not type(defaults[name]):
+            raise ValueError(f"{name} is {value!r}, expected is something like {defaults[name]!r}")
     if "power_on_fail_target" in settings:
         settings["power_on_fail_target"] = FailTarget(settings["power_on_fail_target"])
     return Rrc(RrcConfig(**settings))
