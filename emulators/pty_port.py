@@ -87,8 +87,8 @@ class PtyPort:
                 return
 
     def _make_link(self, link: Path) -> None:
-        if link.is_symlink() and not link.exists():
-            link.unlink()
+        if link.is_symlink() and (self._links_here(link) or not link.exists()):
+            link.unlink()  # left over; the terminal it named may be ours by now
         link.symlink_to(self.path)
         self._link = link
 
