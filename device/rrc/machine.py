@@ -123,7 +123,8 @@ class Rrc:
         self._watch(tick)
         self._drive.step(tick, self.state, self._settings, self.inputs)
         self._report_and_account(tick)
-        self._buzzer.tick(tick, self._drive.alarm_since)
+        running = self.state in POWERED_ON
+        self._buzzer.tick(tick, self._drive.alarm_since if running else None)
         self._due_us = self._next_due(tick) * TICK_US
         return b"".join(self._sent)
 

@@ -43,7 +43,9 @@ class PowerSequence:
         self._faults.clear()
 
     def step(self, state: RrcState, tick: int, inputs: InputBank) -> Step:
-        """Look at the physical side, once a tick."""
+        """Look at the physical side, once a tick; Initialize does not see the button yet."""
+        if state is RrcState.INITIALIZE and self._since is not None:
+            return self._waiting(state, tick - self._since, inputs)
         pressed = inputs["power_button"] > self._button
         self._button = inputs["power_button"]
         if state in POWERED_ON:

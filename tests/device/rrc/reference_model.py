@@ -3,9 +3,9 @@
 It shares no code with the device: no table, no codec, no type. It is slow and plain on purpose,
 counts in exact numbers where the digest gives real ones, and visits every tick of 10 ms.
 
-Three readings are not forced by the digest; the model reads them as the device does: a press of the
-power button in the tick that ends Initialize is lost; while the bus is unplugged, a power-on test
-sees no other fault; the automatic alarm asks whether the stick drove when the outputs were set.
+Two readings are not forced by the digest; the model reads them as the device does: Initialize does
+not look at the power button, so that a press in its tick is seen one tick later; while the bus is
+unplugged, a power-on test sees no other fault.
 """
 
 import math
@@ -233,12 +233,13 @@ class ReferenceRrc:
     # power events
 
     def power_events(self) -> None:
-        edge = self.inputs["power_button"] == 1 and self.power_level == 0
-        self.power_level = self.inputs["power_button"]
         if self.state == "Initialize":
             self.state = "WaitPowerOn"
             self.sent.append("EV:Initialized")
-        elif self.state == "WaitPowerOn":
+            return
+        edge = self.inputs["power_button"] == 1 and self.power_level == 0
+        self.power_level = self.inputs["power_button"]
+        if self.state == "WaitPowerOn":
             self.wait_power_on(edge)
         elif self.state in DRIVING:
             if edge:
@@ -499,7 +500,7 @@ class ReferenceRrc:
             self.buzzer = 0
         elif position < len(self.pattern):
             self.buzzer = self.pattern[position]
-        elif self.gear == "R" and self.by_stick:
+        elif self.gear == "R" and self.by_stick and self.state in DRIVING:
             self.buzzer = 1 if (self.now - self.gear_tick) % 100 < 50 else 0
         else:
             self.buzzer = 0

@@ -552,7 +552,6 @@ def test_a_button_held_through_power_on_is_due() -> None:
     assert device.due_us <= 33 * TICK_US
 
 
-@pytest.mark.xfail(reason="Rrc loses a press in the tick that ends Initialize")
 def test_a_button_held_while_rrc_power_comes_back_is_a_press() -> None:
     device = Rrc()
     device.inputs.set("power_button", 1)

@@ -153,12 +153,17 @@ def test_a_power_cut_in_the_middle_of_a_line_forgets_it() -> None:
     assert bench.run(10) == []
 
 
-def test_a_button_held_while_power_returns_counts_as_pressed() -> None:
+def test_a_press_during_initialize_is_seen_in_the_tick_after_it() -> None:
     bench = RrcBench()
     bench.set(power_button=1)
     assert bench.step() == ["EV:Initialized"]
-    bench.step()
-    assert bench.run(40) == []  # it was held down before there was anything to switch on
+    assert bench.step() == ["EV:PowerOnTrigger"]
+
+
+def test_a_button_still_held_from_switching_off_does_not_switch_on_again() -> None:
+    bench = RrcBench().enter("PowerOffByOthers")
+    bench.set(power_button=1)
+    assert bench.run(100) == ["EV:PowerOffFinished", "EV:Initialized"]
 
 
 def test_lines_that_wait_survive_vr2_being_switched_off() -> None:
