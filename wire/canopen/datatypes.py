@@ -1,0 +1,141 @@
+"""Data types of CANopen: numbers, strings and their little-endian bytes (CiA 301, data types)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Final
+
+from tickrig.wire.errors import FieldError
+
+Value = bool | int | float | str | bytes
+"""What an object holds, for people: strings are str, octet strings and domains bytes."""
+
+
+class DataType(IntEnum):
+    """Data type by its index in the dictionary, as an EDS gives it."""
+
+    BOOLEAN = 0x01
+    INTEGER8 = 0x02
+    INTEGER16 = 0x03
+    INTEGER32 = 0x04
+    UNSIGNED8 = 0x05
+    UNSIGNED16 = 0x06
+    UNSIGNED32 = 0x07
+    REAL32 = 0x08
+    VISIBLE_STRING = 0x09
+    OCTET_STRING = 0x0A
+    UNICODE_STRING = 0x0B
+    TIME_OF_DAY = 0x0C
+    TIME_DIFFERENCE = 0x0D
+    DOMAIN = 0x0F
+    INTEGER24 = 0x10
+    REAL64 = 0x11
+    INTEGER40 = 0x12
+    INTEGER48 = 0x13
+    INTEGER56 = 0x14
+    INTEGER64 = 0x15
+    UNSIGNED24 = 0x16
+    UNSIGNED40 = 0x18
+    UNSIGNED48 = 0x19
+    UNSIGNED56 = 0x1A
+    UNSIGNED64 = 0x1B
+
+    @property
+    def bits(self) -> int:
+        """Size in bits, 0 where it varies."""
+        return _BITS.get(self, 0)
+
+    @property
+    def size(self) -> int:
+        """Size in bytes, 0 where it varies."""
+        return (self.bits + 7) // 8
+
+    @property
+    def signed(self) -> bool:
+        """Whether it is a signed integer."""
+        return self in _SIGNED
+
+    @property
+    def is_integer(self) -> bool:
+        """Whether its value is a whole number; BOOLEAN counts as one bit."""
+        return self in _SIGNED or self in _UNSIGNED
+
+    def encode(self, value: Value) -> bytes:
+        """Return the bytes of a value; FieldError if it does not fit."""
+        try:
+            return _encode(self, value)
+        except (struct.error, OverflowError, TypeError, UnicodeError, AttributeError) as error:
+            raise FieldError(f"{value!r} is no {self.name}") from error
+
+    def decode(self, data: bytes) -> Value:
+        """Return the value of bytes; FieldError if their number is wrong."""
+        if self.size and len(data) != self.size:
+            raise FieldError(f"{len(data)} bytes for {self.name}, which has {self.size}")
+        if self.is_integer:
+            return int.from_bytes(data, "little", signed=self.signed)
+        return _DECODE.get(self, bytes)(data)
+
+
+_SIGNED: Final = {
+    DataType.INTEGER8: 8,
+    DataType.INTEGER16: 16,
+    DataType.INTEGER24: 24,
+    DataType.INTEGER32: 32,
+    DataType.INTEGER40: 40,
+    DataType.INTEGER48: 48,
+    DataType.INTEGER56: 56,
+    DataType.INTEGER64: 64,
+}
+_UNSIGNED: Final = {
+    DataType.BOOLEAN: 1,
+    DataType.UNSIGNED8: 8,
+    DataType.UNSIGNED16: 16,
+    DataType.UNSIGNED24: 24,
+    DataType.UNSIGNED32: 32,
+    DataType.UNSIGNED40: 40,
+    DataType.UNSIGNED48: 48,
+    DataType.UNSIGNED56: 56,
+    DataType.UNSIGNED64: 64,
+}
+_OTHER: Final = {
+    DataType.REAL32: 32,
+    DataType.REAL64: 64,
+    DataType.TIME_OF_DAY: 48,
+    DataType.TIME_DIFFERENCE: 48,
+}
+_BITS: Final = {**_SIGNED, **_UNSIGNED, **_OTHER}
+_FLOATS: Final = {DataType.REAL32: "<f", DataType.REAL64: "<d"}
+_TEXTS: Final = {DataType.VISIBLE_STRING: "latin-1", DataType.UNICODE_STRING: "utf-16-le"}
+
+
+def _float_decoder(layout: str) -> Callable[[bytes], float]:
+    def decode(data: bytes) -> float:
+        value: float = struct.unpack(layout, data)[0]
+        return value
+
+    return decode
+
+
+_DECODE: Final[dict[DataType, Callable[[bytes], Value]]] = {
+    **{kind: _float_decoder(layout) for kind, layout in _FLOATS.items()},
+    DataType.VISIBLE_STRING: lambda data: data.decode("latin-1"),
+    DataType.UNICODE_STRING: lambda data: data.decode("utf-16-le", "replace"),
+}
+
+
+def _encode(kind: DataType, value: Value) -> bytes:
+    if kind.is_integer:
+        if not isinstance(value, int):
+            raise TypeError
+        if kind is DataType.BOOLEAN:
+            value = int(bool(value))
+        return value.to_bytes(kind.size, "little", signed=kind.signed)
+    if kind in _FLOATS:
+        return struct.pack(_FLOATS[kind], value)
+    if isinstance(value, str):
+        return value.encode(_TEXTS.get(kind, "ascii"))
+    if not isinstance(value, bytes) or (kind.size and len(value) != kind.size):
+        raise TypeError
+    return value
