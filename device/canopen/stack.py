@@ -1,0 +1,30 @@
+"""All services of a slave, in the order in which they act in a tick."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.heartbeat_producer import HeartbeatProducer
+from tickrig.device.canopen.nmt_slave import NmtSlave
+from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
+
+SERVICES: Final[tuple[ServiceMaker, ...]] = (
+    NmtSlave,
+    HeartbeatProducer,
+)
+"""NMT, SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat."""
+
+
+def make_slave(
+    dictionary: Dictionary, node_id: int, nonvolatile: Nonvolatile | None = None
+) -> CanopenSlave:
+    """Make a slave with every service that its dictionary has objects for.
+
+    Args:
+        dictionary: the objects, with default values.
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life.
+    """
+    return CanopenSlave(dictionary, node_id, SERVICES, nonvolatile)

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import pytest
+
+from tests.device.canopen.bus import Bus
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.nmt import NmtState
+
+RW = Access.READ | Access.WRITE
+
+
+def make_bus(heartbeat_ms: int = 0, startup: int = 4) -> Bus:
+    entries = [
+        Entry(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ),
+        Entry(0x1017, 0, "Heartbeat", DataType.UNSIGNED16, RW, default=heartbeat_ms),
+        Entry(0x1F80, 0, "NMT startup", DataType.UNSIGNED32, RW, default=startup),
+        Entry(0x2000, 0, "Mine", DataType.UNSIGNED8, RW, default=7),
+    ]
+    return Bus(make_slave(Dictionary(entries), node_id=5))
+
+
+def test_the_first_tick_boots_up() -> None:
+    bus = make_bus()
+    assert bus.step() == ["705#00"]
+    assert bus.slave.state is NmtState.PRE_OPERATIONAL
+    assert bus.run(100) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "state"),
+    [
+        ("000#0105", NmtState.OPERATIONAL),
+        ("000#0200", NmtState.STOPPED),
+        ("000#0106", NmtState.PRE_OPERATIONAL),
+        ("000#0305", NmtState.PRE_OPERATIONAL),
+        ("000#01", NmtState.PRE_OPERATIONAL),
+        ("000#010500", NmtState.PRE_OPERATIONAL),
+        ("000#R2", NmtState.PRE_OPERATIONAL),
+        ("00000000#0105", NmtState.PRE_OPERATIONAL),
+    ],
+)
+def test_commands_for_this_node_or_all_are_obeyed(command: str, state: NmtState) -> None:
+    bus = make_bus()
+    bus.step()
+    assert bus.step(command) == []
+    assert bus.slave.state is state
+
+
+def test_a_node_starts_itself_if_1f80h_says_so() -> None:
+    bus = make_bus(startup=8)
+    bus.step()
+    assert bus.slave.state is NmtState.OPERATIONAL
+
+
+def test_heartbeats_follow_the_boot_up_and_do_not_drift() -> None:
+    bus = make_bus(heartbeat_ms=100)
+    assert bus.step() == ["705#00"]
+    assert [bus.run(100) for _ in range(50)] == [["705#7F"]] * 50
+
+
+def test_reset_communication_keeps_the_application() -> None:
+    bus = make_bus()
+    bus.step()
+    bus.slave.dictionary[0x2000, 0].value = 9
+    bus.slave.dictionary[0x1017, 0].value = 50
+    assert bus.step("000#8205") == ["705#00"]
+    assert bus.slave.dictionary[0x2000, 0].value == 9
+    assert bus.slave.dictionary[0x1017, 0].value == 0
+
+
+def test_reset_node_restores_all() -> None:
+    bus = make_bus()
+    bus.step()
+    bus.slave.dictionary[0x2000, 0].value = 9
+    assert bus.step("000#8100") == ["705#00"]
+    assert bus.slave.dictionary[0x2000, 0].value == 7
+
+
+def test_a_power_cycle_boots_again() -> None:
+    bus = make_bus(heartbeat_ms=100)
+    bus.step("000#0105")
+    bus.slave.reset()
+    assert bus.slave.due_us == 0
+    assert bus.step() == ["705#00"]
+
+
+@pytest.mark.parametrize("node_id", [0, 128, -1, 256])
+def test_an_impossible_node_id_is_refused(node_id: int) -> None:
+    with pytest.raises(ValueError, match="is not in 1..127"):
+        make_slave(Dictionary([]), node_id)
