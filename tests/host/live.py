@@ -10,6 +10,7 @@ from queue import SimpleQueue
 from typing import TypeVar
 
 from tickrig.device.core import NEVER
+from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bridge import Bridge
 from tickrig.emulators.clock import RealClock
@@ -23,10 +24,14 @@ T = TypeVar("T")
 
 
 class LiveRrc:
-    """A running emulator; what is done to its device is done in its own thread."""
+    """A running emulator.
 
-    def __init__(self, outside: Port[bytes]) -> None:
-        line, self._rrc = SerialLine(), Rrc()
+    What is done to its device is done in its own thread, one thing between two
+    steps: a button that is pressed and let go is seen.
+    """
+
+    def __init__(self, outside: Port[bytes], config: RrcConfig) -> None:
+        line, self._rrc = SerialLine(), Rrc(config)
         bridge = Bridge(line.b, outside)
         self._rig = Rig(Station(self._rrc, line.a), bridges=[bridge], clock=RealClock())
         self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -37,9 +42,25 @@ class LiveRrc:
         """Set an input."""
         self._ask(lambda: self._rrc.inputs.set(name, value))
 
+    def move_stick(self, v_pct: int, w_pct: int) -> None:
+        """Set both axes of the stick between the same two ticks."""
+
+        def move() -> None:
+            self._rrc.inputs.set("stick_v_pct", v_pct)
+            self._rrc.inputs.set("stick_w_pct", w_pct)
+
+        self._ask(move)
+
     def read(self, name: str) -> int | str:
         """Read an output."""
         return self._ask(lambda: self._rrc.read(name))
+
+    def await_output(self, name: str, value: int | str) -> None:
+        """Wait until an output has a value; looks once a tick, for 10 s."""
+        for _ in range(1_000):
+            if (present := self.read(name)) == value:
+                return
+        raise AssertionError(f"{name} is {present!r}, not {value!r}")
 
     def start(self) -> None:
         self._thread.start()
@@ -56,15 +77,15 @@ class LiveRrc:
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            while not self._calls.empty():
+            if not self._calls.empty():
                 self._calls.get()()
             self._rig.step()
 
 
 @contextlib.contextmanager
-def live_rrc(outside: Port[bytes]) -> Iterator[LiveRrc]:
+def live_rrc(outside: Port[bytes], config: RrcConfig | None = None) -> Iterator[LiveRrc]:
     """Run an emulator for the length of a `with`."""
-    live = LiveRrc(outside)
+    live = LiveRrc(outside, config or RrcConfig())
     live.start()
     try:
         yield live

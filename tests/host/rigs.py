@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
@@ -33,34 +33,6 @@ class Bench:
 
     def out_pct(self) -> tuple[int | str, int | str]:
         return self.rrc.read("out_v_pct"), self.rrc.read("out_w_pct")
-
-
-class SpyLink:
-    """A SimLink that keeps what was sent, and lets a test spoil it on its way."""
-
-    def __init__(self, link: SimLink) -> None:
-        self._link = link
-        self.sent: list[tuple[int, bytes]] = []
-        self.spoil: Callable[[bytes], bytes] = lambda line: line
-
-    @property
-    def now_us(self) -> int:
-        return self._link.now_us
-
-    @property
-    def lines(self) -> list[bytes]:
-        """The lines that were sent, without LF."""
-        return [line.removesuffix(b"\n") for _, line in self.sent]
-
-    def send(self, traffic: bytes, /) -> None:
-        self.sent.append((self.now_us, traffic))
-        self._link.send(self.spoil(traffic))
-
-    def receive(self, timeout_us: int, /) -> bytes:
-        return self._link.receive(timeout_us)
-
-    def close(self) -> None:
-        self._link.close()
 
 
 def powered_off_bench(
