@@ -89,5 +89,5 @@ def test_a_power_cycle_boots_again() -> None:
 
 @pytest.mark.parametrize("node_id", [0, 128, -1, 256])
 def test_an_impossible_node_id_is_refused(node_id: int) -> None:
-    with pytest.raises(ValueError, match="is not in 1..127"):
+    with pytest.raises(ValueError, match=r"is not in 1\.\.127"):
         make_slave(Dictionary([]), node_id)
