@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
@@ -104,6 +105,8 @@ class SerialRun:
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
         """Read all that can be wrong before anything is opened."""
+        if self._options.panel:
+            self._check_panel()
         rehearsal = Emulator(self._kind.name, self._device)
         try:
             faults = [parse_fault_spec(text) for text in self._options.faults]
@@ -113,6 +116,14 @@ class SerialRun:
             return faults, parser.parse(*_read(self._options.scenario))
         except ValueError as error:
             raise Refused(str(error)) from None
+
+    def _check_panel(self) -> None:
+        if self._options.scenario or self._options.verbose:
+            raise Refused("--panel has the screen to itself: no --scenario and no --verbose")
+        if self._kind.panel is None:
+            raise Refused(f"--panel: there is none for {self._kind.title}")
+        if find_spec("textual") is None:
+            raise Refused("--panel needs Textual: pip install 'tickrig[tui]'")
 
     def _open(self, stack: ExitStack) -> Emulator:
         """Open pty, trace and control socket; each is given back at the end."""

@@ -8,6 +8,7 @@ import click
 
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.rrc.build import NAME, config_to_trace
 from tickrig.emulators.serial_options import serial_options
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
@@ -26,7 +27,13 @@ def _is_event(line: WireLine) -> bool:
     return line.mark is Mark.FROM_DEVICE and line.data.startswith(EVENTS)
 
 
-KIND: Final = Kind(NAME, "RRC", {"check": _with_check}, _is_event)
+def _panel(emulator: Emulator) -> None:
+    from tickrig.emulators.rrc.panel_run import run_panel  # noqa: PLC0415 - the extra [tui]
+
+    run_panel(emulator)
+
+
+KIND: Final = Kind(NAME, "RRC", {"check": _with_check}, _is_event, _panel)
 
 
 @click.command()

@@ -1,0 +1,58 @@
+"""Draw the operator panel into an SVG file, from a run in virtual time.
+
+`python -m tickrig.emulators.rrc.panel_picture docs/rrc-panel.svg`
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.control import Control, Object
+from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.player import Player
+from tickrig.emulators.rrc.build import NAME
+from tickrig.emulators.rrc.panel import RrcPanel
+from tickrig.emulators.scenario import ScenarioParser
+from tickrig.emulators.transcript import Transcript
+
+SCENARIO = """
+0.5  press power_button
+1    send watchdog64
+1.2  send limit3232ffffff
+1.3  send statusA1
++10ms send hello
+1.5  set stick 80 -30
++0s  press speed_up_button for 1s
+1.6  send beep646464640a0a0a0a0a0a
+2    end
+"""
+
+
+def picture() -> str:
+    """Return the panel as SVG, at the end of `SCENARIO`."""
+    emulator = Emulator(NAME, Rrc(), link="/tmp/rrc")
+    scenario = ScenarioParser(emulator.device, emulator.operator).parse(SCENARIO, "")
+    Player(emulator, scenario, Transcript(emulator, lambda line: None))
+    while emulator.running:
+        emulator.step()
+    return asyncio.run(_draw(Control(emulator)))
+
+
+async def _draw(control: Control) -> str:
+    async def ask(requests: Sequence[Object]) -> list[Object]:
+        return [control.answer(request) for request in requests]
+
+    panel = RrcPanel(ask)
+    async with panel.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        await panel.look()
+        await pilot.pause()
+        return panel.export_screenshot(title="rrc-emu --panel")
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(picture(), "utf-8")

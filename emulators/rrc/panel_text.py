@@ -1,0 +1,171 @@
+"""What the operator panel shows, as text: no terminal, no time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from rich.text import Text
+
+Value = int | str
+
+FAULT_KEYS: Final = {
+    "1": "bus_noise",
+    "2": "joystick_fault",
+    "3": "power_module_fault",
+    "4": "vr2_fault",
+    "5": "bus_unplugged",
+    "6": "cut",
+}
+BUTTONS: Final = {
+    "power": "power_button",
+    "alarm": "alarm_button",
+    "speed up": "speed_up_button",
+    "speed down": "speed_down_button",
+}
+STATE_STYLES: Final = {
+    "Limit": "bold black on green",
+    "Output": "bold black on green",
+    "Standby": "bold black on cyan",
+    "PowerOffByOthers": "bold white on red",
+}
+LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
+
+ON: Final = "bold yellow"
+FAULT: Final = "bold white on red"
+DIM: Final = "bright_black"
+HALF: Final = 15  # cells of a bar on each side of zero
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What is known of the emulator at one time.
+
+    Attributes:
+        values: inputs and outputs by name.
+        status: how the run is going.
+        lines: the latest lines on the wire but SA, as `(time, mark, text)`.
+        report: the latest SA line.
+    """
+
+    values: Mapping[str, Value] = field(default_factory=dict)
+    status: Mapping[str, Value] = field(default_factory=dict)
+    lines: tuple[tuple[str, str, str], ...] = ()
+    report: str = ""
+
+    def number(self, name: str) -> int:
+        """Return a value that is a number, 0 if it is not known yet."""
+        value = self.values.get(name, 0)
+        return value if isinstance(value, int) else 0
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Names of the faults that are present."""
+        return tuple(str(self.status.get("faults", "")).split())
+
+
+def stick_pad(v_pct: int, w_pct: int) -> Text:
+    """Draw the stick in its square: forward is up, right is right."""
+    row, column = 5 - round(v_pct / 20), 10 + round(w_pct / 10)
+    text = Text()
+    for y in range(11):
+        for x in range(21):
+            if (y, x) == (row, column):
+                text.append("●", style=ON)
+            else:
+                text.append("┼" if (y, x) == (5, 10) else _axis(y, x), style=DIM)
+        text.append("\n")
+    return text.append(f"v {_signed(v_pct)} %     w {_signed(w_pct)} %")
+
+
+def _signed(percent: int) -> str:
+    return f"{percent:+4}" if percent else "   0"
+
+
+def _axis(y: int, x: int) -> str:
+    if y == 5:
+        return "─"
+    return "│" if x == 10 else "·" if y % 5 == 0 or x % 10 == 0 else " "
+
+
+def bar(percent: int) -> Text:
+    """Draw -100..100 % as a bar to the left or right of zero."""
+    cells = round(abs(percent) * HALF / 100)
+    left = "█" * cells if percent < 0 else ""
+    right = "█" * cells if percent > 0 else ""
+    return Text.assemble(
+        ("░" * (HALF - len(left)), DIM),
+        (left, ON),
+        "│",
+        (right, ON),
+        ("░" * (HALF - len(right)), DIM),
+        f" {_signed(percent)} %",
+    )
+
+
+def scale(value: int, top: int) -> Text:
+    """Draw 1..top as filled and empty squares."""
+    return Text.assemble(("■" * value, ON), ("□" * (top - value), DIM), f" {value}")
+
+
+def lamp(label: str, value: Value, style: str) -> Text:
+    """Draw a lamp that is on or off."""
+    return Text.assemble(("● ", style) if value else ("○ ", DIM), label)
+
+
+def outputs_pane(view: View) -> Text:
+    """Show what the RRC does."""
+    state = str(view.values.get("state", "?"))
+    lamps = [
+        lamp("VR2 runs", view.number("vr2_power"), "bold green"),
+        lamp("error LED", view.number("error_led"), "bold red"),
+        lamp("buzzer", view.number("buzzer"), ON),
+    ]
+    rows = [
+        Text.assemble("state  ", (f" {state} ", STATE_STYLES.get(state, "bold reverse"))),
+        Text.assemble("drive  v ", bar(view.number("out_v_pct"))),
+        Text.assemble("       w ", bar(view.number("out_w_pct"))),
+        Text.assemble("speed  ", scale(view.number("speed_mode"), 5), "   gear "),
+        Text.assemble("gauge  ", scale(view.number("gauge"), 10)),
+        Text.assemble("       ", Text("   ").join(lamps)),
+    ]
+    rows[3].append(str(view.values.get("gear", "?")), style="bold")
+    return Text("\n").join(rows)
+
+
+def controls_pane(view: View) -> Text:
+    """Show which buttons are pressed and which faults are present."""
+    buttons = [
+        Text(f" {label} ", style="bold black on yellow" if view.number(name) else "reverse dim")
+        for label, name in BUTTONS.items()
+    ]
+    faults = [
+        Text.assemble(
+            (f"{key} {name}", FAULT if name in view.faults else DIM), " " * (20 - len(name))
+        )
+        for key, name in FAULT_KEYS.items()
+    ]
+    rows = [Text(" ").join(faults[at : at + 2]) for at in range(0, len(faults), 2)]
+    return Text("\n").join([Text(" ").join(buttons), *rows])
+
+
+def wire_pane(view: View, height: int) -> Text:
+    """Show the latest lines on the wire, the newest at the bottom."""
+    rows = []
+    for time, mark, text in view.lines[max(0, len(view.lines) - height) :]:
+        style = "bold green" if mark == ">" else LINE_STYLES.get(text[:2], "")
+        rows.append(Text.assemble((f"{time:>11} ", DIM), (f"{mark} {text}", style)))
+    return Text("\n").join(rows)
+
+
+def status_line(view: View) -> Text:
+    """Show how the run is going."""
+    status, now_us = view.status, view.status.get("now_us", 0)
+    text = Text(f" {status.get('link', '')}   {int(now_us) / 1e6:.1f} s")
+    late, lost = int(status.get("late_steps", 0)), int(status.get("lost_bytes", 0))
+    text.append(f"   late ticks {late}", style=ON if late else "")
+    text.append(f"   lost bytes {lost}", style=ON if lost else "")
+    if error := status.get("trace_error"):
+        text.append(f"   trace ended: {error}", style="bold red")
+    return text
