@@ -14,6 +14,7 @@ from tickrig.host.rrc import RrcClient
 
 OFF_STATE = "WaitPowerOn"
 SAMPLE_US = 10_000
+EDGE_US = 50_000  # how far a sampled edge may be off
 
 
 class Hands(Protocol):
@@ -110,10 +111,10 @@ class EmulatorOperator:
         return self._hands.read("error_led") == 1
 
     def hears_tones(self, times_us: tuple[int, ...]) -> bool:
-        tones_us = self._listen(sum(times_us) + 4 * SAMPLE_US)[:-1]
+        tones_us = self._listen(sum(times_us) + EDGE_US)[:-1]
         wanted_us = times_us[:-1]  # the last pause has no end
         return len(tones_us) == len(wanted_us) and all(
-            abs(heard - wanted) <= 4 * SAMPLE_US
+            abs(heard - wanted) <= EDGE_US
             for heard, wanted in zip(tones_us, wanted_us, strict=True)
         )
 

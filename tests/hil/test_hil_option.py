@@ -41,9 +41,11 @@ def hardware(tmp_path: Path) -> Iterator[Hardware]:
         command, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as emulator:
         assert emulator.stdout is not None
-        assert emulator.stdout.readline() == f"{it.port}\n".encode()
-        yield it
-        emulator.terminate()
+        try:
+            assert emulator.stdout.readline() == f"{it.port}\n".encode()
+            yield it
+        finally:
+            emulator.kill()
 
 
 def hil_command(rig_toml: str, chosen: str) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
-from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.bridge import Bridge
 from tickrig.emulators.clock import RealClock
 from tickrig.emulators.port import Port
@@ -27,7 +27,7 @@ class LiveRrc:
     """A running emulator.
 
     What is done to its device is done in its own thread, one thing between two
-    steps: a button that is pressed and let go is seen.
+    ticks: a button that is pressed and let go is seen.
     """
 
     def __init__(self, outside: Port[bytes], config: RrcConfig) -> None:
@@ -79,7 +79,7 @@ class LiveRrc:
         while not self._stop.is_set():
             if not self._calls.empty():
                 self._calls.get()()
-            self._rig.step()
+            self._rig.run_for(TICK_US)
 
 
 @contextlib.contextmanager

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import contextlib
 import os
 import runpy
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -58,6 +60,15 @@ def test_without_a_port_the_usage_is_shown(name: str, monkeypatch: pytest.Monkey
         run(name, monkeypatch)
 
 
+@contextlib.contextmanager
+def ended(process: subprocess.Popen[str]) -> Iterator[None]:
+    """End a process with the test, however that ends."""
+    try:
+        yield
+    finally:
+        process.kill()
+
+
 @pytest.mark.realtime
 def test_the_control_loop_follows_the_stick_until_vr2_is_off() -> None:
     command = [sys.executable, str(EXAMPLES / "rrc_control_loop.py")]
@@ -68,6 +79,7 @@ def test_the_control_loop_follows_the_stick_until_vr2_is_off() -> None:
         subprocess.Popen(
             [*command, port.path], env=environment, stdout=subprocess.PIPE, text=True
         ) as loop,
+        ended(loop),
     ):
         assert loop.stdout is not None
         assert loop.stdout.readline() == "press the power button\n"
