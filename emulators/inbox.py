@@ -43,7 +43,7 @@ class Inbox:
                 return
             if self._closed:
                 answers.cancel()
-            else:
+            elif answers.set_running_or_notify_cancel():
                 answers.set_result([self._control.answer(request) for request in requests])
 
     def close(self) -> None:

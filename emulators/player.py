@@ -69,6 +69,12 @@ class Player:
             end_us = max((_end_us(line) for line in scenario), default=0)
             emulator.agenda.put(self, end_us, self._end)
 
+    def finish(self, now_us: int) -> None:
+        """Count the expectations that are still open as missed."""
+        for item in list(self._open):
+            self._miss(item, now_us)
+            self._emulator.agenda.drop(item)
+
     def _carry_out(self, line: Line, now_us: int) -> None:
         operator = self._emulator.operator
         match line.action:
@@ -115,9 +121,7 @@ class Player:
         self._transcript.tell(now_us, "?", f"{item.line.place}: no line {expect.text!r} {within}")
 
     def _end(self, now_us: int) -> None:
-        for item in list(self._open):
-            self._miss(item, now_us)
-            self._emulator.agenda.drop(item)
+        self.finish(now_us)
         self._emulator.stop()
 
 

@@ -93,14 +93,17 @@ class SerialRun:
         """
         faults, scenario = self._checked()
         with ExitStack() as stack:
-            stack.enter_context(self._stopped_by_signals())
+            if self._options.in_real_time:
+                stack.enter_context(self._stopped_by_signals())
             emulator = self._running = self._open(stack)
-            for spec in faults:
-                emulator.operator.fault(0, spec)
             if self._options.in_real_time and not self._options.panel:
                 self._greet(emulator)
             player = self._attend(emulator, scenario)
+            for spec in faults:
+                emulator.operator.fault(0, spec)
             self._go_on(emulator)
+            if player:
+                player.finish(emulator.rig.now_us)
         return self._sum_up(emulator, player)
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:

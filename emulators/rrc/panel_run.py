@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Sequence
-from threading import Thread
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Final
 
 from tickrig.emulators.control import Control, Object
@@ -22,25 +23,31 @@ def run_panel(emulator: Emulator) -> None:
     inbox = Inbox(Control(emulator))
 
     def run() -> None:
-        try:
+        with _ending(emulator, inbox):
             while emulator.running:
                 emulator.step()
                 inbox.serve()
-        finally:
-            emulator.stop()
-            inbox.close()
 
     async def ask(requests: Sequence[Object]) -> list[Object]:
         return await asyncio.wrap_future(inbox.post(requests))
 
-    thread = Thread(target=run, name="rig")
+    started: list[Future[None]] = []
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)
     try:
-        RrcPanel(ask, thread.start).run()
+        with ThreadPoolExecutor(1, "rig") as pool, _ending(emulator, inbox):
+            RrcPanel(ask, lambda: started.append(pool.submit(run))).run()
+    finally:
+        sys.setswitchinterval(before_s)
+    for rig in started:
+        rig.result()
+
+
+@contextmanager
+def _ending(emulator: Emulator, inbox: Inbox) -> Iterator[None]:
+    """Let the emulator end, and nobody wait for it, however this ends."""
+    try:
+        yield
     finally:
         emulator.stop()
         inbox.close()
-        if thread.is_alive():
-            thread.join()
-        sys.setswitchinterval(before_s)

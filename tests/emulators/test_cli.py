@@ -75,6 +75,7 @@ def test_faults_of_the_command_line_are_those_of_scenarios() -> None:
         *("--scenario", "-", "--fault", "vr2_fault", "--fault", "cut@5ms-15ms"),
         text="0.1 press power_button\n0.5 end",
     )
+    assert "0.000000 ! vr2_fault=1\n" in result.stdout
     assert "0.401476 < EV:PowerOnError2" in result.stdout
     assert "EV:Initialized" not in result.stdout
 
@@ -118,6 +119,31 @@ def test_a_mistake_is_one_line_and_exit_status_2(
     assert result.stderr.startswith(f"Error: {error}")
     assert result.stderr.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("words", [["-v"], ["--scenario", "x"]])
+def test_a_panel_has_the_screen_to_itself(words: list[str]) -> None:
+    result = rrc("--panel", *words)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Error: --panel has the screen to itself: no --scenario")
+
+
+def test_a_panel_without_textual_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tickrig.emulators.serial_run.find_spec", lambda name: None)
+    result = rrc("--panel")
+    assert result.exit_code == 2
+    assert result.stderr == "Error: --panel needs Textual: pip install 'tickrig[tui]'\n"
+
+
+def test_nothing_but_the_panel_needs_textual() -> None:
+    program = (
+        "import sys; sys.modules.update(textual=None, rich=None);"
+        "from tickrig.emulators.rrc.cli import main; main()"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    words = [sys.executable, "-c", program, "--scenario", "drive.txt"]
+    done = subprocess.run(words, cwd=GOLDEN, env=env, capture_output=True, check=False)
+    assert done.stdout == (GOLDEN / "drive.transcript").read_bytes()
 
 
 def test_a_mistake_leaves_an_older_trace_alone(tmp_path: Path) -> None:

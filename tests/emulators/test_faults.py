@@ -4,10 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.emulators.lamp import Lamp
 from tickrig.device.core import NEVER
 from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.chance import Chance, threshold_of
+from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.faults import FaultyPort
+from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.serial_line import SerialLine
 
 
 class Loop:
@@ -127,3 +131,23 @@ def test_faults_never_see_silence() -> None:
     port.arm("drop", 0.5)
     assert received(port, loop, b"", b"", b"", b"abcdefgh") == before
     assert loop.due_us < NEVER
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 9_000), st.binary(min_size=1, max_size=9)), max_size=9),
+    st.sampled_from(["flip=0.2", "drop=0.3", "dup=0.3"]),
+)
+def test_dense_and_sparse_runs_suffer_the_same(sent: list[tuple[int, bytes]], fault: str) -> None:
+    def heard(*, dense: bool) -> list[tuple[int, bytes]]:
+        line, spec = SerialLine(), parse_fault_spec(fault)
+        port = FaultyPort(line.a, BYTE_FAULTS)
+        port.arm(spec.name, spec.rate)
+        rig, log = Rig(Station(Lamp(), port), dense=dense), []
+        for delay_us, data in sent:
+            line.b.send(rig.now_us, data)
+            rig.run_for(delay_us)
+            log.append((rig.now_us, line.b.poll(rig.now_us)))
+        rig.run_for(50_000)
+        return [*log, (rig.now_us, line.b.poll(rig.now_us))]
+
+    assert heard(dense=False) == heard(dense=True)

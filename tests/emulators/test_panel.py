@@ -13,6 +13,7 @@ from tickrig.emulators.inbox import Inbox
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.rrc.panel_picture import picture
+from tickrig.emulators.rrc.panel_run import run_panel
 from tickrig.emulators.rrc.panel_text import View
 
 Act = Callable[[RrcPanel, Emulator, Any], Awaitable[None]]
@@ -189,12 +190,28 @@ def test_trouble_is_in_the_status_line() -> None:
     assert panel_text.status_line(View()).plain == "    0.0 s   late ticks 0   lost bytes 0"
 
 
+def test_what_goes_wrong_in_the_rig_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(self: Emulator) -> None:
+        raise ZeroDivisionError
+
+    def show(self: RrcPanel) -> None:
+        self._when_ready()
+
+    monkeypatch.setattr(Emulator, "step", broken)
+    monkeypatch.setattr(RrcPanel, "run", show)
+    with pytest.raises(ZeroDivisionError):
+        run_panel(Emulator("rrc", Rrc()))
+
+
 def test_an_inbox_answers_together_and_cancels_after_the_end() -> None:
     inbox = Inbox(Control(Emulator("rrc", Rrc())))
     asked = inbox.post([{"v": 1, "do": "get", "names": ["gauge"]}, {"v": 1, "do": "nope"}])
     assert not asked.done()
     inbox.serve()
     assert [answer["ok"] for answer in asked.result(0)] == [True, False]
+    given_up = inbox.post([])
+    given_up.cancel()
+    inbox.serve()
     waiting = inbox.post([{"v": 1, "do": "get"}])
     inbox.close()
     assert waiting.cancelled()
