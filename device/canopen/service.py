@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtState
@@ -31,6 +31,11 @@ class Service:
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         self.node, self.slot = node, slot
+
+    @classmethod
+    def of(cls, node: CanopenSlave) -> Self:
+        """Return this service of a slave; StopIteration if the slave has none."""
+        return next(service for service in node.services if isinstance(service, cls))
 
     def power_on(self) -> None:
         """Forget what only a power cut makes it forget."""

@@ -47,6 +47,7 @@ class CanopenSlave:
         now_us: time of the latest tick.
         accepts: CAN-IDs that it listens to, for the acceptance filter of a wire.
         on_state: told of each change of the NMT state, old and new.
+        on_sync: told the counter of each SYNC, 0 if it has none: RPDOs, TPDOs, then others.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class CanopenSlave:
         self.configured_id = node_id
         self.node_id, self.state, self.now_us = node_id, NmtState.INITIALISING, 0
         self.on_state: list[Callable[[NmtState, NmtState], None]] = []
+        self.on_sync: list[Callable[[int], None]] = []
         self._powered = False
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler] = {}
