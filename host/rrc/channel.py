@@ -62,6 +62,7 @@ class Channel:
             refused = RrcRefused(exchange.sent, exchange.refusal)
             self._raise_alarm(refused)
             raise refused
+        self._raise_alarm()
         if not exchange.done:
             raise LinkTimeout(
                 f"sent {exchange.sent!r}, waited {timeout_us / 1_000:g} ms,"
@@ -87,6 +88,11 @@ class Channel:
             else:
                 self._deliver(reply, exchange)
         self.ledger.settle(now_us)
+
+    def resume(self) -> None:
+        """Lift the stop after too many refusals."""
+        self.ledger.refusals.clear()
+        self._alarm = None
 
     def restart(self) -> None:
         """Forget all that was known of the RRC and the commands."""

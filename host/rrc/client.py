@@ -92,11 +92,11 @@ class RrcClient(Session):
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
         """Send `output`, and before it the slowest speed mode if the stick drove until now.
 
-        The manual advises it for every change between limit and output. Choose
-        the speed mode again afterwards.
+        The manual advises it for every change between limit and output. The
+        first output is confirmed. Choose the speed mode again afterwards.
         """
-        self._slow_down_before(cmd.Output)
-        self.output(v_pct, w_pct)
+        changes = self._slow_down_before(cmd.Output)
+        self.output(v_pct, w_pct, confirm=changes or None)
 
     def drive_by_stick(
         self,
@@ -110,11 +110,13 @@ class RrcClient(Session):
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)
 
-    def _slow_down_before(self, drive: type[cmd.Limit | cmd.Output]) -> None:
-        """Send speed mode 1 unless this drive is on; the lock of the buttons stays."""
+    def _slow_down_before(self, drive: type[cmd.Limit | cmd.Output]) -> bool:
+        """Send speed mode 1 unless this drive is on; return whether that was sent."""
         mirror = self._ledger.mirror
-        if mirror.drive is not drive:
+        changes = mirror.drive is not drive
+        if changes:
             self.command(cmd.SpeedMode(SLOWEST, mirror.locked))
+        return changes
 
 
 def _units(time_us: int) -> int:

@@ -72,6 +72,11 @@ class Exchange:
         return f"OK:{self.name}"
 
     @property
+    def has_barrier(self) -> bool:
+        """Whether the command has no answer of its own."""
+        return len(self.lines) > 1
+
+    @property
     def changes_talk(self) -> bool:
         """Whether nothing else may be sent before this is settled."""
         return isinstance(self.command, StableMode | Watchdog)
@@ -86,7 +91,7 @@ class Exchange:
                 return name in (self.name, self._last)
             case Text(text):
                 if self._wants_text and not self.done:
-                    self.text = text if self._last == self.name else ""
+                    self.text = "" if self.has_barrier else text
                     self.done = True
                     return True
                 return False
@@ -96,5 +101,5 @@ class Exchange:
             return False
         self.refusal = self.refusal or reason
         # Behind a refused command the barrier's answer still comes.
-        self.done = self.done or len(self.lines) == 1 or reason == self._last
+        self.done = self.done or not self.has_barrier or reason == self._last
         return True

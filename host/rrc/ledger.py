@@ -27,7 +27,7 @@ class Ledger:
     def sent(self, now_us: int, command: Command) -> None:
         """Note a command that nobody waits for."""
         self._outbox.add(now_us, command.name.decode())
-        self.mirror.accepted(command)
+        self.mirror.sent(command)
 
     def take(self, reply: Answer, exchange: Exchange | None) -> bool:
         """Account for a reply; False if no command awaits it."""
@@ -56,13 +56,12 @@ class Ledger:
     def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
         """Return the name of the refused command, empty if that cannot be known.
 
-        Without stablemode every command is answered, in order: the oldest one
-        that can be meant is meant. With stablemode it cannot be known, and the
-        awaited command goes first: better to report a setting as refused that
-        was not than the other way round.
+        Commands are answered in order: the oldest one that can be meant is
+        meant. But where carried out commands have no answer that cannot be
+        known, and the awaited one goes first: better to report a setting as
+        refused that was not than the other way round.
         """
-        awaited = exchange is not None and self.mirror.stable and exchange.take(refusal)
-        if exchange is not None and awaited:
+        if exchange is not None and exchange.has_barrier and exchange.take(refusal):
             return exchange.name
         if (name := self._outbox.claim(refusal.reason)) is not None:
             return name

@@ -20,13 +20,20 @@ class Mirror:
         stable: stablemode: CHECK on every line, no OK.
         watchdog_10ms: time of the watchdog, 0 is off.
         locked: whether the controller's speed buttons are locked.
-        drive: the latest command that chose who drives.
+        drive: the command that chose who drives, None if that is not certain.
     """
 
     stable: bool = False
     watchdog_10ms: int = 0
     locked: int = 0
     drive: type[Limit | Output] | None = None
+
+    def sent(self, command: Command) -> None:
+        """Note a command whose fate is not waited for; who drives may have changed."""
+        if isinstance(command, Limit | Output) and self.drive is not type(command):
+            self.drive = None
+        else:
+            self.accepted(command)
 
     def accepted(self, command: Command) -> None:
         """Note a command that the RRC carried out."""

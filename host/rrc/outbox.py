@@ -10,12 +10,15 @@ from tickrig.host.rrc.exchange import NAMELESS
 SETTLED_US: Final = 100_000
 """An ER would have come by then: 10 periods of the RRC."""
 
+MOTION: Final = ("output", "limit")
+
 
 class Outbox:
     """Remembers unconfirmed commands until a reply or time tells their fate.
 
     Replies come in the order of the commands, so a reply belongs to the oldest
-    command it can belong to.
+    command of its name. An ER without a name goes to the account of a motion
+    command if there is one: the safe side, where it cannot be known.
     """
 
     def __init__(self) -> None:
@@ -27,10 +30,12 @@ class Outbox:
 
     def claim(self, reason: str) -> str | None:
         """Take out the command that an OK or ER belongs to; return its name."""
-        for entry in self._sent:
-            if reason == entry[1] or reason in NAMELESS:
-                self._sent.remove(entry)
-                return entry[1]
+        wanted = (*MOTION, None) if reason in NAMELESS else (reason,)
+        for name in wanted:
+            for entry in self._sent:
+                if name in (None, entry[1]):
+                    self._sent.remove(entry)
+                    return entry[1]
         return None
 
     def settle(self, now_us: int) -> list[str]:

@@ -14,7 +14,7 @@ from tickrig.host.rrc.errors import RrcRefused
 from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.refusals import OnRefusals, Refusals
 from tickrig.host.serial_link import SerialLink
-from tickrig.wire.rrc.commands import Command, DeviceName, Output
+from tickrig.wire.rrc.commands import Command, DeviceName, Output, StableMode
 from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, EventKind, StatusA
 
 TIMEOUT_US: Final = 200_000
@@ -136,7 +136,7 @@ class Session:
 
     def resume(self) -> None:
         """Send again after RrcStopped."""
-        self._ledger.refusals.clear()
+        self._channel.resume()
 
     def command(self, command: Command, *, confirm: bool | None = None) -> str:
         """Send any command and wait until the RRC has worked on it.
@@ -144,7 +144,8 @@ class Session:
         Args:
             command: what to send.
             confirm: False to send it only, for a stream; ERs that come later
-                count. Left out, all is confirmed but `output` with stablemode on.
+                count. Left out, all is confirmed but `output` with stablemode on;
+                `stablemode` is confirmed in any case.
 
         Returns:
             The answer of `device`, `version` or `date`, empty for the others.
@@ -157,7 +158,7 @@ class Session:
         """
         if confirm is None:
             confirm = not (self.stable and isinstance(command, Output))
-        if confirm:
+        if confirm or isinstance(command, StableMode):
             return self._channel.converse(command, self._timeout_us)
         self._channel.send(command)
         return ""

@@ -31,9 +31,9 @@ def test_a_minute_in_virtual_time(
 ) -> None:
     run("rrc_virtual_time.py", monkeypatch)
     assert capsys.readouterr().out.splitlines() == [
-        "60.472 s: Output, 30 %",
-        "60.772 s: EV:PowerOffWaitByWatchdog",
-        "60.772 s: PowerOffByOthers, 0 %",
+        "60.480 s: Output, 30 %",
+        "60.780 s: EV:PowerOffWaitByWatchdog",
+        "60.780 s: PowerOffByOthers, 0 %",
     ]
 
 

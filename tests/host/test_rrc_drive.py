@@ -27,7 +27,7 @@ def test_it_does_not_come_again_while_the_driver_stays() -> None:
         bench.client.drive_by_host(v_pct, 0)
     assert bench.link.lines == [
         *(b"speedmode107", b"device0"),
-        *(b"output0a002", b"output14006", b"output1e007"),
+        *(b"output0a002", b"device0", b"output14006", b"output1e007"),
     ]
 
 
@@ -56,3 +56,12 @@ def test_a_refused_output_does_not_count_as_driving() -> None:
         with pytest.raises(RrcRefused):
             bench.client.drive_by_host(30, 0)
     assert bench.link.lines == [b"speedmode10", b"output1e00"] * 2
+
+
+def test_a_stream_of_output_leaves_it_uncertain_who_drives() -> None:
+    bench = standby_bench(stable=True)
+    bench.client.drive_by_stick(100, 100)
+    bench.client.output(30, 0)
+    bench.link.sent.clear()
+    bench.client.drive_by_stick(100, 100)
+    assert bench.link.lines[0] == b"speedmode107"

@@ -11,10 +11,10 @@ def spoil_output(line: bytes) -> bytes:
     return line.replace(b"output", b"outp!t")
 
 
-def stream(bench: Bench, commands: int) -> None:
+def stream(bench: Bench, commands: int, period_us: int = 10_000) -> None:
     for _ in range(commands):
         bench.client.output(30, 0)
-        bench.client.run_for(10_000)
+        bench.client.run_for(period_us)
 
 
 def test_the_third_refusal_in_a_row_stops_the_client() -> None:
@@ -162,3 +162,36 @@ def test_three_refused_renewals_stop_the_client_too() -> None:
 def test_at_least_one_refusal_must_be_allowed() -> None:
     with pytest.raises(ValueError, match="0 refusals"):
         standby_bench(max_refusals=0)
+
+
+def test_a_stop_that_comes_during_another_command_is_raised_by_it() -> None:
+    bench = standby_bench(stable=True, on_refusals=OnRefusals.WATCHDOG)
+    bench.client.watchdog(2_550_000)
+    bench.link.spoil = spoil_output
+    for _ in range(3):
+        bench.client.output(30, 0)
+    with pytest.raises(RrcStopped):
+        bench.client.device()
+
+
+def test_resume_forgets_a_stop_that_was_not_raised_yet() -> None:
+    bench = standby_bench(on_refusals=OnRefusals.WATCHDOG, max_refusals=1)
+    bench.client.watchdog(2_550_000)
+    bench.link.spoil = spoil_output
+    with pytest.raises(RrcStopped):
+        bench.client.output(30, 0)
+    bench.client.resume()
+    bench.client.run_for(1_000_000)
+    assert not bench.client.stopped
+
+
+@pytest.mark.parametrize("period_us", [10_000, 30_000, 60_000, 100_000, 130_000, 500_000])
+def test_renewals_in_between_do_not_hide_that_every_output_is_refused(period_us: int) -> None:
+    bench = standby_bench(stable=True)
+    bench.client.watchdog(2_550_000)
+    bench.client.status()
+    bench.link.spoil = spoil_output
+    refused_before = bench.link.heard.count(b"ER:")
+    with pytest.raises(RrcStopped):
+        stream(bench, 10, period_us)
+    assert bench.link.heard.count(b"ER:") - refused_before == 3

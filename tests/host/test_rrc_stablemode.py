@@ -5,6 +5,7 @@ import pytest
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
+from tickrig.wire.rrc.commands import StableMode
 from tickrig.wire.rrc.replies import EventKind
 
 
@@ -142,3 +143,18 @@ def test_stablemode_works_before_vr2_is_on() -> None:
     bench.client.watchdog(500_000)
     assert bench.client.stable
     assert bench.client.watchdog_us == 500_000
+
+
+def test_stablemode_is_confirmed_in_any_case() -> None:
+    bench = standby_bench()
+    bench.link.spoil = lambda line: line.replace(b"mode1", b"mode2")
+    with pytest.raises(RrcRefused, match="ER:stablemode"):
+        bench.client.command(StableMode(1), confirm=False)
+    assert not bench.client.stable
+
+
+def test_a_refused_barrier_is_a_refusal() -> None:
+    bench = standby_bench(stable=True)
+    bench.link.spoil = lambda line: line.replace(b"device0", b"devicex8")
+    with pytest.raises(RrcRefused, match=r"'speedmode40A'.*ER:device"):
+        bench.client.speedmode(4)

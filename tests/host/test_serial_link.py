@@ -127,6 +127,8 @@ def test_a_lost_connection_comes_out_of_every_call(lost_client: RrcClient) -> No
 def test_a_port_that_closes_meanwhile_ends_the_wait() -> None:
     with pty() as port:
         link = SerialLink(port.path)
-        threading.Timer(0.05, port.close).start()
+        unplugging = threading.Timer(0.05, port.close)
+        unplugging.start()
         with contextlib.closing(link), pytest.raises(LinkClosed, match="cannot read"):
             link.receive(10_000_000)
+        unplugging.join()
