@@ -142,7 +142,7 @@ def controls_pane(view: View) -> Text:
     ]
     faults = [
         Text.assemble(
-            (f"{key} {name}", FAULT if name in view.faults else DIM), " " * (20 - len(name))
+            (f"{key} {name}", FAULT if name in view.faults else ""), " " * (20 - len(name))
         )
         for key, name in FAULT_KEYS.items()
     ]
