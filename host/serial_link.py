@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import time
+from typing import Final
 
 import serial
 
 from tickrig.host.errors import LinkClosed
+
+NEGOTIATED: Final = ("rfc2217:",)
+"""URLs under which each change of a port setting is a dialogue of 100 ms with the other end."""
+
+NEGOTIATED_WAIT_S: Final = 0.002
 
 
 class SerialLink:
@@ -22,11 +28,15 @@ class SerialLink:
     """
 
     def __init__(self, url: str, baud: int = 115_200) -> None:
+        self._url, self._negotiated = url, url.startswith(NEGOTIATED)
+        wait_s = NEGOTIATED_WAIT_S if self._negotiated else 0
+        write_timeout_s = None if self._negotiated else 1  # pyserial has none there
         try:
-            self._port = serial.serial_for_url(url, baudrate=baud, timeout=0, write_timeout=1)
+            self._port = serial.serial_for_url(
+                url, baudrate=baud, timeout=wait_s, write_timeout=write_timeout_s
+            )
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkClosed(f"cannot open {url!r}: {error}") from error
-        self._url = url
 
     @property
     def now_us(self) -> int:
@@ -34,7 +44,7 @@ class SerialLink:
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: bytes, /) -> None:
-        """Write bytes; raises LinkClosed if the port is gone or takes none for 1 s."""
+        """Write bytes; LinkClosed if the port is gone or takes none for 1 s."""
         try:
             self._port.write(traffic)
         except (serial.SerialException, OSError, TypeError) as error:
@@ -43,8 +53,7 @@ class SerialLink:
     def receive(self, timeout_us: int, /) -> bytes:
         """Wait for a first byte, then return all that are there."""
         try:
-            self._port.timeout = timeout_us / 1e6
-            first = self._port.read(1)
+            first = self._wait_for_byte(timeout_us)
             return first + self._port.read(self._port.in_waiting) if first else b""
         except (serial.SerialException, OSError, TypeError) as error:
             raise LinkClosed(f"cannot read from {self._url!r}: {error}") from error
@@ -52,3 +61,12 @@ class SerialLink:
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+
+    def _wait_for_byte(self, timeout_us: int) -> bytes:
+        if not self._negotiated:
+            self._port.timeout = timeout_us / 1e6
+            return self._port.read(1)
+        until_us = self.now_us + timeout_us
+        while not (first := self._port.read(1)) and self.now_us < until_us:
+            continue
+        return first

@@ -9,6 +9,9 @@ from collections.abc import Callable, Iterator
 from queue import SimpleQueue
 from typing import TypeVar
 
+import serial
+from serial.rfc2217 import PortManager
+
 from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
@@ -132,3 +135,27 @@ class TcpPort:
         self._listener.close()
         if self._connection is not None:
             self._connection.close()
+
+
+class Rfc2217Port(TcpPort):
+    """The same behind telnet with the serial options of RFC 2217, as a serial server has it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._settings = serial.serial_for_url("loop://", baudrate=115_200)
+        # typeshed wants two pyserial ports; the manager wants one port and a writer (pyserial docs)
+        self._manager = PortManager(self._settings, self)  # type: ignore[arg-type]
+
+    def write(self, data: bytes) -> None:
+        """Send what the port manager answers to a negotiation."""
+        super().send(0, data)
+
+    def poll(self, now_us: int, /) -> bytes:
+        return b"".join(self._manager.filter(super().poll(now_us)))
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        super().send(now_us, b"".join(self._manager.escape(traffic)))
+
+    def close(self) -> None:
+        self._settings.close()
+        super().close()

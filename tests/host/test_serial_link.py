@@ -8,7 +8,7 @@ from itertools import islice
 
 import pytest
 
-from tests.host.live import LiveRrc, TcpPort, live_rrc, pty
+from tests.host.live import LiveRrc, Rfc2217Port, TcpPort, live_rrc, pty
 from tickrig.host.errors import LinkClosed
 from tickrig.host.rrc import RrcClient
 from tickrig.host.serial_link import SerialLink
@@ -52,6 +52,21 @@ def test_the_client_works_on_a_socket() -> None:
     with socket_client() as (client, rrc):
         drive_forward(client, rrc)
         assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
+
+
+@pytest.mark.realtime
+@pytest.mark.filterwarnings("ignore:set:DeprecationWarning")  # of pyserial's own thread
+def test_the_client_works_on_a_serial_server_of_rfc_2217() -> None:
+    with (
+        contextlib.closing(Rfc2217Port()) as port,
+        live_rrc(port) as rrc,
+        RrcClient.open(f"rfc2217://127.0.0.1:{port.number}") as client,
+    ):
+        drive_forward(client, rrc)
+        assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
+        start_us = client.now_us
+        client.run_for(100_000)
+        assert client.now_us - start_us < 1_000_000
 
 
 @pytest.mark.realtime
