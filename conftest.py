@@ -1,6 +1,8 @@
-"""Options of the whole test run."""
+"""Options of the whole test run; here, so that `pytest --hil rig.toml` finds them."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import pytest
 
@@ -23,3 +25,13 @@ def pytest_configure(config: pytest.Config) -> None:
         config.stash[RIG] = read_rig_file(path)
     except BadRigFile as error:
         raise pytest.UsageError(str(error)) from None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With --hil run what tests the hardware, and nothing else."""
+    if config.getoption("--hil") is None:
+        return
+    hil = Path(__file__).parent / "tests" / "hil"
+    others = [item for item in items if hil not in item.path.parents]
+    config.hook.pytest_deselected(items=others)
+    items[:] = [item for item in items if hil in item.path.parents]
