@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self
 
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
@@ -56,6 +57,18 @@ class Service:
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Hear of each change of the NMT state, after it was made."""
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """Hear of an error (see `CanopenSlave.emergency`)."""
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """Hear that an error is gone."""
+
+    def communication_error(self) -> None:
+        """Hear of a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Hear of the CAN controller's fault confinement."""
 
     def tick(self, now_us: int) -> None:
         """Do what is due; called in the tick for which it was scheduled."""

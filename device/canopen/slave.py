@@ -11,7 +11,9 @@ from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.service import Handler, Service
 from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.time_of_day import TimeOfDay
 
 TICK_US: Final = 1_000
 UNCONFIGURED: Final = 0xFF
@@ -43,11 +45,16 @@ class CanopenSlave:
         ValueError: an impossible node-ID.
 
     Attributes:
+        node_id: the active node-ID.
+        pending_id: the node-ID that counts from the next reset on (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
         accepts: CAN-IDs that it listens to, for the acceptance filter of a wire.
+        time_of_day: the latest TIME stamp that was received, None before the first.
+        silent_until_us: nothing is sent before; LSS switches the bit rate.
         on_state: told of each change of the NMT state, old and new.
         on_sync: told the counter of each SYNC, 0 if it has none: RPDOs, TPDOs, then others.
+        on_bit_rate: told the bit rate in bit/s that LSS has switched to.
     """
 
     def __init__(
@@ -60,10 +67,13 @@ class CanopenSlave:
         if node_id != UNCONFIGURED and not 1 <= node_id <= 127:
             raise ValueError(f"node-ID {node_id} is not in 1..127 and not {UNCONFIGURED}")
         self.dictionary, self.nonvolatile = dictionary, nonvolatile or Nonvolatile()
-        self.configured_id = node_id
+        self.configured_id = self.pending_id = node_id
         self.node_id, self.state, self.now_us = node_id, NmtState.INITIALISING, 0
         self.on_state: list[Callable[[NmtState, NmtState], None]] = []
         self.on_sync: list[Callable[[int], None]] = []
+        self.on_bit_rate: list[Callable[[int], None]] = []
+        self.time_of_day: TimeOfDay | None = None
+        self.silent_until_us = 0
         self._powered = False
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler] = {}
@@ -105,6 +115,8 @@ class CanopenSlave:
         if not out:
             return ()
         self._out = []
+        if now_us < self.silent_until_us:
+            return ()
         if len(out) > 1:
             out.sort(key=_can_id)
         return tuple(out)
@@ -112,6 +124,34 @@ class CanopenSlave:
     def send(self, can_id: int, data: bytes) -> None:
         """Put a data frame into this tick's traffic."""
         self._out.append(CanFrame(can_id, data))
+
+    def emergency(self, code: int, register: int, text: bytes = b"") -> None:
+        """Raise an error: it is active until it is cleared, and raising it again is none.
+
+        Args:
+            code: emergency error code; see `EmcyCode`.
+            register: bits of the error register 1001h; the generic bit comes by itself.
+            text: manufacturer-specific bytes, up to 5; errors of one code may differ in them.
+        """
+        if self._powered:
+            for service in self.services:
+                service.emergency(code, register, text)
+
+    def emergency_clear(self, code: int, text: bytes | None = None) -> None:
+        """Clear an error, without `text` all that have this code."""
+        for service in self.services:
+            service.emergency_clear(code, text)
+
+    def communication_error(self) -> None:
+        """Let the error behaviour for communication errors act (1029h:01)."""
+        for service in self.services:
+            service.communication_error()
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Tell what the CAN controller reports; for the one that owns the controller."""
+        if self._powered:
+            for service in self.services:
+                service.bus_state(state)
 
     def schedule(self, slot: int, due_us: int) -> None:
         """Enter when a service wants its `tick`."""
@@ -141,18 +181,21 @@ class CanopenSlave:
 
     def reset_node(self) -> None:
         """Reset application and communication: every object has its power-on value again."""
+        self.node_id = self.pending_id
         self._restore(range(0x1_0000))
         self._boot()
 
     def reset_communication(self) -> None:
         """Reset the communication objects, 1000h to 1FFFh, and boot again."""
+        self.node_id = self.pending_id
         self._restore(COMMUNICATION_AREA)
         self._boot()
 
     def _power_on(self) -> None:
         self._powered = True
         self._out, self._dues = [], [NEVER] * len(self.services)
-        self.node_id = self.nonvolatile.node_id or self.configured_id
+        self.pending_id = self.nonvolatile.node_id or self.configured_id
+        self.time_of_day, self.silent_until_us = None, 0
         for service in self.services:
             service.power_on()
         self.reset_node()
