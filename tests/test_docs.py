@@ -1,0 +1,46 @@
+"""What the pages show is run, and what they point to is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.host.live import live_rrc, pty
+from tickrig.host.rrc import RrcClient
+from tickrig.wire.rrc.replies import EventKind
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "tests/hil/README.md"])
+
+
+def blocks(page: str, language: str) -> list[str]:
+    text = (ROOT / page).read_text("utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def test_the_readme_program_runs() -> None:
+    (program,) = blocks("README.md", "python")
+    exec(compile(program, "README.md", "exec"), {})
+
+
+@pytest.mark.realtime
+def test_the_host_program_of_the_rrc_page_runs() -> None:
+    (program,) = blocks("docs/rrc.md", "python")
+    with pty() as port, live_rrc(port) as rrc:
+        with RrcClient.open(port.path) as client:
+            rrc.set("power_button", 1)
+            client.wait_for(EventKind.POWER_ON_SUCCESS, 3_000_000)
+        exec(compile(program.replace("/tmp/rrc", port.path), "docs/rrc.md", "exec"), {})
+        assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_every_link_and_named_test_is_there(page: Path) -> None:
+    text = page.read_text("utf-8")
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
+        if "://" not in target:
+            assert (page.parent / target).exists(), f"{page.name} points to {target}"
+    for named in re.findall(r"`(tests/[\w/]+\.py)`", text):
+        assert (ROOT / named).exists(), f"{page.name} names {named}"
