@@ -1,0 +1,144 @@
+"""Faults of a CAN bus: drop, corrupt, duplicate, delay, babble, short."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+from types import MappingProxyType
+from typing import Final
+
+from tickrig.emulators.chance import Chance, threshold_of
+
+DELAY_US: Final = 10_000
+"""How long a delayed node sends nothing."""
+
+
+class Verdict(Enum):
+    """What becomes of a frame on the bus."""
+
+    SENT = auto()
+    DROPPED = auto()
+    CORRUPTED = auto()
+    DUPLICATED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class CanFaultKind:
+    """A fault that can be armed by name.
+
+    Attributes:
+        text: what it does, for people.
+        rated: whether it wants a rate.
+        verdict: what it makes of a frame that it hits.
+    """
+
+    text: str
+    rated: bool = True
+    verdict: Verdict | None = None
+
+
+CAN_FAULTS: Final[Mapping[str, CanFaultKind]] = MappingProxyType(
+    {
+        "drop": CanFaultKind(
+            "each frame is acknowledged and then taken by nobody, at this rate",
+            verdict=Verdict.DROPPED,
+        ),
+        "corrupt": CanFaultKind(
+            "a bit of each frame is turned over, at this rate", verdict=Verdict.CORRUPTED
+        ),
+        "duplicate": CanFaultKind(
+            "each frame is sent again, its sender saw the last bit wrong, at this rate",
+            verdict=Verdict.DUPLICATED,
+        ),
+        "delay": CanFaultKind("each time a node sends, it is held for 10 ms, at this rate"),
+        "babble": CanFaultKind("a broken node sends 000# without a pause", rated=False),
+        "short": CanFaultKind("the lines touch: nobody can send", rated=False),
+    }
+)
+
+
+class CanFaults:
+    """The faults of one bus; those with a rate have a chance of their own.
+
+    Chance is drawn once for each frame on the bus, and once for each time a
+    node sends, so it is the same in every run.
+
+    Args:
+        seed: seed of all chance in it.
+        changed: told of each fault that begins (True) or ends (False).
+
+    Attributes:
+        kinds: the faults that can be armed, by name.
+        place: a number from which the place of a turned bit is taken.
+    """
+
+    kinds = CAN_FAULTS
+
+    def __init__(self, seed: int, changed: Callable[[str, bool], None]) -> None:
+        self._seed, self._changed = seed, changed
+        self._armed: dict[str, int] = {}
+        self._chances: dict[str, Chance] = {}
+        self._verdict: Verdict | None = None
+        self.place = 0
+
+    def __bool__(self) -> bool:
+        """Say whether any fault is armed."""
+        return bool(self._armed)
+
+    @property
+    def armed(self) -> tuple[str, ...]:
+        """Names of the faults that are armed."""
+        return tuple(self._armed)
+
+    def check(self, name: str, rate: float | None) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+        rated = self.kinds[name].rated
+        if rated and (rate is None or not 0 < rate <= 1):
+            came = "no rate" if rate is None else f"{rate:g}"
+            raise ValueError(f"{name} wants a rate above 0 and up to 1, as {name}=0.01; got {came}")
+        if not rated and rate is not None:
+            raise ValueError(f"{name} takes no rate, got {rate:g}")
+
+    def arm(self, name: str, rate: float | None = None) -> None:
+        """Let a fault begin, at the time the bus has reached; one of the same name is replaced.
+
+        Raises:
+            KeyError: no fault has this name.
+            ValueError: a rate is missing, out of range or too much.
+        """
+        self.check(name, rate)
+        self.clear(name)
+        self._armed[name] = threshold_of(rate or 0)
+        self._changed(name, True)
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; clearing one that is not armed is no error."""
+        if self._armed.pop(name, None) is not None:
+            self._verdict = None
+            self._changed(name, False)
+
+    def judge(self) -> Verdict:
+        """Say what becomes of the next frame on the bus; the same until `spend`."""
+        if self._verdict is None:
+            self._verdict = Verdict.SENT
+            for name in self._armed:
+                verdict = self.kinds[name].verdict
+                if verdict and self._hits(name, name) and self._verdict is Verdict.SENT:
+                    self._verdict = verdict
+            self.place = self._chance("place").draw()
+        return self._verdict
+
+    def spend(self) -> None:
+        """Note that the frame judged last has been on the bus."""
+        self._verdict = None
+
+    def delay_us(self, number: int) -> int:
+        """Draw how long a node that sends is held."""
+        return DELAY_US if "delay" in self._armed and self._hits("delay", f"delay {number}") else 0
+
+    def _hits(self, name: str, stream: str) -> bool:
+        return self._chance(stream).hit(self._armed[name])
+
+    def _chance(self, stream: str) -> Chance:
+        return self._chances.setdefault(stream, Chance(self._seed, stream))

@@ -1,0 +1,20 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.errors import FramingError
+
+
+@given(st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8))
+def test_what_was_written_is_read_back(error_class: int, data: bytes) -> None:
+    frame = ErrorFrame(error_class, data)
+    assert ErrorFrame.parse(str(frame)) == frame
+
+
+@pytest.mark.parametrize("text", ["", "705#7F", "00000605#40", "20000020#00", "20000020#R"])
+def test_another_text_says_what_it_should_look_like(text: str) -> None:
+    with pytest.raises(FramingError, match="is not an error frame like 20000020#0000000000000000"):
+        ErrorFrame.parse(text)
