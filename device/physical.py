@@ -17,6 +17,7 @@ class Kind(Enum):
 
     LEVEL = "level"  # a quantity: a stick, a voltage, a load
     BUTTON = "button"  # 1 while pressed
+    TEXT = "text"  # words, or bytes in hex
     FAULT = "fault"  # 1 while the physical fault is present
 
 
@@ -37,8 +38,8 @@ class Input:
     name: str
     text: str
     kind: Kind = Kind.LEVEL
-    low: int = 0
-    high: int = 1
+    low: float = 0
+    high: float = 1
     unit: str = ""
     initial: int = 0
 
@@ -95,22 +96,24 @@ class InputBank:
         """Return the present value of an input."""
         return self._values[name]
 
-    def set(self, name: str, value: int) -> None:
+    def set(self, name: str, value: float | str) -> None:
         """Set an input.
 
         Raises:
-            ValueError: no such input, or a value out of its range.
+            ValueError: no such input, no whole number, or one out of its range.
         """
-        self.check(name, value)
-        self._values[name] = value
+        self._values[name] = self.check(name, value)
         self.changed = True
 
-    def check(self, name: str, value: int) -> None:
-        """Raise ValueError unless the input can be set to this value."""
+    def check(self, name: str, value: float | str) -> int:
+        """Return the value that the input would be set to, or raise as `set` does."""
         item = self.find(name)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise ValueError(f"{name} takes a whole number, not {value!r}")
         if not item.low <= value <= item.high:
             unit = f" {item.unit}" if item.unit else ""
             raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
+        return value
 
     def find(self, name: str, kind: Kind | None = None) -> Input:
         """Return the description of an input.

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.emulators.byte_text import escape
-from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.operator import PRESS_US
+from tickrig.emulators.setting import Setting
+from tickrig.emulators.workbench import Workbench
 
 VERSION: Final = 1
 
@@ -28,7 +29,7 @@ class Control:
         emulator: what is controlled. It must not be stepping meanwhile.
     """
 
-    def __init__(self, emulator: Emulator) -> None:
+    def __init__(self, emulator: Workbench) -> None:
         self._emulator = emulator
         self._verbs: dict[str, tuple[Callable[[Object], Object], tuple[str, ...]]] = {
             "describe": (self._describe, ()),
@@ -105,14 +106,14 @@ class Control:
             raise ValueError(f"no input or output {_short(unknown[0])}; known: {', '.join(known)}")
         return {"values": {name: self._value(name) for name in names}}
 
-    def _value(self, name: str) -> int | str:
+    def _value(self, name: str) -> Setting:
         device = self._emulator.device
         return device.inputs[name] if name in device.inputs.table else device.read(name)
 
     def _set(self, request: Object) -> Object:
         name, value = _text(request, "name"), request.get("value")
         values = value if isinstance(value, list) else [value]
-        self._emulator.operator.set(name, *[_whole(item, "value") for item in values])
+        self._emulator.operator.set(name, *[_setting(item) for item in values])
         return {}
 
     def _press(self, request: Object) -> Object:
@@ -167,6 +168,12 @@ def _text(request: Mapping[str, object], key: str) -> str:
 def _whole(value: object, key: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{key} is a whole number, not {_short(value)}")
+    return value
+
+
+def _setting(value: object) -> Setting:
+    if not isinstance(value, int | float | str) or isinstance(value, bool):
+        raise ValueError(f"value is a number or a string, not {_short(value)}")
     return value
 
 

@@ -13,6 +13,7 @@ from tickrig.emulators.control import Object
 from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.duration import format_time, parse_time_us
 from tickrig.emulators.refused import Refused
+from tickrig.emulators.setting import parse_setting
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 
@@ -53,12 +54,16 @@ def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
 
 @ctl.command("set", context_settings={"ignore_unknown_options": True})
 @click.argument("name")
-@click.argument("values", nargs=-1, required=True, type=int)
+@click.argument("values", nargs=-1, required=True)
 @as_json
 @click.pass_obj
-def set_(socket: Path, name: str, values: tuple[int, ...], as_json: bool) -> None:
+def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> None:
     """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
-    _show(_ask(socket, "set", name=name, value=list(values)), _nothing, as_json)
+    _show(
+        _ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
+        _nothing,
+        as_json,
+    )
 
 
 @ctl.command()
@@ -159,7 +164,8 @@ def _status(answer: Any) -> list[str]:
 def _describe(answer: Any) -> list[str]:
     out = [f"{answer['device']}, a tick each {answer['tick_us'] / 1_000:g} ms", "", "inputs"]
     for x in answer["inputs"]:
-        limits = f"{x['low']}..{x['high']} {x['unit']}".rstrip()
+        limits = "" if x["kind"] == "text" else f"{x['low']}..{x['high']}"
+        limits = f"{limits} {x['unit']}".strip()
         out.append(f"  {x['name']:<20} {x['kind']:<7} {limits:<12} {x['text']}")
     out += ["", "groups"]
     out += [f"  {name:<20} {' '.join(members)}" for name, members in answer["groups"].items()]

@@ -2,17 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Final
+from collections.abc import Callable, Collection, Mapping
+from typing import Final, Protocol
 
 from tickrig.device.core import NEVER
-from tickrig.device.physical import InputBank, Kind
+from tickrig.device.physical import Kind
 from tickrig.emulators.agenda import Agenda
+from tickrig.emulators.emulated import Inputs
 from tickrig.emulators.fault_spec import FaultSpec
-from tickrig.emulators.faults import FaultyPort
+from tickrig.emulators.setting import Setting
 
 PRESS_US: Final = 100_000
 """How long a button is pressed unless told otherwise."""
+
+
+class WireFault(Protocol):
+    """A fault of a wire, as people see it."""
+
+    @property
+    def text(self) -> str:
+        """What it does."""
+        ...
+
+    @property
+    def rated(self) -> bool:
+        """Whether it wants a rate."""
+        ...
+
+
+class WireFaults(Protocol):
+    """Where faults of a wire are armed by name: `FaultyPort`, or a whole bus."""
+
+    @property
+    def kinds(self) -> Mapping[str, WireFault]:
+        """The faults that can be armed."""
+        ...
+
+    @property
+    def armed(self) -> Collection[str]:
+        """Names of those that are."""
+        ...
+
+    def check(self, name: str, rate: float | None) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+
+    def arm(self, name: str, rate: float | None = None) -> None:
+        """Let a fault begin; one of the same name is replaced."""
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; one that is not armed is no error."""
 
 
 class Operator:
@@ -32,16 +70,16 @@ class Operator:
 
     def __init__(
         self,
-        inputs: InputBank,
+        inputs: Inputs,
         tick_us: int,
         agenda: Agenda,
-        wire: FaultyPort[Any],
+        wire: WireFaults,
         note: Callable[[str], None] = lambda text: None,
     ) -> None:
         self._inputs, self._tick_us, self._agenda, self._wire = inputs, tick_us, agenda, wire
         self.note = note
 
-    def set(self, name: str, *values: int) -> None:
+    def set(self, name: str, *values: Setting) -> None:
         """Set an input, or all inputs of a group.
 
         Raises:
@@ -52,7 +90,7 @@ class Operator:
             self._drop_fault(member)
             self._put(member, value)
 
-    def check_set(self, name: str, *values: int) -> list[tuple[str, int]]:
+    def check_set(self, name: str, *values: Setting) -> list[tuple[str, Setting]]:
         """Return which inputs `set` would set to what, or raise as it does."""
         groups = self._inputs.groups
         if name not in groups and name not in self._inputs.table:
@@ -152,6 +190,6 @@ class Operator:
         else:
             self._put(name, 0)
 
-    def _put(self, name: str, value: int) -> None:
+    def _put(self, name: str, value: Setting) -> None:
         self._inputs.set(name, value)
         self.note(f"{name}={value}")

@@ -10,7 +10,6 @@ from typing import assert_never
 
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.duration import format_time
-from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.fault_spec import FaultSpec
 from tickrig.emulators.scenario import (
     Clear,
@@ -26,6 +25,7 @@ from tickrig.emulators.scenario import (
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.transcript import Transcript
 from tickrig.emulators.wire_log import WireLine
+from tickrig.emulators.workbench import Workbench
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Player:
 
     def __init__(
         self,
-        emulator: Emulator,
+        emulator: Workbench,
         scenario: Sequence[Line],
         transcript: Transcript,
         *,

@@ -7,8 +7,9 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from tickrig.device.physical import InputBank, Output
-from tickrig.emulators.emulated import Emulated
+from tickrig.device.physical import Output
+from tickrig.emulators.emulated import Emulated, Inputs
+from tickrig.emulators.setting import Setting
 from tickrig.emulators.trace import RESET, Header, Mark, Record
 
 _logger = logging.getLogger(__name__)
@@ -72,7 +73,9 @@ class TracedDevice:
 
     def __init__(self, device: Emulated[bytes], trace: TraceFile) -> None:
         self._device, self._trace = device, trace
-        self._seen = {item.name: item.initial for item in device.inputs.table.values()}
+        self._seen: dict[str, Setting] = {
+            item.name: item.initial for item in device.inputs.table.values()
+        }
         self._was_reset = False
 
     @property
@@ -86,7 +89,7 @@ class TracedDevice:
         return self._device.due_us
 
     @property
-    def inputs(self) -> InputBank:
+    def inputs(self) -> Inputs:
         """The device's inputs."""
         return self._device.inputs
 
@@ -95,7 +98,7 @@ class TracedDevice:
         """The device's outputs."""
         return self._device.outputs
 
-    def read(self, name: str, /) -> int | str:
+    def read(self, name: str, /) -> Setting:
         """Return an output of the device."""
         return self._device.read(name)
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.device.physical import Physical
 from tickrig.emulators.byte_text import unescape
 from tickrig.emulators.duration import parse_time_us
+from tickrig.emulators.emulated import Touchable
 from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.operator import PRESS_US, Operator
+from tickrig.emulators.setting import Setting, parse_setting
 
 Encoder = Callable[[bytes], bytes]
 """Makes a line for the wire of the text that a scenario gives."""
@@ -29,12 +31,16 @@ class Send:
     shown: bytes
 
 
+Sender = Callable[[str], Send]
+"""Reads what stands behind a verb that sends."""
+
+
 @dataclass(frozen=True, slots=True)
 class Set:
     """Set an input or a group."""
 
     name: str
-    values: tuple[int, ...]
+    values: tuple[Setting, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,16 +110,20 @@ class ScenarioParser:
         device: for the names of inputs and outputs.
         operator: for what can be done to it.
         encoders: further verbs that send a line, beside `send`.
+        senders: the verbs that send, on a wire that carries no lines.
     """
 
     def __init__(
-        self, device: Physical, operator: Operator, encoders: Mapping[str, Encoder] | None = None
+        self,
+        device: Touchable,
+        operator: Operator,
+        encoders: Mapping[str, Encoder] | None = None,
+        *,
+        senders: Mapping[str, Sender] | None = None,
     ) -> None:
         self._device, self._operator = device, operator
-        self._encoders = {"send": lambda text: text + b"\n", **(encoders or {})}
         self._verbs: dict[str, Callable[[str], Action]] = {
-            **{verb: self._line_verb(encode) for verb, encode in self._encoders.items()},
-            "raw": _parse_raw,
+            **(senders or _line_senders(encoders or {})),
             "set": self._parse_set,
             "press": self._parse_press,
             "release": self._parse_release,
@@ -158,19 +168,9 @@ class ScenarioParser:
             raise ValueError(f"{rest} would have ended before {time}")
         return Line(at_us, action, place)
 
-    def _line_verb(self, encode: Encoder) -> Callable[[str], Send]:
-        def parse(rest: str) -> Send:
-            data = encode(unescape(rest))
-            return Send(data, data.removesuffix(b"\n"))
-
-        return parse
-
     def _parse_set(self, rest: str) -> Set:
-        name, *words = rest.split() or [""]
-        try:
-            values = tuple(int(word) for word in words)
-        except ValueError:
-            raise ValueError(f"set takes NAME and whole numbers, got {rest!r}") from None
+        name, *words = shlex.split(rest) or [""]
+        values = tuple(parse_setting(word) for word in words)
         self._operator.check_set(name, *values)
         return Set(name, values)
 
@@ -200,6 +200,20 @@ class ScenarioParser:
         if unknown := [name for name in names or [""] if name not in known]:
             raise ValueError(f"no output {unknown[0]!r}; known: {', '.join(known)}")
         return Watch(names)
+
+
+def _line_senders(encoders: Mapping[str, Encoder]) -> dict[str, Sender]:
+    """Return the verbs of a serial line."""
+    lines: dict[str, Encoder] = {"send": lambda text: text + b"\n", **encoders}
+    return {**{verb: _line_sender(encode) for verb, encode in lines.items()}, "raw": _parse_raw}
+
+
+def _line_sender(encode: Encoder) -> Sender:
+    def parse(rest: str) -> Send:
+        data = encode(unescape(rest))
+        return Send(data, data.removesuffix(b"\n"))
+
+    return parse
 
 
 def _parse_raw(rest: str) -> Send:

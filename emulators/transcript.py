@@ -7,9 +7,10 @@ from typing import Final
 
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.duration import format_time
-from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.setting import Setting
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.wire_log import WireLine
+from tickrig.emulators.workbench import Workbench
 
 STATE: Final = "state"
 """The output that is watched unasked, where a device has one."""
@@ -26,12 +27,12 @@ class Transcript:
 
     def __init__(
         self,
-        emulator: Emulator,
+        emulator: Workbench,
         write: Callable[[str], None],
         wanted: Callable[[WireLine], bool] = lambda line: True,
     ) -> None:
         self._emulator, self._write, self._wanted = emulator, write, wanted
-        self._shown: dict[str, int | str] = {}
+        self._shown: dict[str, Setting] = {}
         self._sending = False
         emulator.operator.note = lambda text: self.tell(emulator.touch_us, "!", text)
         emulator.log.listeners.append(self._hear)

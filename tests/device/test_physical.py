@@ -26,10 +26,13 @@ def test_a_change_is_noticed() -> None:
     [
         ("level_v", 6, "level_v 6 is not in -5..5 V"),
         ("gauge", -1, "gauge -1 is not in 0..9"),
+        ("gauge", 1.5, "gauge takes a whole number, not 1.5"),
+        ("gauge", "9", "gauge takes a whole number, not '9'"),
+        ("gauge", True, "gauge takes a whole number, not True"),
         ("smell", 1, "no input 'smell'; known: level_v, key, gauge"),
     ],
 )
-def test_a_wrong_input_says_what_is_allowed(name: str, value: int, reason: str) -> None:
+def test_a_wrong_input_says_what_is_allowed(name: str, value: float | str, reason: str) -> None:
     inputs = bank()
     inputs.changed = False
     with pytest.raises(ValueError, match=reason):

@@ -48,7 +48,7 @@ def shown(panel: RrcPanel, name: str) -> str:
     return str(panel.query_one(f"#{name}").render())
 
 
-def inputs(emulator: Emulator, *names: str) -> list[int]:
+def inputs(emulator: Emulator, *names: str) -> list[object]:
     return [emulator.device.inputs[name] for name in names]
 
 

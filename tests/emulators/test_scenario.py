@@ -79,7 +79,7 @@ def test_a_scenario_is_read_into_values() -> None:
         ("1 raw", "got ''"),
         ("1 set", "no input ''; known: place, lamp"),
         ("1 set lamp", "lamp takes one value (lamp), got 0"),
-        ("1 set lamp on", "set takes NAME and whole numbers, got 'lamp on'"),
+        ("1 set lamp on", "lamp takes a whole number, not 'on'"),
         ("1 set place 1 99", "y_mm 99 is not in -10..10 mm"),
         ("1 press", "press takes NAME or NAME for DURATION, got ''"),
         ("1 press key 5", "got 'key 5'"),

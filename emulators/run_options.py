@@ -1,0 +1,44 @@
+"""The options that the command lines of all emulators share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig import __version__
+
+PATH: Final = click.Path(path_type=Path)
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def add_options(*options: Decorator) -> Decorator:
+    """Return a decorator that adds options in this order."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+def run_options(wire_faults: str) -> Decorator:
+    """Return a decorator that adds the fields of `run.RunOptions`, and --version."""
+    return add_options(
+        click.option("--scenario", type=PATH, help="Scenario to play; - reads standard input."),
+        click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'."),
+        click.option(
+            "--fault",
+            "faults",
+            multiple=True,
+            metavar="NAME[=RATE][@FROM[-TO]]",
+            help=f"Fault of the wire ({wire_faults}) or of the device; may be repeated.",
+        ),
+        click.option("--seed", type=int, default=0, help="Seed of the wire faults' chance.  [0]"),
+        click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
+        click.version_option(__version__, message="%(prog)s (tickrig) %(version)s"),
+    )
