@@ -25,6 +25,11 @@ class Device(Protocol[W]):
         A rig in virtual time jumps to it. It may be in the past (the next tick
         then does the work) or `NEVER`. A tick before it, without traffic, must
         change nothing that anybody could ever see.
+
+        It may become earlier in `tick` and `reset`, and by what is done to the
+        device between steps: inputs, a write to its dictionary. A rig looks
+        again whenever it is asked to go on; what one device does to another
+        within a step is heard of only through the wire.
         """
         ...
 

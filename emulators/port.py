@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
 
-from tickrig.device.core import W
+from tickrig.device.core import Device, W
 
 
 class Port(Protocol[W]):
@@ -21,3 +22,28 @@ class Port(Protocol[W]):
 
     def send(self, now_us: int, traffic: W, /) -> None:
         """Put one tick's traffic on the wire at `now_us`."""
+
+
+class Wire(Protocol):
+    """A wire that many stations share; it is moved on by the rig."""
+
+    @property
+    def due_us(self) -> int:
+        """When something ends on it next, `NEVER` if nothing is on its way."""
+        ...
+
+    def advance(self, now_us: int, /) -> None:
+        """Let everything end that ends by `now_us`, and wake who received it."""
+
+
+@runtime_checkable
+class WirePort(Port[W], Protocol[W]):
+    """A port that says when traffic has arrived, so that nobody need look."""
+
+    @property
+    def wire(self) -> Wire:
+        """The wire it is an end of."""
+        ...
+
+    def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
+        """Serve a device: call `wake` with the time when traffic has arrived for it."""

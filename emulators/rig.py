@@ -3,24 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Generic
+from typing import Any, Final, Generic, Protocol
 
 from tickrig.device.core import NEVER, Device, W
-from tickrig.emulators.bridge import Bridge
 from tickrig.emulators.clock import Clock, VirtualClock
-from tickrig.emulators.port import Port
+from tickrig.emulators.port import Port, Wire, WirePort
+from tickrig.emulators.timetable import Timetable
 
 LATE_US: Final = 1_000
 """A step that begins later than this counts as late."""
 
 
-class Station(Generic[W]):
-    """A device on a port."""
+class Joint(Protocol):
+    """A joint of a wire with the outside world: `Bridge`, `CanBridge`."""
 
-    __slots__ = ("device", "port", "tick_us")
+    @property
+    def due_us(self) -> int:
+        """When there is something to be handed out."""
+        ...
+
+    def take_in(self, now_us: int, /) -> None:
+        """Put on the wire what the outside sent."""
+
+    def give_out(self, now_us: int, /) -> None:
+        """Hand out what has arrived."""
+
+
+class Station(Generic[W]):
+    """A device on a port.
+
+    Attributes:
+        at_us: the tick for which it stands in the timetable of its rig.
+    """
+
+    __slots__ = ("at_us", "device", "port", "tick_us")
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
         self.device, self.port, self.tick_us = device, port, device.tick_us
+        self.at_us = NEVER
 
     def wake_us(self, now_us: int) -> int:
         """Return the first tick after `now_us` at which this station has work."""
@@ -41,6 +61,8 @@ class Rig:
     In virtual time the rig jumps over ticks at which no device is due and
     nothing arrives; `dense=True` visits them all, which must make no
     difference. In real time it wakes at every tick and runs those with work.
+    Stations on a shared wire stand in a timetable and cost nothing until they
+    have work; the others are looked at in every step.
 
     Args:
         stations: the devices, each on its port.
@@ -57,26 +79,34 @@ class Rig:
     def __init__(
         self,
         *stations: Station[Any],
-        bridges: Sequence[Bridge] = (),
+        bridges: Sequence[Joint] = (),
         clock: Clock | None = None,
         dense: bool = False,
     ) -> None:
         self.now_us = self.late_us = self.late_steps = 0
-        self._stations, self._bridges = stations, tuple(bridges)
+        self._bridges, self._dense = tuple(bridges), dense
         self._clock = clock or VirtualClock()
         self._jumps = not dense and isinstance(self._clock, VirtualClock)
-        self._dense = dense
+        self._periods = tuple(sorted({station.tick_us for station in stations}))
+        self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
+        self._wires: tuple[Wire, ...] = ()
+        self._woken = tuple(s for s in stations if self._attached(s) and not dense)
+        self._looked_at = tuple(s for s in stations if s not in self._woken)
+
+    def _attached(self, station: Station[Any]) -> bool:
+        port = station.port
+        if not isinstance(port, WirePort):
+            return False
+        port.attach(station.device, lambda at_us: self._enter(station, at_us))
+        if port.wire not in self._wires:
+            self._wires += (port.wire,)
+        return True
 
     @property
     def next_us(self) -> int:
-        """When the next step has something to do."""
-        now_us = self.now_us
-        wake = [bridge.due_us for bridge in self._bridges]
-        if self._jumps:
-            wake += [station.wake_us(now_us) for station in self._stations]
-        else:
-            wake += [now_us - now_us % s.tick_us + s.tick_us for s in self._stations]
-        return max(now_us, min(wake, default=NEVER))
+        """When there is something to do next: a tick with work, or something ends on a wire."""
+        self._look()
+        return min(self._planned_us, self._wires_due_us)
 
     def step(self) -> None:
         """Go to the next time with something to do, and do it; nothing if that never comes."""
@@ -85,8 +115,11 @@ class Rig:
 
     def run_to(self, t_us: int) -> None:
         """Step through all that happens up to and at `t_us`."""
-        while (next_us := self.next_us) <= t_us:
+        self._look()
+        while (next_us := self._go_on(t_us)) <= t_us:
             self._run(next_us)
+        for wire in self._wires:
+            wire.advance(t_us)
         self._idle_to(t_us)
 
     def run_for(self, duration_us: int) -> None:
@@ -103,26 +136,80 @@ class Rig:
             self.step()
         return True
 
+    def _look(self) -> None:
+        """Enter what has come due between steps: inputs set, a dictionary written."""
+        for station in self._woken:
+            if (due_us := station.device.due_us) < station.at_us:
+                self._enter(station, due_us)
+
+    def _enter(self, station: Station[Any], at_us: int) -> None:
+        """Let a station have work at the first tick from `at_us` on."""
+        if at_us < NEVER:
+            tick_us = station.tick_us
+            self._timetable.enter(station, -(-max(at_us, self._open_us) // tick_us) * tick_us)
+
+    @property
+    def _planned_us(self) -> int:
+        """The next tick that is known to have work."""
+        now_us, next_us = self.now_us, self._timetable.first_us
+        for bridge in self._bridges:
+            next_us = min(next_us, bridge.due_us)
+        if self._jumps:
+            for station in self._looked_at:
+                next_us = min(next_us, station.wake_us(now_us))
+        else:
+            for tick_us in self._periods:
+                next_us = min(next_us, now_us - now_us % tick_us + tick_us)
+        return max(now_us, next_us)
+
+    @property
+    def _wires_due_us(self) -> int:
+        return min((wire.due_us for wire in self._wires), default=NEVER)
+
+    def _go_on(self, until_us: int) -> int:
+        """Let frames end up to the next tick with work, and return that."""
+        while True:
+            next_us, due_us = self._planned_us, self._wires_due_us
+            if due_us >= next_us or due_us > until_us:
+                return next_us
+            for wire in self._wires:
+                wire.advance(due_us)
+
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:
             self._clock.wait_until(t_us)
             self.now_us = t_us
+        self._open_us = self.now_us + 1
 
     def _run(self, now_us: int) -> None:
         late_us = self._clock.wait_until(now_us)
-        self.now_us = now_us
+        self.now_us = self._open_us = now_us
         self.late_us = max(self.late_us, late_us)
         self.late_steps += late_us > LATE_US
         for bridge in self._bridges:
             bridge.take_in(now_us)
+        for wire in self._wires:
+            wire.advance(now_us)
+        self._tick(now_us)
+        for bridge in self._bridges:
+            bridge.give_out(now_us)
+
+    def _tick(self, now_us: int) -> None:
+        """Let all devices with work compute, then send."""
         sent = []
-        for station in self._stations:
+        for station in self._looked_at:
             if now_us % station.tick_us:
                 continue
             received = station.port.poll(now_us)
             if received or self._dense or station.device.due_us <= now_us:
                 sent.append((station.port, station.device.tick(now_us, received)))
+        woken = self._timetable.take(now_us)
+        self._open_us = now_us + 1
+        for station in woken:
+            received = station.port.poll(now_us)
+            device = station.device
+            if received or device.due_us <= now_us:
+                sent.append((station.port, device.tick(now_us, received)))
+            self._enter(station, device.due_us)
         for port, traffic in sent:
             port.send(now_us, traffic)
-        for bridge in self._bridges:
-            bridge.give_out(now_us)
