@@ -12,6 +12,7 @@ from tickrig.device.canopen.service import Handler, Service
 from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.time_of_day import TimeOfDay
 
@@ -152,6 +153,11 @@ class CanopenSlave:
         if self._powered:
             for service in self.services:
                 service.bus_state(state)
+
+    def overrun(self) -> None:
+        """Tell that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
+        self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
+        self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
     def schedule(self, slot: int, due_us: int) -> None:
         """Enter when a service wants its `tick`."""

@@ -4,14 +4,32 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.device.canopen.can_error_state import CanErrorState
 from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.emcy_consumer import EmcyConsumer
+from tickrig.device.canopen.emcy_producer import EmcyProducer
+from tickrig.device.canopen.error_behaviour import ErrorBehaviour
+from tickrig.device.canopen.heartbeat_consumer import HeartbeatConsumer
 from tickrig.device.canopen.heartbeat_producer import HeartbeatProducer
+from tickrig.device.canopen.lss_slave import LssSlave
 from tickrig.device.canopen.nmt_slave import NmtSlave
+from tickrig.device.canopen.node_guarding import NodeGuarding
 from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tickrig.device.canopen.parameter_store import ParameterStore
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.time_stamp import TimeStamp
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
     NmtSlave,
+    LssSlave,
+    TimeStamp,
+    ParameterStore,
+    EmcyConsumer,
+    HeartbeatConsumer,
+    NodeGuarding,
+    CanErrorState,
+    EmcyProducer,
+    ErrorBehaviour,
     HeartbeatProducer,
 )
 """NMT, SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat."""
