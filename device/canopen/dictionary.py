@@ -57,6 +57,15 @@ class Dictionary:
             entry.index: known.get(entry.index, ObjectInfo(entry.name)) for entry in ordered
         }
 
+    def copy(self) -> Dictionary:
+        """Return the same objects with their default values, for another slave."""
+        twin = Dictionary.__new__(Dictionary)
+        entries = [entry.copy() for entry in self._entries.values()]
+        twin._entries = dict(zip(self._entries, entries, strict=True))
+        twin.by_multiplexer = dict(zip(self.by_multiplexer, entries, strict=True))
+        twin.objects = self.objects
+        return twin
+
     def __iter__(self) -> Iterator[Entry]:
         """Give all entries, sorted."""
         return iter(self._entries.values())

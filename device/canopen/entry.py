@@ -115,6 +115,18 @@ class Entry:
         """Name it as a log line would."""
         return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
 
+    def copy(self) -> Entry:
+        """Return the same description with its default value, and nobody's rules."""
+        twin = Entry.__new__(Entry)
+        twin.index, twin.sub, twin.name = self.index, self.sub, self.name
+        twin.data_type, twin.access, twin.size = self.data_type, self.access, self.size
+        twin.low, twin.high, twin.max_bytes = self.low, self.high, self.max_bytes
+        twin.readable, twin.writable, twin.relative = self.readable, self.writable, self.relative
+        twin.default = twin.data = self.default
+        twin.guard = twin.written = twin.source = None
+        twin.watchers = []
+        return twin
+
     @property
     def key(self) -> int:
         """Index and sub-index in one number."""

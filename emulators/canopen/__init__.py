@@ -1,0 +1,1 @@
+"""CANopen slaves out of files: EDS, DCF and what survives a power cut."""

@@ -1,0 +1,101 @@
+"""Values in an EDS: numbers, `$NODEID` sums, texts and hexadecimal bytes (CiA 306)."""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+from tickrig.emulators.canopen.eds_file import parse_number
+from tickrig.wire.canopen.datatypes import DataType, Value
+
+NODE_ID: Final = "$NODEID"
+
+TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
+FLOATS: Final = {DataType.REAL32: "f", DataType.REAL64: "d"}
+TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
+
+_TRUTH: Final = {"true": True, "false": False}
+
+
+def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
+    """Read a value.
+
+    Args:
+        kind: its data type.
+        text: not empty.
+
+    Returns:
+        The value, and whether the node-ID is to be added to it.
+
+    Raises:
+        ValueError: not a value of this type.
+
+    >>> parse_value(DataType.UNSIGNED32, "$NODEID+0x180")
+    (384, True)
+    >>> parse_value(DataType.INTEGER8, "0xFF")
+    (-1, False)
+    >>> parse_value(DataType.REAL32, "0x3F800000")
+    (1.0, False)
+    """
+    if kind in TEXTS:
+        return text, False
+    if kind in BYTES:
+        return _parse_bytes(text), False
+    if kind in FLOATS:
+        return _parse_float(FLOATS[kind], text), False
+    if kind is DataType.BOOLEAN and text.lower() in _TRUTH:
+        return _TRUTH[text.lower()], False
+    number, relative = _parse_sum(text)
+    if kind in TIMES:
+        return number.to_bytes(6, "little"), False
+    if kind.signed and 1 << kind.bits - 1 <= number < 1 << kind.bits:
+        number -= 1 << kind.bits
+    return number, relative
+
+
+def parse_limit(kind: DataType, text: str) -> float | None:
+    """Read a limit; None if the type has none or it is that of every value of the type."""
+    if kind not in FLOATS and (not kind.is_integer or NODE_ID in text.upper()):
+        return None
+    value = parse_value(kind, text)[0]
+    return value if isinstance(value, int | float) else None
+
+
+def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
+    """Write a value; what it cannot express is for the caller to see by reading it again.
+
+    >>> format_value(DataType.UNSIGNED32, (0x180).to_bytes(4, "little"), relative=True)
+    '$NODEID+0x180'
+    """
+    value = kind.decode(data)
+    if isinstance(value, bytes):
+        return f"0x{int.from_bytes(data, 'little'):012X}" if kind in TIMES else data.hex().upper()
+    if isinstance(value, str):
+        return value
+    if isinstance(value, float) or kind.signed or kind is DataType.BOOLEAN:
+        return str(value)
+    return f"{NODE_ID}+0x{value:X}" if relative else f"0x{value:0{2 * kind.size}X}"
+
+
+def _parse_sum(text: str) -> tuple[int, bool]:
+    terms = text.replace(" ", "").upper().split("+")
+    numbers = [parse_number(term) for term in terms if term != NODE_ID]
+    return sum(numbers), NODE_ID in terms
+
+
+def _parse_float(layout: str, text: str) -> float:
+    """Read a decimal number, or the bytes of a float as a hexadecimal one."""
+    if not text.lower().startswith("0x"):
+        return float(text)
+    data = int(text, 16).to_bytes(struct.calcsize(layout), "big")
+    value: float = struct.unpack(">" + layout, data)[0]
+    return value
+
+
+def _parse_bytes(text: str) -> bytes:
+    """Read hexadecimal bytes; some editors write a text instead."""
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        return text.encode()
