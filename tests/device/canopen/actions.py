@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.wire.canopen.time_of_day import TimeOfDay
 
 
 class SlaveActions:
@@ -15,6 +16,9 @@ class SlaveActions:
         self.verbs: dict[str, Callable[..., None]] = {
             "od": self.write_object,
             "nodeid": self.give_node_id,
+            "emcy": self.raise_error,
+            "emcy_clear": self.clear_error,
+            "expect_time": self.expect_time,
         }
 
     def act(self, verb: str, *args: str) -> None:
@@ -29,3 +33,16 @@ class SlaveActions:
     def give_node_id(self, node_id: str) -> None:
         """Set the node-ID of the switches; it counts from the next power-on."""
         self.slave.configured_id = int(node_id, 16)
+
+    def raise_error(self, code: str, register: str) -> None:
+        """Raise an error."""
+        self.slave.emergency(int(code, 16), int(register, 16))
+
+    def clear_error(self, code: str) -> None:
+        """Clear an error."""
+        self.slave.emergency_clear(int(code, 16))
+
+    def expect_time(self, milliseconds: str, days: str) -> None:
+        """Compare the latest time stamp."""
+        wanted = TimeOfDay(int(milliseconds), int(days))
+        assert self.slave.time_of_day == wanted, f"{self.slave.time_of_day}, want {wanted}"
