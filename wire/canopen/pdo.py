@@ -1,0 +1,188 @@
+"""PDOs on the wire: mapping entries, bits in a frame, multiplexed PDOs (CiA 301, PDO).
+
+>>> MappedObject.parse(0x6200_0108)
+MappedObject(index=25088, sub=1, bits=8)
+>>> pack_bits(((1, 1), (0, 1), (5, 3))).hex()
+'15'
+>>> unpack_bits(bytes.fromhex("15"), (1, 1, 3))
+(1, 0, 5)
+>>> Mpdo.parse(bytes.fromhex("8500200134120000")).data.hex()
+'34120000'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.wire.errors import FieldError, FramingError
+
+MAX_PDO_BYTES: Final = 8
+MAX_PDO_BITS: Final = 64
+MAX_MAPPED_OBJECTS: Final = 64
+
+SAM_MPDO: Final = 0xFE
+"""Sub-index 0 of a mapping: multiplexed PDO, source address mode."""
+
+DAM_MPDO: Final = 0xFF
+"""Sub-index 0 of a mapping: multiplexed PDO, destination address mode."""
+
+MPDO_DATA_BYTES: Final = 4
+
+_DESTINATION: Final = 0x80
+_NODE_ID_MASK: Final = 0x7F
+
+
+@dataclass(frozen=True, slots=True)
+class MappedObject:
+    """One entry of a PDO mapping (CiA 301, PDO mapping parameter).
+
+    Attributes:
+        index: 0x0000..0xFFFF; below 0x0020 a data type, as a dummy.
+        sub: 0..255.
+        bits: length in the PDO.
+    """
+
+    index: int
+    sub: int
+    bits: int
+
+    @classmethod
+    def parse(cls, value: int) -> MappedObject:
+        """Read the 32 bits of an entry."""
+        return cls(value >> 16 & 0xFFFF, value >> 8 & 0xFF, value & 0xFF)
+
+    def encode(self) -> int:
+        """Return the 32 bits of an entry."""
+        return self.index << 16 | self.sub << 8 | self.bits
+
+
+@dataclass(frozen=True, slots=True)
+class Scanned:
+    """One entry of an object scanner list, 1FA0h.. (CiA 301, object scanner list).
+
+    Attributes:
+        index: of the objects that a SAM-MPDO producer may send.
+        sub: the first of them.
+        block: how many follow each other.
+    """
+
+    index: int
+    sub: int
+    block: int
+
+    @classmethod
+    def parse(cls, value: int) -> Scanned:
+        """Read the 32 bits of an entry."""
+        return cls(value >> 8 & 0xFFFF, value & 0xFF, value >> 24 & 0xFF)
+
+    def encode(self) -> int:
+        """Return the 32 bits of an entry."""
+        return self.block << 24 | self.index << 8 | self.sub
+
+
+@dataclass(frozen=True, slots=True)
+class Dispatched:
+    """One entry of an object dispatching list, 1FD0h.. (CiA 301, object dispatching list).
+
+    Attributes:
+        node_id: of the SAM-MPDO producer.
+        producer_index: of the object there.
+        producer_sub: the first sub-index there.
+        index: of the object here.
+        sub: the first sub-index here.
+        block: how many follow each other.
+    """
+
+    node_id: int
+    producer_index: int
+    producer_sub: int
+    index: int
+    sub: int
+    block: int
+
+    @classmethod
+    def parse(cls, value: int) -> Dispatched:
+        """Read the 64 bits of an entry."""
+        return cls(
+            value & 0xFF,
+            value >> 16 & 0xFFFF,
+            value >> 8 & 0xFF,
+            value >> 40 & 0xFFFF,
+            value >> 32 & 0xFF,
+            value >> 56 & 0xFF,
+        )
+
+    def encode(self) -> int:
+        """Return the 64 bits of an entry."""
+        local = self.block << 24 | self.index << 8 | self.sub
+        return local << 32 | self.producer_index << 16 | self.producer_sub << 8 | self.node_id
+
+
+@dataclass(frozen=True, slots=True)
+class Mpdo:
+    """A multiplexed PDO (CiA 301, MPDO protocol).
+
+    Attributes:
+        destination: destination address mode: the rest names the consumer, else the producer.
+        node_id: 0 in destination address mode: all nodes.
+        index: of the object, there.
+        sub: of the object, there.
+        data: four bytes, padded with zeros.
+    """
+
+    destination: bool
+    node_id: int
+    index: int
+    sub: int
+    data: bytes
+
+    def __post_init__(self) -> None:
+        """Raise FieldError if there are more than four bytes or a node-ID above 127."""
+        if len(self.data) > MPDO_DATA_BYTES:
+            raise FieldError(f"{len(self.data)} bytes, an MPDO carries {MPDO_DATA_BYTES}")
+        if not 0 <= self.node_id <= _NODE_ID_MASK:
+            raise FieldError(f"node-ID {self.node_id} is not in 0..{_NODE_ID_MASK}")
+
+    @classmethod
+    def parse(cls, data: bytes) -> Mpdo:
+        """Read the data of a frame; FramingError unless it has eight bytes."""
+        if len(data) != MAX_PDO_BYTES:
+            raise FramingError(f"{len(data)} bytes, an MPDO has {MAX_PDO_BYTES}")
+        return cls(
+            bool(data[0] & _DESTINATION),
+            data[0] & _NODE_ID_MASK,
+            data[1] | data[2] << 8,
+            data[3],
+            data[4:],
+        )
+
+    def encode(self) -> bytes:
+        """Return the data of a frame."""
+        address = self.node_id | (_DESTINATION if self.destination else 0)
+        head = bytes((address, self.index & 0xFF, self.index >> 8, self.sub))
+        return head + self.data.ljust(MPDO_DATA_BYTES, b"\0")
+
+
+def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
+    """Return values behind each other, lowest bit first, filled up to whole bytes.
+
+    Args:
+        fields: value and number of bits each; what does not fit is cut off.
+    """
+    number = position = 0
+    for value, bits in fields:
+        number |= (value & (1 << bits) - 1) << position
+        position += bits
+    return number.to_bytes((position + 7) // 8, "little")
+
+
+def unpack_bits(data: bytes, widths: Iterable[int]) -> tuple[int, ...]:
+    """Return the values that lie behind each other; bits that are missing are 0."""
+    number = int.from_bytes(data, "little")
+    values = []
+    for bits in widths:
+        values.append(number & (1 << bits) - 1)
+        number >>= bits
+    return tuple(values)
