@@ -16,14 +16,22 @@ from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.node_guarding import NodeGuarding
 from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.parameter_store import ParameterStore
+from tickrig.device.canopen.pdo_consumer import PdoConsumer
+from tickrig.device.canopen.pdo_producer import PdoProducer
+from tickrig.device.canopen.sdo_servers import SdoServers
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.sync import Sync
 from tickrig.device.canopen.time_stamp import TimeStamp
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
     NmtSlave,
     LssSlave,
     TimeStamp,
+    Sync,
+    PdoConsumer,
+    SdoServers,
     ParameterStore,
+    PdoProducer,
     EmcyConsumer,
     HeartbeatConsumer,
     NodeGuarding,

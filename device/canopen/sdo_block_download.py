@@ -1,0 +1,107 @@
+"""Block download of one object (CiA 301, SDO block download)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.canopen.abort import SdoAbort
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.crc import crc16
+from tickrig.wire.canopen.sdo_command import (
+    BLOCK_ACKNOWLEDGE,
+    BLOCK_CRC,
+    BLOCK_END,
+    BLOCK_ENDED,
+    BLOCK_LAST,
+    BLOCK_SEQNO,
+    BLOCK_SIZE_INDICATED,
+    SEGMENT_BYTES,
+    ClientCommand,
+    ServerCommand,
+)
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.entry import Entry
+    from tickrig.device.canopen.sdo_server import SdoServer
+
+SEGMENT_TIMEOUT_US: Final = 200_000
+"""Silence inside a block after which it is acknowledged as it is: its last segment was lost."""
+
+_END_MASK: Final = 0xE1
+"""Command specifier and subcommand of the end; n is between them."""
+
+
+class BlockDownload:
+    """Collects a value in blocks; the object changes when the client has ended the transfer.
+
+    A segment out of sequence is dropped, and the block acknowledged at its end
+    with the last one in sequence. If the end of the block was lost, it is
+    acknowledged after `SEGMENT_TIMEOUT_US`; then a new block is waited for, and
+    what comes before its first segment belongs to the old one. The size is
+    judged before the CRC. Inside a block every frame but an abort is a segment.
+    """
+
+    def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
+        self._server, self._entry = server, entry
+        self._data, self._in_sequence, self._finished = bytearray(), 0, False
+        self._crc = bool(request[0] & BLOCK_CRC)
+        entry.check_writable()
+        self._size: int | None = None
+        self._most = entry.size or entry.max_bytes
+        if request[0] & BLOCK_SIZE_INDICATED:
+            self._size = self._most = int.from_bytes(request[4:], "little")
+            entry.check_size(self._size)
+        self._block_size = server.block_size
+        command = ServerCommand.BLOCK_DOWNLOAD | BLOCK_CRC
+        server.confirm(command, bytes([self._block_size, 0, 0, 0]))
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Take a segment of the running block."""
+        head = request[0]
+        if head == ClientCommand.ABORT:
+            self._server.end()
+            return
+        seqno = head & BLOCK_SEQNO
+        if seqno == self._in_sequence + 1:
+            self._in_sequence = seqno
+            self._data += request[1:]
+            self._finished = head >= BLOCK_LAST
+        if head >= BLOCK_LAST or seqno >= self._block_size:
+            self._acknowledge()
+        else:
+            self._server.wait(self._segment, SEGMENT_TIMEOUT_US, self._segment_missing)
+
+    def _segment_missing(self) -> None:
+        self._acknowledge()
+        self._server.wait(self._first_segment)
+
+    def _first_segment(self, request: bytes) -> None:
+        """Wait for the first segment of the block that repeats what was lost."""
+        if request[0] == ClientCommand.ABORT or request[0] & BLOCK_SEQNO == 1:
+            self._segment(request)
+
+    def _acknowledge(self) -> None:
+        """Say how far the block was received, and begin the next."""
+        if len(self._data) > self._most + SEGMENT_BYTES:
+            raise SdoAbort(AbortCode.TOO_LONG)
+        self._block_size = self._server.block_size
+        head = bytes([BLOCK_ACKNOWLEDGE, self._in_sequence, self._block_size])
+        self._server.respond(head + bytes(5))
+        self._in_sequence = 0
+        self._server.wait(self._end if self._finished else self._segment)
+
+    def _end(self, request: bytes) -> None:
+        """Judge the whole, and write it."""
+        if request[0] & _END_MASK != BLOCK_END:
+            self._server.initiate(request)
+            return
+        data = bytes(self._data[: len(self._data) - (request[0] >> 2 & 7)])
+        size = len(data) if self._size is None else self._size
+        if len(data) != size:
+            raise SdoAbort(AbortCode.TOO_LONG if len(data) > size else AbortCode.TOO_SHORT)
+        if self._crc and crc16(data) != int.from_bytes(request[1:3], "little"):
+            raise SdoAbort(AbortCode.CRC)
+        self._entry.download(data)
+        self._server.respond(bytes([BLOCK_ENDED]) + bytes(7))
+        self._server.end()
