@@ -17,39 +17,36 @@ class CanArbiter:
     All times are in the units of the segment.
 
     Attributes:
+        heads: a heap of priority, number of the node, node.
         free: no frame starts before this.
         slow: some node has to wait longer than the bus is busy.
     """
 
-    __slots__ = ("_heads", "free", "slow")
+    __slots__ = ("free", "heads", "slow")
 
     def __init__(self, free: int) -> None:
         self.free, self.slow = free, False
-        self._heads: list[tuple[int, int, CanEnd]] = []  # a heap: priority, number, end
-
-    def __bool__(self) -> bool:
-        """Say whether any node wants to send."""
-        return bool(self._heads)
+        self.heads: list[tuple[int, int, CanEnd]] = []
 
     def enter(self, end: CanEnd, now: int) -> None:
         """Let a node whose queue was empty take part from now on."""
         end.held = max(end.held, now)
-        heappush(self._heads, (priority(end.queue[0]), end.number, end))
+        heappush(self.heads, (priority(end.queue[0]), end.number, end))
 
     def put_back(self, ends: list[CanEnd]) -> None:
         """Let nodes take part again, those that still have a frame to send."""
         for end in ends:
             if end.queue:
-                heappush(self._heads, (priority(end.queue[0]), end.number, end))
+                heappush(self.heads, (priority(end.queue[0]), end.number, end))
 
     def remove(self, end: CanEnd) -> None:
         """Let a node take part no longer."""
-        self._heads = [head for head in self._heads if head[2] is not end]
-        heapify(self._heads)
+        self.heads = [head for head in self.heads if head[2] is not end]
+        heapify(self.heads)
 
     def take(self) -> list[CanEnd]:
         """Take the winner out; several nodes with the same identifier all win."""
-        heads = self._heads
+        heads = self.heads
         rank, _, end = heappop(heads)
         winners = [end]
         while heads and heads[0][0] == rank:
@@ -58,10 +55,10 @@ class CanArbiter:
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
         """Take the winner of those that wait least, or all of them; the start comes first."""
-        start = max(self.free, min(head[2].held for head in self._heads))
-        able = sorted(head for head in self._heads if head[2].held <= start)
+        start = max(self.free, min(head[2].held for head in self.heads))
+        able = sorted(head for head in self.heads if head[2].held <= start)
         winners = [end for rank, _, end in able if everybody or rank == able[0][0]]
-        self.slow = any(head[2].held > self.free for head in self._heads)
+        self.slow = any(head[2].held > self.free for head in self.heads)
         for end in winners:
             self.remove(end)
         return start, winners

@@ -31,6 +31,14 @@ class Filtering(Protocol):
         ...
 
 
+@runtime_checkable
+class ErrorAware(Protocol):
+    """A device that is told the error state of its CAN controller."""
+
+    def bus_state(self, state: ErrorState, /) -> None:
+        """Hear of a change; it is seen to in the next tick."""
+
+
 class CanEnd:
     """One node on a `CanWire`; a `WirePort[Frames]`.
 
@@ -49,7 +57,7 @@ class CanEnd:
     """
 
     __slots__ = (
-        *("_accepts", "_device", "controller", "held", "inbox", "lost", "number"),
+        *("_accepts", "_device", "_error_aware", "controller", "held", "inbox", "lost", "number"),
         *("on_error_state", "queue", "room", "segment", "stamps", "wake", "wire"),
     )
 
@@ -64,6 +72,7 @@ class CanEnd:
         self.wake: Callable[[int], None] = _ignore
         self.on_error_state: Callable[[int, ErrorState], None] | None = None
         self._device: Filtering | None = None
+        self._error_aware: ErrorAware | None = None
 
     @property
     def accepts(self) -> Accepted:
@@ -80,11 +89,13 @@ class CanEnd:
         """When the next frame will have arrived, or earlier: its receivers are not known yet."""
         return self.stamps[0] if self.stamps else self.wire.due_us
 
-    def attach(self, device: Device[Any], wake: Callable[[int], None]) -> None:
-        """Take the filter from a device, and say when a frame has arrived for it."""
+    def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
+        """Take the filter from a device, tell it the error state, say when a frame has arrived."""
         self.wake = wake
         if isinstance(device, Filtering):
             self._device, self.accepts = device, device.accepts
+        if isinstance(device, ErrorAware):
+            self._error_aware = device
 
     def poll(self, now_us: int, /) -> Frames:
         """Take the frames that had ended by `now_us`."""
@@ -119,6 +130,7 @@ class CanEnd:
         """Take a frame from the bus."""
         if not self.inbox:
             self.wake(at_us)
+            self.segment.heard = True
         elif len(self.inbox) >= QUEUE_FRAMES:
             self.lost += 1
             return
@@ -134,9 +146,12 @@ class CanEnd:
 
     def error_state_changed(self, at_us: int) -> None:
         """Tell whoever wants to know."""
+        if self._error_aware is not None:
+            self._error_aware.bus_state(self.controller.state)
         if self.on_error_state is not None:
             self.on_error_state(at_us, self.controller.state)
-            self.wake(at_us)
+        self.wake(at_us)
+        self.segment.heard = True
 
 
 def _ignore(at_us: int) -> None:

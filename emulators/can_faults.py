@@ -70,6 +70,7 @@ class CanFaults:
 
     Attributes:
         kinds: the faults that can be armed, by name.
+        active: whether any is armed.
         place: a number from which the place of a turned bit is taken.
     """
 
@@ -80,11 +81,7 @@ class CanFaults:
         self._armed: dict[str, int] = {}
         self._chances: dict[str, Chance] = {}
         self._verdict: Verdict | None = None
-        self.place = 0
-
-    def __bool__(self) -> bool:
-        """Say whether any fault is armed."""
-        return bool(self._armed)
+        self.active, self.place = False, 0
 
     @property
     def armed(self) -> tuple[str, ...]:
@@ -110,12 +107,13 @@ class CanFaults:
         self.check(name, rate)
         self.clear(name)
         self._armed[name] = threshold_of(rate or 0)
+        self.active = True
         self._changed(name, True)
 
     def clear(self, name: str) -> None:
         """Let a fault end; clearing one that is not armed is no error."""
         if self._armed.pop(name, None) is not None:
-            self._verdict = None
+            self._verdict, self.active = None, bool(self._armed)
             self._changed(name, False)
 
     def judge(self) -> Verdict:

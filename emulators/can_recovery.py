@@ -19,23 +19,25 @@ class Recovery:
 
     Args:
         bit: length of a bit, in the units in which all times here are.
+
+    Attributes:
+        active: whether any node waits.
     """
 
     def __init__(self, bit: int) -> None:
         self._sequence = SEQUENCE_BITS * bit
         self._waiting: dict[int, tuple[CanEnd, int, int]] = {}  # end, sequences left, since
-
-    def __bool__(self) -> bool:
-        """Say whether any node waits."""
-        return bool(self._waiting)
+        self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
         """Let a node wait; asking twice changes nothing."""
         self._waiting.setdefault(end.number, (end, SEQUENCES, now))
+        self.active = True
 
     def leave(self, end: CanEnd) -> None:
         """Let a node wait no longer."""
         self._waiting.pop(end.number, None)
+        self.active = bool(self._waiting)
 
     @property
     def due(self) -> int:

@@ -49,6 +49,7 @@ class CanSegment:
         routes: the ends and who of them receives what.
         busy: from when to when the latest frames kept the bus busy, in units.
         shorted: nobody can send.
+        heard: a frame woke a station since `advance_until_heard` was called.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class CanSegment:
     ) -> None:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
-        self.now_us, self.shorted = start_us, False
+        self.now_us, self.shorted, self.heard = start_us, False, False
         self.routes = CanRoutes()
         self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
         self._faults, self._observers = faults, observers
@@ -86,12 +87,25 @@ class CanSegment:
 
     def advance(self, now_us: int) -> None:
         """Let everything end that ends by `now_us`."""
-        while self.due_us <= now_us:
+        while self.advance_until_heard(now_us):
+            pass
+        self.now_us = now_us
+
+    def advance_until_heard(self, until_us: int) -> bool:
+        """Let everything end up to the first frame that wakes a station; False if none did."""
+        self.heard = False
+        if self._stale:
+            self._plan()
+        while self._due_us <= until_us:
             self._finish()
             self._stale = True
             if self._news:
                 self._tell_news()
-        self.now_us = now_us
+            if self._stale:
+                self._plan()
+            if self.heard:
+                return True
+        return False
 
     def send(self, end: CanEnd, now_us: int, frames: Frames) -> None:
         """Queue the frames of one node."""
@@ -105,7 +119,7 @@ class CanSegment:
             return
         if self._start >= now:
             self._withdraw()
-        if self._faults and (delay_us := self._faults.delay_us(end.number)):
+        if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
         waiting = bool(queue)
         queue.extend(frames)
@@ -160,7 +174,7 @@ class CanSegment:
 
     def _enter(self, end: CanEnd, now: int) -> None:
         arbiter = self._arbiter
-        if not arbiter and not self._winners and arbiter.free < now:
+        if not arbiter.heads and not self._winners and arbiter.free < now:
             arbiter.free = now
         arbiter.enter(end, now)
 
@@ -173,20 +187,20 @@ class CanSegment:
         """Find out what ends next, and when."""
         self._stale = False
         arbiter = self._arbiter
-        if arbiter and not self._repeating:
+        if arbiter.heads and not self._repeating:
             if arbiter.slow or self.shorted:
                 self._start, self._winners = arbiter.take_waiting(everybody=self.shorted)
             else:
                 self._start, self._winners = arbiter.free, arbiter.take()
             frame = self._winners[0].queue[0]
             bits = self._lengths.get(frame) or self._length(frame)
-            if self._on_bus > 1 and not self._faults and len(self._winners) == 1:
+            if self._on_bus > 1 and not self._faults.active and len(self._winners) == 1:
                 self._settle(self._deliver, bits)
             else:
                 self._judge(frame, bits)
         else:
             self._start = self._due_us = NEVER
-        if self._recovery and self._recovery.due <= self._start:
+        if self._recovery.active and self._recovery.due <= self._start:
             self._plan_return()
 
     def _plan_return(self) -> None:
@@ -317,9 +331,10 @@ class CanSegment:
         self.busy.append((self._start, self._free))
         if self._confinement.marked:
             self._suspend(self._winners)
-        if self._recovery:
+        if self._recovery.active:
             self._recovery.interrupt(self._start, self._free - RECESSIVE_BITS * self.bit)
-        self._faults.spend()
+        if self._faults.active:
+            self._faults.spend()
         self._arbiter.put_back(self._winners)
         self._winners = []
 

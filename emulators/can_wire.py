@@ -84,6 +84,14 @@ class CanWire:
             for apart in self._apart.values():
                 apart.advance(now_us)
 
+    def advance_until_heard(self, until_us: int) -> bool:
+        """Let everything end up to the first frame that somebody heard; False if none was."""
+        if not self._apart:
+            return self.bus.advance_until_heard(until_us)
+        due_us = self.due_us
+        self.advance(min(due_us, until_us))
+        return due_us <= until_us
+
     def load_permille(self, window_us: int = WINDOW_US) -> int:
         """Return how busy the bus was in the latest time, in 0.1 %; at most a second is known."""
         bus = self.bus

@@ -35,6 +35,10 @@ class Wire(Protocol):
     def advance(self, now_us: int, /) -> None:
         """Let everything end that ends by `now_us`, and wake who received it."""
 
+    def advance_until_heard(self, until_us: int, /) -> bool:
+        """Let things end until a station was woken; False if none was by `until_us`."""
+        ...
+
 
 @runtime_checkable
 class WirePort(Port[W], Protocol[W]):

@@ -90,14 +90,21 @@ class Rig:
         self._periods = tuple(sorted({station.tick_us for station in stations}))
         self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
         self._wires: tuple[Wire, ...] = ()
-        self._woken = tuple(s for s in stations if self._attached(s) and not dense)
+        attached = [station for station in stations if self._attach(station)]
+        self._woken = () if dense else tuple(attached)
         self._looked_at = tuple(s for s in stations if s not in self._woken)
 
-    def _attached(self, station: Station[Any]) -> bool:
+    def _attach(self, station: Station[Any]) -> bool:
+        """Let a port that can say so say when a station has work."""
+
+        def wake(at_us: int) -> None:
+            if not self._dense:
+                self._enter(station, at_us)
+
         port = station.port
         if not isinstance(port, WirePort):
             return False
-        port.attach(station.device, lambda at_us: self._enter(station, at_us))
+        port.attach(station.device, wake)
         if port.wire not in self._wires:
             self._wires += (port.wire,)
         return True
@@ -144,7 +151,7 @@ class Rig:
 
     def _enter(self, station: Station[Any], at_us: int) -> None:
         """Let a station have work at the first tick from `at_us` on."""
-        if at_us < NEVER:
+        if at_us < station.at_us:
             tick_us = station.tick_us
             self._timetable.enter(station, -(-max(at_us, self._open_us) // tick_us) * tick_us)
 
@@ -169,11 +176,15 @@ class Rig:
     def _go_on(self, until_us: int) -> int:
         """Let frames end up to the next tick with work, and return that."""
         while True:
-            next_us, due_us = self._planned_us, self._wires_due_us
-            if due_us >= next_us or due_us > until_us:
+            next_us = self._planned_us
+            if not self._wires:
                 return next_us
-            for wire in self._wires:
-                wire.advance(due_us)
+            limit_us = min(next_us - 1, until_us)
+            if len(self._wires) > 1:  # what ends on one may let a station send on another
+                limit_us = min(limit_us, self._wires_due_us)
+            heard = [wire.advance_until_heard(limit_us) for wire in self._wires]
+            if not any(heard) and self._wires_due_us > limit_us:
+                return next_us
 
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:

@@ -1,0 +1,102 @@
+"""Emulated devices on a CAN bus, with all that can be done to them while they run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.can_end import CanEnd
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.clock import Clock
+from tickrig.emulators.emulated import Touchable
+from tickrig.emulators.rig import Joint, Rig, Station
+from tickrig.emulators.trace import Mark
+from tickrig.emulators.workbench import Workbench
+from tickrig.wire.can import CanFrame, Frames
+
+
+class CanJoint(Joint, Protocol):
+    """A joint with a bus outside: `CanBridge`."""
+
+    lost: int
+
+
+class CanLog(Protocol):
+    """A record of the bus: a candump log on its way to a file."""
+
+    @property
+    def error(self) -> str:
+        """Why it ended early, empty while all is well."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+
+
+class CanEmulator(Workbench):
+    """Devices, their bus, their operator, and a rig that runs them.
+
+    One more end of the bus belongs to the caller: what it sends is heard by all
+    devices and by the bus outside, and it hears all.
+
+    Args:
+        name: what the devices are called.
+        physical: the physical side of all devices.
+        stations: the devices, each on its end of the bus.
+        wire: the bus.
+        outside: the joint with the bus where the host is, if it is outside.
+        clock: a `VirtualClock` unless given.
+        trace: the record, to be closed in the end.
+        link: how people call the bus outside.
+    """
+
+    def __init__(  # noqa: PLR0913 - options, by keyword
+        self,
+        name: str,
+        physical: Touchable,
+        stations: Sequence[Station[Frames]],
+        wire: CanWire,
+        *,
+        outside: CanJoint | None = None,
+        clock: Clock | None = None,
+        trace: CanLog | None = None,
+        link: str = "",
+    ) -> None:
+        super().__init__(name, physical, wire.faults, link)
+        self._outside, self._trace = outside, trace
+        self._host, self._ends = wire.end(), [station.port for station in stations]
+        self.rig = Rig(*stations, bridges=[outside] if outside else [], clock=clock)
+
+    @property
+    def _host_due_us(self) -> int:
+        return NEVER
+
+    def _listen(self, now_us: int) -> None:
+        for at_us, frame in self._host.poll_stamped(now_us):
+            self._hear(at_us, Mark.FROM_DEVICE, frame)
+
+    def send(self, now_us: int, data: bytes) -> None:
+        """Put a frame, given in candump's notation, on the bus, as a host would."""
+        frame = CanFrame.parse(data.decode("ascii"))
+        self._hear(now_us, Mark.TO_DEVICE, frame)
+        self._host.send(now_us, (frame,))
+
+    def _hear(self, at_us: int, mark: Mark, frame: CanFrame) -> None:
+        self.log.hear(at_us, mark, f"{frame}\n".encode())
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Frames that found a queue full, at an end of the bus or outside."""
+        ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
+        return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}
+
+    @property
+    def trace_error(self) -> str:
+        """Why the record ended early, empty while all is well."""
+        return self._trace.error if self._trace else ""
+
+    def close(self) -> None:
+        """End the record."""
+        if self._trace is not None:
+            self._trace.close()

@@ -1,0 +1,172 @@
+"""The options of a CAN bus outside, as the tools of python-can take them, and the bus itself."""
+
+from __future__ import annotations
+
+import errno
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import can
+import click
+from can.util import load_config
+
+from tickrig.emulators.refused import Refused
+from tickrig.emulators.run_options import Decorator, add_options
+from tickrig.emulators.setting import parse_setting
+
+GREEDY: Final = ("--timing", "--bus-kwargs")
+"""Options that take one or more values in python-can's tools."""
+
+HINTS: Final = {
+    errno.EAFNOSUPPORT: "this kernel has no SocketCAN",
+    errno.ENODEV: "no such CAN interface; a virtual one is made by"
+    " 'ip link add dev NAME up type vcan'",
+}
+CAUSES: Final = (can.CanError, OSError, ValueError, TypeError, ImportError, AttributeError)
+"""What the drivers of python-can raise when they cannot open a bus."""
+
+_KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BusOptions:
+    """Which bus, with what of it the command line says."""
+
+    interface: str | None = None
+    channel: str | None = None
+    bitrate: int | None = None
+    timing: tuple[str, ...] = ()
+    bus_kwargs: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Say whether a bus outside is asked for."""
+        return bool(self.interface or self.channel or self.timing or self.bus_kwargs)
+
+
+class BusCommand(click.Command):
+    """A command whose `--timing` and `--bus-kwargs` take all words up to the next option."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Repeat such an option before each of its values."""
+        return super().parse_args(ctx, spread(args))
+
+
+def spread(args: Sequence[str]) -> list[str]:
+    """Repeat greedy options.
+
+    >>> spread(["--bus-kwargs", "a=1", "b=2", "-v"])
+    ['--bus-kwargs', 'a=1', '--bus-kwargs', 'b=2', '-v']
+    """
+    out: list[str] = []
+    greedy, given = "", False
+    for word in args:
+        if word.startswith("-"):
+            greedy, given = (word if word in GREEDY else ""), False
+        elif greedy and given:
+            out.append(greedy)
+        out.append(word)
+        given = bool(greedy) and not word.startswith("-")
+    return out
+
+
+bus_options: Final[Decorator] = add_options(
+    click.option(
+        "-i",
+        "--interface",
+        type=click.Choice(sorted(can.VALID_INTERFACES)),
+        metavar="INTERFACE",
+        help="Driver of python-can, as socketcan, udp_multicast, slcan.",
+    ),
+    click.option("-c", "--channel", metavar="CHANNEL", help="Channel of it, as can0."),
+    click.option("-b", "--bitrate", type=int, metavar="BITRATE", help="Bit rate in bit/s."),
+    click.option(
+        "--timing",
+        multiple=True,
+        metavar="KEY=VALUE...",
+        help="Bit timing, as f_clock=8000000 tseg1=5 tseg2=2 sjw=2 brp=2 nof_samples=1.",
+    ),
+    click.option(
+        "--bus-kwargs",
+        multiple=True,
+        metavar="KEY=VALUE...",
+        help="More for the driver, as port=43113.",
+    ),
+)
+"""Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
+
+
+def open_bus(options: BusOptions) -> tuple[can.BusABC, str]:
+    """Open the bus that options, environment or configuration files of python-can name.
+
+    Returns:
+        The bus, and what people call it.
+
+    Raises:
+        Refused: none is named, or it cannot be opened.
+    """
+    given = _given(options)
+    try:
+        config = load_config(config=dict(given))
+    except can.CanInterfaceNotImplementedError:
+        raise Refused(_nothing_named()) from None
+    except CAUSES as error:
+        raise Refused(f"CAN bus: {_one_line(error)}") from None
+    interface, channel = config["interface"], config["channel"]
+    name = f"{interface} {'' if channel is None else channel}".strip()
+    try:
+        return can.Bus(**{"single_handle": True, **given}), name
+    except CAUSES as error:
+        raise Refused(f"CAN bus {name}: {_reason(error)}") from None
+
+
+def _given(options: BusOptions) -> Mapping[str, Any]:
+    given: dict[str, Any] = {
+        key: value
+        for key in ("interface", "channel", "bitrate")
+        if (value := getattr(options, key)) is not None
+    }
+    given.update(_pairs("--bus-kwargs", options.bus_kwargs, parse_setting))
+    if options.timing:
+        given["timing"] = _timing(_pairs("--timing", options.timing, int))
+    return given
+
+
+def _pairs(option: str, words: Sequence[str], parse: Callable[[str], Any]) -> dict[str, Any]:
+    pairs = {}
+    for word in words:
+        match = _KEY_VALUE.fullmatch(word)
+        try:
+            if match is None:
+                raise ValueError
+            pairs[match[1].replace("-", "_")] = parse(match[2])
+        except ValueError:
+            raise Refused(f"{option} {word!r} is not KEY=VALUE") from None
+    return pairs
+
+
+def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
+    try:
+        return can.BitTiming(**pairs)
+    except (TypeError, ValueError) as error:
+        raise Refused(f"--timing: {_one_line(error)}") from None
+
+
+def _nothing_named() -> str:
+    names = ", ".join(sorted(can.VALID_INTERFACES))
+    return (
+        "no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE and CAN_CHANNEL, or"
+        " write them into ~/.canrc; or give --scenario FILE, which runs in virtual time."
+        f" python-can has {names}"
+    )
+
+
+def _reason(error: BaseException) -> str:
+    number = getattr(error, "errno", None) or getattr(error, "error_code", None)
+    hint = HINTS.get(number) if isinstance(number, int) else None
+    return f"{_one_line(error)} ({hint})" if hint else _one_line(error)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
