@@ -73,9 +73,10 @@ class Runner:
             raise AssertionError(f"unexpected {self._unread[cob_id][0]}")
 
     def count(self, pattern: str, for_ms: int, least: int, most: int) -> None:
-        """Wait; so many frames that match must be unread then."""
-        self.wait(for_ms)
+        """Wait; so many frames that match must come meanwhile."""
         unread = self._unread[int(pattern[:3], 16)]
+        unread.clear()
+        self.wait(for_ms)
         got = sum(matches(pattern, text) for text in unread)
         unread.clear()
         if not least <= got <= most:
