@@ -22,6 +22,8 @@ class MpdoQueue(TpdoMode):
     An event of an object that waits already adds no frame: the newest data are sent.
     """
 
+    timed = True
+
     def __init__(self, tpdo: Tpdo) -> None:
         super().__init__(tpdo)
         self._inhibit_us, self._free_us = tpdo.parameters.inhibit_us, 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.rpdo import RPDO_PARAMETERS, Rpdo
 from tickrig.device.canopen.service import Handler, Service
 from tickrig.device.canopen.slave import CanopenSlave
@@ -36,8 +37,8 @@ class PdoConsumer(Service):
             if index in RPDO_PARAMETERS
         ]
         self._synchronous: tuple[Rpdo, ...] = ()
-        self._window = node.dictionary.find(SYNCHRONOUS_WINDOW_LENGTH)
-        self._window_end_us = self._due_us = NEVER
+        self._window_us, self._window_end_us, self._due_us = 0, NEVER, NEVER
+        self._follow(node.dictionary.find(SYNCHRONOUS_WINDOW_LENGTH))
         node.on_sync.append(self._sync)
 
     @property
@@ -92,5 +93,16 @@ class PdoConsumer(Service):
     def _sync(self, counter: int) -> None:
         for rpdo in self._synchronous:
             rpdo.sync()
-        if self._window is not None and self._window.number:
-            self._window_end_us = self.node.now_us + self._window.number
+        if self._window_us:
+            self._window_end_us = self.node.now_us + self._window_us
+
+    def _follow(self, window: Entry | None) -> None:
+        """Know the synchronous window at each SYNC."""
+        if window is None:
+            return
+
+        def changed() -> None:
+            self._window_us = window.number
+
+        changed()
+        window.watchers.append(changed)

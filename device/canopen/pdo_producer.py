@@ -40,6 +40,7 @@ class PdoProducer(Service):
             if index in TPDO_PARAMETERS
         ]
         self._synchronous: tuple[TpdoMode, ...] = ()
+        self._timed: tuple[TpdoMode, ...] = ()
         self._counters: list[int] = []
         self._due_us = NEVER
         node.on_sync.append(self._sync)
@@ -109,10 +110,12 @@ class PdoProducer(Service):
             for counter in counters:
                 for mode in self._synchronous:
                     mode.on_sync(counter)
-        for tpdo in self.tpdos:
-            if tpdo.mode.due_us <= now_us:
-                tpdo.mode.run(now_us)
-        self._settle()
+        self._due_us = NEVER
+        if self._timed:
+            for mode in self._timed:
+                if mode.due_us <= now_us:
+                    mode.run(now_us)
+            self.wake(min([mode.due_us for mode in self._timed]))
 
     def _sync(self, counter: int) -> None:
         if self._synchronous:
@@ -120,12 +123,9 @@ class PdoProducer(Service):
             self.wake(self.node.now_us)
 
     def _collect(self) -> None:
-        """Find out which TPDOs act on SYNC."""
-        modes = (tpdo.mode for tpdo in self.tpdos)
+        """Find out which TPDOs act on SYNC, and which on events or with time."""
+        modes = [tpdo.mode for tpdo in self.tpdos]
         self._synchronous = tuple(mode for mode in modes if mode.synchronous)
-        self._settle()
-
-    def _settle(self) -> None:
-        """Find out when the next one is due."""
-        self._due_us = min((tpdo.mode.due_us for tpdo in self.tpdos), default=NEVER)
+        self._timed = tuple(mode for mode in modes if mode.timed)
+        self._due_us = min((mode.due_us for mode in self._timed), default=NEVER)
         self.schedule(self._due_us)

@@ -161,8 +161,11 @@ class CanopenSlave:
 
     def schedule(self, slot: int, due_us: int) -> None:
         """Enter when a service wants its `tick`."""
-        self._dues[slot] = due_us
-        self._due_us = min(self._dues) if self._powered else 0
+        before, self._dues[slot] = self._dues[slot], due_us
+        if due_us < self._due_us:
+            self._due_us = due_us
+        elif before == self._due_us and self._powered:
+            self._due_us = min(self._dues)
 
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
@@ -232,10 +235,13 @@ class CanopenSlave:
 
     def _run_due(self, now_us: int) -> None:
         """Let the services act that are due, in their order."""
+        dues = self._dues
         for slot, service in enumerate(self.services):
-            if self._dues[slot] <= now_us:
-                self.schedule(slot, NEVER)
+            if dues[slot] <= now_us:
+                dues[slot] = NEVER
                 service.tick(now_us)
+        if self._powered:
+            self._due_us = min(dues)
 
 
 def _both(first: Handler | None, second: Handler) -> Handler:

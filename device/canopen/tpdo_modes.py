@@ -17,10 +17,11 @@ class TpdoMode:
     Attributes:
         due_us: when it wants to be run.
         synchronous: whether it wants to hear of SYNC.
+        timed: whether it ever wants to be run.
         on_sync: called with the counter of each SYNC, 0 if it has none.
     """
 
-    synchronous = False
+    synchronous = timed = False
 
     def __init__(self, tpdo: Tpdo) -> None:
         self.tpdo, self.due_us = tpdo, NEVER
@@ -127,6 +128,8 @@ class EventDriven(TpdoMode):
 
     Not earlier than the inhibit time after the last one, then with the newest data.
     """
+
+    timed = True
 
     def __init__(self, tpdo: Tpdo) -> None:
         super().__init__(tpdo)
