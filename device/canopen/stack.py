@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.can_error_state import CanErrorState
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.emcy_consumer import EmcyConsumer
@@ -31,6 +32,7 @@ SERVICES: Final[tuple[ServiceMaker, ...]] = (
     PdoConsumer,
     SdoServers,
     ParameterStore,
+    Application,
     PdoProducer,
     EmcyConsumer,
     HeartbeatConsumer,
@@ -44,7 +46,10 @@ SERVICES: Final[tuple[ServiceMaker, ...]] = (
 
 
 def make_slave(
-    dictionary: Dictionary, node_id: int, nonvolatile: Nonvolatile | None = None
+    dictionary: Dictionary,
+    node_id: int,
+    nonvolatile: Nonvolatile | None = None,
+    application: ServiceMaker = Application,
 ) -> CanopenSlave:
     """Make a slave with every service that its dictionary has objects for.
 
@@ -52,5 +57,7 @@ def make_slave(
         dictionary: the objects, with default values.
         node_id: 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: what it kept from an earlier life.
+        application: what the device does with its objects: a device profile, or nothing.
     """
-    return CanopenSlave(dictionary, node_id, SERVICES, nonvolatile)
+    services = tuple(application if make is Application else make for make in SERVICES)
+    return CanopenSlave(dictionary, node_id, services, nonvolatile)
