@@ -1,0 +1,94 @@
+"""Any bus of python-can as a port of a rig in real time."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from typing import Final
+
+import can
+
+from tickrig.device.core import NEVER
+from tickrig.host.can_message import to_frame, to_message
+from tickrig.wire.can import CanFrame, Frames
+
+FRAMES_A_POLL: Final = 1_024
+"""So that a bus that never falls silent cannot stop the clock."""
+
+_logger = logging.getLogger(__name__)
+
+
+class CanBusPort:
+    """A `Port[Frames]` on a real or virtual bus; it never waits.
+
+    What the adapter does not take at once is kept up to `queue_frames`, and
+    sent in order; after that frames are dropped and counted.
+
+    Args:
+        bus: an open bus. Nobody else may read from it.
+        queue_frames: frames kept for an adapter that takes none.
+
+    Attributes:
+        lost: frames dropped because the adapter took none.
+        errors: error frames that came in.
+        failed: why the adapter last took or gave nothing, empty while all is well.
+    """
+
+    def __init__(self, bus: can.BusABC, queue_frames: int = 4_096) -> None:
+        self._bus, self._queue_frames = bus, queue_frames
+        self._unsent: deque[CanFrame] = deque()
+        self.lost = self.errors = 0
+        self.failed = ""
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the bus."""
+        return NEVER
+
+    def poll(self, now_us: int, /) -> Frames:
+        """Read without waiting."""
+        self._flush()
+        frames = []
+        for _ in range(FRAMES_A_POLL):
+            message = self._read()
+            if message is None:
+                break
+            frame = to_frame(message)
+            if frame is None:
+                self.errors += message.is_error_frame
+            else:
+                frames.append(frame)
+        return tuple(frames)
+
+    def send(self, now_us: int, traffic: Frames, /) -> None:
+        """Send as much as the adapter takes; keep the rest for later."""
+        room = self._queue_frames - len(self._unsent)
+        self.lost += max(0, len(traffic) - room)
+        self._unsent += traffic[:room]
+        self._flush()
+
+    def close(self) -> None:
+        """Close the bus."""
+        self._bus.shutdown()
+
+    def _read(self) -> can.Message | None:
+        try:
+            return self._bus.recv(0)
+        except (can.CanError, OSError) as error:
+            self._note(str(error))
+            return None
+
+    def _flush(self) -> None:
+        try:
+            while self._unsent:
+                self._bus.send(to_message(self._unsent[0]), timeout=0)
+                self._unsent.popleft()
+            self._note("")
+        except (can.CanError, OSError) as error:
+            self._note(str(error))
+
+    def _note(self, failed: str) -> None:
+        """Warn once, not in every tick."""
+        if failed and not self.failed:
+            _logger.warning("CAN bus: %s; what it does not take is kept", failed)
+        self.failed = failed

@@ -1,0 +1,62 @@
+"""The CAN link on python-can's virtual bus: real time, but nothing to wait for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import can
+import pytest
+
+from tests.emulators.can_bench import frames
+from tickrig.host.can_link import CanLink
+from tickrig.host.can_message import to_frame, to_message
+from tickrig.host.errors import LinkClosed
+
+
+@pytest.fixture
+def other() -> Iterator[can.BusABC]:
+    with can.Bus(interface="virtual", channel="can_link") as bus:
+        yield bus
+
+
+def test_frames_go_both_ways(other: can.BusABC) -> None:
+    link = CanLink("can_link", "virtual", bit_rate=500_000)
+    link.send(frames("601#4000100000000000 00000605#R8"))
+    heard = [other.recv(1), other.recv(1)]
+    assert tuple(to_frame(m) for m in heard if m) == frames("601#4000100000000000 00000605#R8")
+    for frame in frames("581#4300100092010000 705#7F"):
+        other.send(to_message(frame))
+    assert link.receive(1_000_000) == frames("581#4300100092010000 705#7F")
+    link.close()
+
+
+def test_silence_ends_with_the_timeout(other: can.BusABC) -> None:
+    link = CanLink("can_link", "virtual")
+    before_us = link.now_us
+    assert link.receive(2_000) == ()
+    assert link.now_us >= before_us + 2_000
+    link.close()
+
+
+def test_error_frames_and_fd_frames_are_passed_over(other: can.BusABC) -> None:
+    link = CanLink("can_link", "virtual")
+    other.send(can.Message(is_error_frame=True))
+    other.send(can.Message(is_fd=True, data=bytes(12)))
+    other.send(to_message(frames("080#")[0]))
+    assert link.receive(1_000_000) == frames("080#")
+    link.close()
+
+
+def test_a_closed_link_says_so(other: can.BusABC) -> None:
+    link = CanLink("can_link", "virtual")
+    link.close()
+    link.close()
+    with pytest.raises(LinkClosed, match="cannot send on virtual:can_link"):
+        link.send(frames("080#"))
+    with pytest.raises(LinkClosed, match="cannot read from virtual:can_link"):
+        link.receive(0)
+
+
+def test_a_bus_that_cannot_be_opened_is_told() -> None:
+    with pytest.raises(LinkClosed, match="cannot open nonsense:can0"):
+        CanLink("can0", "nonsense")
