@@ -3,35 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 from tickrig.device.core import NEVER
+from tickrig.emulators.can_bridge import CanBridge
 from tickrig.emulators.can_end import CanEnd
 from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.clock import Clock
 from tickrig.emulators.emulated import Touchable
-from tickrig.emulators.rig import Joint, Rig, Station
+from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.trace import Mark
+from tickrig.emulators.without_echo import CountingPort
 from tickrig.emulators.workbench import Workbench
 from tickrig.wire.can import CanFrame, Frames
-
-
-class CanJoint(Joint, Protocol):
-    """A joint with a bus outside: `CanBridge`."""
-
-    lost: int
-
-
-class CanLog(Protocol):
-    """A record of the bus: a candump log on its way to a file."""
-
-    @property
-    def error(self) -> str:
-        """Why it ended early, empty while all is well."""
-        ...
-
-    def close(self) -> None:
-        """End it."""
 
 
 class CanEmulator(Workbench):
@@ -45,7 +29,7 @@ class CanEmulator(Workbench):
         physical: the physical side of all devices.
         stations: the devices, each on its end of the bus.
         wire: the bus.
-        outside: the joint with the bus where the host is, if it is outside.
+        outside: the bus where the host is, if it is outside.
         clock: a `VirtualClock` unless given.
         trace: the record, to be closed in the end.
         link: how people call the bus outside.
@@ -58,15 +42,22 @@ class CanEmulator(Workbench):
         stations: Sequence[Station[Frames]],
         wire: CanWire,
         *,
-        outside: CanJoint | None = None,
+        outside: CountingPort | None = None,
         clock: Clock | None = None,
-        trace: CanLog | None = None,
+        trace: CandumpFile | None = None,
         link: str = "",
     ) -> None:
         super().__init__(name, physical, wire.faults, link)
-        self._outside, self._trace = outside, trace
-        self._host, self._ends = wire.end(), [station.port for station in stations]
-        self.rig = Rig(*stations, bridges=[outside] if outside else [], clock=clock)
+        self._wire, self._outside, self._trace = wire, outside, trace
+        self._ends = [station.port for station in stations]
+        self._host = self._open_end()
+        bridges = [CanBridge(self._open_end(), outside)] if outside else []
+        self.rig = Rig(*stations, bridges=bridges, clock=clock)
+
+    def _open_end(self) -> CanEnd:
+        end = self._wire.end()
+        self._ends.append(end)
+        return end
 
     @property
     def _host_due_us(self) -> int:

@@ -5,27 +5,33 @@ from __future__ import annotations
 import errno
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import can
 import click
 from can.util import load_config
 
+from tickrig.emulators.can_bus_port import CanBusPort
 from tickrig.emulators.refused import Refused
 from tickrig.emulators.run_options import Decorator, add_options
 from tickrig.emulators.setting import parse_setting
+from tickrig.emulators.without_echo import CountingPort, WithoutEcho
 
 GREEDY: Final = ("--timing", "--bus-kwargs")
 """Options that take one or more values in python-can's tools."""
+
+ECHOING: Final = ("udp_multicast",)
+"""Interfaces that give back what they sent, whatever is asked of them."""
 
 HINTS: Final = {
     errno.EAFNOSUPPORT: "this kernel has no SocketCAN",
     errno.ENODEV: "no such CAN interface; a virtual one is made by"
     " 'ip link add dev NAME up type vcan'",
 }
-CAUSES: Final = (can.CanError, OSError, ValueError, TypeError, ImportError, AttributeError)
-"""What the drivers of python-can raise when they cannot open a bus."""
+UNNAMED: Final = '"None"'
+"""In what python-can says where no interface is named."""
 
 _KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
 
@@ -97,11 +103,22 @@ bus_options: Final[Decorator] = add_options(
 """Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
 
 
-def open_bus(options: BusOptions) -> tuple[can.BusABC, str]:
-    """Open the bus that options, environment or configuration files of python-can name.
+class OpenBus(NamedTuple):
+    """A bus outside.
 
-    Returns:
-        The bus, and what people call it.
+    Attributes:
+        port: the bus.
+        name: what people call it.
+        channel: what logs call it.
+    """
+
+    port: CountingPort
+    name: str
+    channel: str
+
+
+def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
+    """Open the bus that options, environment or configuration files of python-can name.
 
     Raises:
         Refused: none is named, or it cannot be opened.
@@ -109,16 +126,21 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str]:
     given = _given(options)
     try:
         config = load_config(config=dict(given))
-    except can.CanInterfaceNotImplementedError:
-        raise Refused(_nothing_named()) from None
-    except CAUSES as error:
+    except can.CanInterfaceNotImplementedError as error:
+        unnamed = UNNAMED in str(error)
+        raise Refused(_nothing_named() if unnamed else f"CAN bus: {_one_line(error)}") from None
+    except (ValueError, TypeError) as error:
         raise Refused(f"CAN bus: {_one_line(error)}") from None
-    interface, channel = config["interface"], config["channel"]
-    name = f"{interface} {'' if channel is None else channel}".strip()
+    interface, channel = str(config["interface"]), config["channel"]
+    name = interface if channel is None else f"{interface} {channel}"
     try:
-        return can.Bus(**{"single_handle": True, **given}), name
-    except CAUSES as error:
+        bus = can.Bus(**{"single_handle": True, **given})
+    except Exception as error:  # its drivers raise whatever they come across, NameError even
         raise Refused(f"CAN bus {name}: {_reason(error)}") from None
+    stack.callback(bus.shutdown)
+    port = CanBusPort(bus)
+    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
+    return OpenBus(WithoutEcho(port) if interface in ECHOING else port, name, label)
 
 
 def _given(options: BusOptions) -> Mapping[str, Any]:

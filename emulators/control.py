@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.emulators.byte_text import escape
+from tickrig.emulators.emulated import look_at
 from tickrig.emulators.fault_spec import parse_fault_spec
+from tickrig.emulators.names import known
 from tickrig.emulators.operator import PRESS_US
 from tickrig.emulators.setting import Setting
 from tickrig.emulators.workbench import Workbench
@@ -98,17 +100,16 @@ class Control:
 
     def _get(self, request: Object) -> Object:
         device = self._emulator.device
-        known = (*device.inputs.table, *device.outputs)
-        names = request.get("names", list(known))
+        names = request.get("names", [*device.inputs.table, *device.outputs])
         if not isinstance(names, list):
             raise ValueError(f"names is a list of names, not {_short(names)}")
-        if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"no input or output {_short(unknown[0])}; known: {', '.join(known)}")
-        return {"values": {name: self._value(name) for name in names}}
-
-    def _value(self, name: str) -> Setting:
-        device = self._emulator.device
-        return device.inputs[name] if name in device.inputs.table else device.read(name)
+        for name in names:
+            if not isinstance(name, str) or not (
+                name in device.inputs.table or name in device.outputs
+            ):
+                everything = known([*device.inputs.table, *device.outputs])
+                raise ValueError(f"no input or output {_short(name)}; known: {everything}")
+        return {"values": {name: look_at(device, name) for name in names}}
 
     def _set(self, request: Object) -> Object:
         name, value = _text(request, "name"), request.get("value")

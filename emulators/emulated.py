@@ -70,3 +70,8 @@ class Touchable(Protocol):
 
 class Emulated(Device[W], Touchable, Protocol[W]):
     """A device on a wire that can be touched."""
+
+
+def look_at(device: Touchable, name: str) -> Setting:
+    """Return the present value of an input or output; KeyError if there is none."""
+    return device.inputs[name] if name in device.inputs.table else device.read(name)

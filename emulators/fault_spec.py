@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.core import NEVER
 from tickrig.emulators.duration import parse_time_us
 
-_SPEC: Final = re.compile(r"(\w+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
+_SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from functools import cached_property
 from typing import Final, Protocol
 
 from tickrig.device.core import NEVER
@@ -10,6 +11,7 @@ from tickrig.device.physical import Kind
 from tickrig.emulators.agenda import Agenda
 from tickrig.emulators.emulated import Inputs
 from tickrig.emulators.fault_spec import FaultSpec
+from tickrig.emulators.names import known
 from tickrig.emulators.setting import Setting
 
 PRESS_US: Final = 100_000
@@ -94,8 +96,7 @@ class Operator:
         """Return which inputs `set` would set to what, or raise as it does."""
         groups = self._inputs.groups
         if name not in groups and name not in self._inputs.table:
-            known = ", ".join([*groups, *self._inputs.table])
-            raise ValueError(f"no input {name!r}; known: {known}")
+            raise ValueError(f"no input {name!r}; known: {known([*groups, *self._inputs.table])}")
         members = groups.get(name, (name,))
         if len(values) != len(members):
             what = "one value" if len(members) == 1 else f"{len(members)} values"
@@ -155,13 +156,16 @@ class Operator:
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless there is a fault of this name."""
         if name not in self.faults:
-            raise ValueError(f"no fault {name!r}; known: {', '.join(self.faults)}")
+            raise ValueError(f"no fault {name!r}; known: {known(self.faults)}")
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Names of all faults there are, of the wire and of the device."""
-        physical = [i.name for i in self._inputs.table.values() if i.kind is Kind.FAULT]
-        return (*self._wire.kinds, *physical)
+        return (*self._wire.kinds, *self._physical_faults)
+
+    @cached_property
+    def _physical_faults(self) -> tuple[str, ...]:
+        return tuple(i.name for i in self._inputs.table.values() if i.kind is Kind.FAULT)
 
     @property
     def active_faults(self) -> tuple[str, ...]:

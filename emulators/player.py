@@ -76,6 +76,14 @@ class Player:
             self._emulator.agenda.drop(item)
 
     def _carry_out(self, line: Line, now_us: int) -> None:
+        """Do it; what the device itself refuses counts as missed."""
+        try:
+            self._do(line, now_us)
+        except ValueError as error:
+            self.missed += 1
+            self._transcript.tell(now_us, "?", f"{line.place}: {error}")
+
+    def _do(self, line: Line, now_us: int) -> None:
         operator = self._emulator.operator
         match line.action:
             case Send(data, shown):

@@ -12,6 +12,7 @@ from tickrig.emulators.byte_text import unescape
 from tickrig.emulators.duration import parse_time_us
 from tickrig.emulators.emulated import Touchable
 from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.names import known
 from tickrig.emulators.operator import PRESS_US, Operator
 from tickrig.emulators.setting import Setting, parse_setting
 
@@ -196,9 +197,10 @@ class ScenarioParser:
         return Clear(rest)
 
     def _parse_watch(self, rest: str) -> Watch:
-        names, known = tuple(rest.split()), self._device.outputs
-        if unknown := [name for name in names or [""] if name not in known]:
-            raise ValueError(f"no output {unknown[0]!r}; known: {', '.join(known)}")
+        names, device = tuple(rest.split()), self._device
+        for name in names or ("",):
+            if name not in device.outputs and name not in device.inputs.table:
+                raise ValueError(f"no output {name!r}; known: {known(device.outputs)}")
         return Watch(names)
 
 

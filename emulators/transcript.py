@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.duration import format_time
+from tickrig.emulators.emulated import look_at
 from tickrig.emulators.setting import Setting
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.wire_log import WireLine
@@ -59,7 +60,7 @@ class Transcript:
 
     def _look(self, now_us: int) -> None:
         for name, shown in self._shown.items():
-            if (value := self._emulator.device.read(name)) != shown:
+            if (value := look_at(self._emulator.device, name)) != shown:
                 self._shown[name] = value
                 self.tell(now_us, "*", f"{name} {value}")
 

@@ -1,0 +1,56 @@
+"""Nodes on a bus with all around them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.emulators.can_emulator import CanEmulator
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.candump_file import CandumpFile
+from tickrig.emulators.canopen.nodes import Nodes
+from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.emulators.clock import Clock
+from tickrig.emulators.rig import Station
+from tickrig.emulators.without_echo import CountingPort
+
+NAME: Final = "canopen-slave"
+
+_logger = logging.getLogger(__name__)
+
+
+def make_bench(  # noqa: PLR0913 - options, by keyword
+    wire: CanWire,
+    nodes: Nodes,
+    *,
+    outside: CountingPort | None = None,
+    link: str = "",
+    trace: CandumpFile | None = None,
+    clock: Clock | None = None,
+) -> CanEmulator:
+    """Put nodes together with the bus outside, if there is one, and a clock."""
+    stations = [Station(node, node.port) for node in nodes.nodes]
+    return CanEmulator(
+        NAME, nodes, stations, wire, outside=outside, clock=clock, trace=trace, link=link
+    )
+
+
+def store_keeper(store: StoreFile) -> Callable[[int], None]:
+    """Return what writes the file whenever a node has stored something.
+
+    Where writing fails there is one warning, and it is tried again.
+    """
+    failed = False
+
+    def keep(now_us: int) -> None:
+        nonlocal failed
+        try:
+            store.save()
+            failed = False
+        except OSError as error:
+            if not failed:
+                _logger.warning("store %s: %s; the emulator goes on", store.path, error.strerror)
+            failed = True
+
+    return keep

@@ -1,0 +1,81 @@
+"""Make nodes of their files and put them on a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.canopen.device_description import DeviceDescription
+from tickrig.emulators.canopen.eds_cache import EdsCache
+from tickrig.emulators.canopen.eds_file import EdsError
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.emulators.refused import Refused, refuse_path
+
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """A node whose file was read.
+
+    Attributes:
+        name: what its things are called after, and its memory in a store file.
+        node_id: 1..127, or `UNCONFIGURED`.
+        description: what its file says.
+    """
+
+    name: str
+    node_id: int
+    description: DeviceDescription
+
+
+def describe_nodes(specs: Iterable[NodeSpec]) -> list[Described]:
+    """Read the files; Refused if one cannot be used, or a node-ID is missing or there twice."""
+    cache, found = EdsCache(), dict[str, Described]()
+    for spec in specs:
+        description = _read(cache, spec)
+        node_id = spec.node_id if spec.node_id is not None else description.node_id
+        if node_id is None:
+            raise Refused(
+                f"{spec.file} gives no node-ID: add --node-id 1..127, or --node-id {LSS} for a"
+                " node that waits for LSS"
+            )
+        name = _name(node_id, found)
+        if name in found:
+            raise Refused(
+                f"node {name} is there twice: {found[name].description.file}, {spec.file}"
+            )
+        found[name] = Described(name, node_id, description)
+    return list(found.values())
+
+
+def make_nodes(
+    described: Iterable[Described], wire: CanWire, store: StoreFile | None = None
+) -> list[Node]:
+    """Make the nodes, with what they stored in an earlier life."""
+    nodes = []
+    for item in described:
+        dictionary = item.description.make_dictionary()
+        memory = store.nonvolatile(item.name, dictionary) if store else None
+        nodes.append(Node(item.name, make_slave(dictionary, item.node_id, memory), wire))
+    return nodes
+
+
+def _read(cache: EdsCache, spec: NodeSpec) -> DeviceDescription:
+    try:
+        return cache.read(spec.file)
+    except EdsError as error:
+        raise Refused(str(error)) from None
+    except OSError as error:
+        refuse_path("file", error)
+
+
+def _name(node_id: int, found: dict[str, Described]) -> str:
+    """Return the node-ID; nodes that wait for one are lss, lss2, ..."""
+    if node_id != UNCONFIGURED:
+        return str(node_id)
+    count = sum(item.node_id == UNCONFIGURED for item in found.values())
+    return f"{LSS}{count + 1}" if count else LSS

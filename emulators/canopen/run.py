@@ -1,0 +1,147 @@
+"""Run CANopen slaves as the command line asks: on a CAN bus, or a scenario."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.emulators.can_emulator import CanEmulator
+from tickrig.emulators.can_options import BusOptions, open_bus
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.candump import LogLine
+from tickrig.emulators.candump_file import CandumpFile
+from tickrig.emulators.canopen.bench import make_bench, store_keeper
+from tickrig.emulators.canopen.build import Described, describe_nodes, make_nodes
+from tickrig.emulators.canopen.node_spec import NodeSpec
+from tickrig.emulators.canopen.nodes import Nodes
+from tickrig.emulators.canopen.store_file import StoreError, StoreFile
+from tickrig.emulators.frame_transcript import FrameTranscript
+from tickrig.emulators.player import Player
+from tickrig.emulators.refused import Refused, refuse_path
+from tickrig.emulators.run import EmulatorRun, RunOptions, say
+from tickrig.emulators.scenario import Line, ScenarioParser, Send
+from tickrig.emulators.workbench import Workbench
+from tickrig.wire.can import CanFrame
+
+VIRTUAL_CHANNEL: Final = "can0"
+BIT_RATE: Final = 1_000_000
+SHOWN_NODES: Final = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanopenOptions(RunOptions):
+    """The command line.
+
+    Attributes:
+        specs: the nodes.
+        bus: the bus outside.
+        store: file in which nodes keep what 1010h and LSS store.
+    """
+
+    specs: tuple[NodeSpec, ...] = ()
+    bus: BusOptions = field(default_factory=BusOptions)
+    store: Path | None = None
+
+    @property
+    def in_real_time(self) -> bool:
+        """A scenario alone runs in virtual time."""
+        return not self.scenario or bool(self.bus or self.control)
+
+
+class CanopenRun(EmulatorRun):
+    """One run; see `CanopenOptions`."""
+
+    def __init__(self, options: CanopenOptions) -> None:
+        super().__init__(options, in_real_time=options.in_real_time)
+        self._options = options
+        self._described: list[Described] = []
+        self._channel = VIRTUAL_CHANNEL
+
+    def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
+        self._described = describe_nodes(self._options.specs)
+        if not self._described:
+            raise Refused("no node: give --eds FILE --node-id N, --node N=FILE or --rig FILE")
+        wire = self._make_wire()
+        bench = make_bench(wire, Nodes(make_nodes(self._described, wire)))
+        senders = {"send": parse_send}
+        return bench, ScenarioParser(bench.device, bench.operator, senders=senders)
+
+    def _make_wire(self) -> CanWire:
+        options = self._options
+        rate = options.bus.bitrate or self._described[0].description.bit_rate or BIT_RATE
+        try:
+            return CanWire(rate, options.seed)
+        except ValueError as error:
+            raise Refused(str(error)) from None
+
+    def _open(self, stack: ExitStack) -> CanEmulator:
+        outside, link = None, ""
+        if self._options.in_real_time:
+            outside, link, self._channel = open_bus(self._options.bus, stack)
+        wire = self._make_wire()
+        store = self._open_store()
+        nodes = Nodes(make_nodes(self._described, wire, store))
+        trace = self._open_trace(wire)
+        bench = make_bench(
+            wire,
+            nodes,
+            outside=outside,
+            link=link,
+            trace=trace,
+            clock=self._clock if outside else None,
+        )
+        if store:
+            bench.after_step.append(store_keeper(store))
+        if self._options.scenario or self._options.verbose > 1:
+            wire.observers.append(lambda at, x: click.echo(str(LogLine(at, self._channel, x))))
+        return bench
+
+    def _open_store(self) -> StoreFile | None:
+        if self._options.store is None:
+            return None
+        try:
+            return StoreFile(self._options.store)
+        except StoreError as error:
+            raise Refused(f"store {error}") from None
+        except OSError as error:
+            refuse_path("store", error)
+
+    def _open_trace(self, wire: CanWire) -> CandumpFile | None:
+        if self._options.trace is None:
+            return None
+        try:
+            trace = CandumpFile(self._options.trace, self._channel)
+        except OSError as error:
+            refuse_path("trace", error)
+        wire.observers.append(trace.hear)
+        return trace
+
+    def _attend(self, bench: Workbench, scenario: tuple[Line, ...]) -> Player | None:
+        options = self._options
+        if not (options.scenario or options.verbose):
+            return None
+        transcript = FrameTranscript(bench, say)
+        if options.verbose:
+            transcript.watch(0, *(name for name in bench.device.outputs if name.endswith("state")))
+        return Player(bench, scenario, transcript, stays=options.in_real_time)
+
+    def _greet(self, bench: Workbench) -> None:
+        nodes = [f"{item.name} ({item.description.file})" for item in self._described]
+        more = f" and {len(nodes) - SHOWN_NODES} more" if len(nodes) > SHOWN_NODES else ""
+        say(f"CANopen slave {', '.join(nodes[:SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")
+        control = self._options.control
+        say(
+            f"  tickrig ctl {control} describe"
+            if control
+            else "Add --control PATH to touch the objects from the inside, -vv to see the frames."
+        )
+
+
+def parse_send(rest: str) -> Send:
+    """Read a frame in candump's notation."""
+    data = str(CanFrame.parse(rest)).encode()
+    return Send(data, data)

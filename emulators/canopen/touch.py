@@ -1,0 +1,181 @@
+"""What somebody inside a CANopen device can read and set, by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Final, Protocol
+
+from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
+from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.physical import Input, Kind
+from tickrig.emulators.setting import Setting
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.errors import FieldError
+
+HEX: Final = "hex:"
+"""Begins the bytes of an octet string, a time or a domain."""
+
+REAL32_MAX: Final = 3.4028234663852886e38
+REAL64_MAX: Final = 1.7976931348623157e308
+
+_NAME: Final = re.compile(r"0x([0-9A-Fa-f]{4})(?::([0-9]{1,3}|0x[0-9A-Fa-f]{1,2}))?")
+_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+
+
+class Touch(Protocol):
+    """One thing that can be read and set."""
+
+    @property
+    def item(self) -> Input:
+        """What it is."""
+        ...
+
+    def read(self) -> Setting:
+        """Return the present value."""
+        ...
+
+    def check(self, value: Setting) -> Setting:
+        """Return the value that `write` would leave; ValueError if it cannot be set to it."""
+        ...
+
+    def write(self, value: Setting) -> None:
+        """Set it."""
+
+
+def object_name(dictionary: Dictionary, entry: Entry) -> str:
+    """Return what an entry is called: `0x6000:1`, a variable `0x1017`.
+
+    The sub-index is decimal.
+    """
+    name = f"0x{entry.index:04X}"
+    code = dictionary.objects[entry.index].code
+    plain = code in (ObjectCode.VAR, ObjectCode.DOMAIN) and entry.sub == 0
+    return name if plain else f"{name}:{entry.sub}"
+
+
+def find_object(dictionary: Dictionary, name: str) -> Entry | None:
+    """Return the entry of this name, None if there is none; `0x6000` is `0x6000:0`."""
+    match = _NAME.fullmatch(name)
+    return dictionary.find(int(match[1], 16), int(match[2] or "0", 0)) if match else None
+
+
+Later = Callable[[Callable[[], None]], None]
+"""Takes what is to be done at the beginning of the node's next tick."""
+
+
+class ObjectTouch:
+    """An object of the dictionary, from the inside.
+
+    Access is not asked for, except that a constant stays what it is. The service
+    that owns an object judges a new value and acts on it as if it had come over
+    the bus, so that a heartbeat time that is set here takes effect. The value
+    changes at the beginning of the node's next tick.
+
+    Args:
+        name: as `object_name` gives it.
+        entry: the object.
+        later: where the change is left.
+    """
+
+    def __init__(self, name: str, entry: Entry, later: Later) -> None:
+        self._name, self._entry, self._later = name, entry, later
+
+    @property
+    def item(self) -> Input:
+        """Name, kind and range; the unit is the data type."""
+        entry, kind = self._entry, self._entry.data_type
+        low, high = self._limits()
+        shape = Kind.LEVEL if _is_number(kind) else Kind.TEXT
+        return Input(self._name, f"{entry.name} ({_access(entry)})", shape, low, high, kind.name)
+
+    def read(self) -> Setting:
+        """Return the present value: a number, text, or bytes in hex."""
+        entry = self._entry
+        try:
+            data = entry.data if entry.source is None else entry.source()
+            value = entry.data_type.decode(data)
+        except (SdoAbort, FieldError) as error:
+            return f"({error})"
+        return HEX + value.hex() if isinstance(value, bytes) else value
+
+    def check(self, value: Setting) -> Setting:
+        """Return the value, or raise ValueError."""
+        self._encode(value)
+        return value
+
+    def write(self, value: Setting) -> None:
+        """Set it; ValueError if its owner refuses."""
+        entry, data = self._entry, self._encode(value)
+        try:
+            if entry.guard is not None:
+                entry.guard(entry.data_type.decode(data))
+        except SdoAbort as abort:
+            raise ValueError(f"{self._name} {value}: refused, {abort}") from None
+        self._later(partial(_change, entry, data))
+
+    def _encode(self, value: Setting) -> bytes:
+        entry, kind = self._entry, self._entry.data_type
+        if Access.CONST in entry.access:
+            raise ValueError(f"{self._name} is constant")
+        low, high = self._limits()
+        if _is_number(kind) and not isinstance(value, str) and not low <= value <= high:
+            raise ValueError(f"{self._name} {value} is not in {low}..{high}")
+        try:
+            data = kind.encode(_value(kind, value))
+        except ValueError as error:
+            raise ValueError(f"{self._name} {value!r}: {error}") from None
+        if not kind.size and len(data) > entry.max_bytes:
+            raise ValueError(f"{self._name} holds {entry.max_bytes} bytes, not {len(data)}")
+        return data
+
+    def _limits(self) -> tuple[float, float]:
+        """Return the limits of a number, those of its type where the object has none."""
+        low, high = _range(self._entry.data_type)
+        entry = self._entry
+        return low if entry.low is None else entry.low, high if entry.high is None else entry.high
+
+
+def _change(entry: Entry, data: bytes) -> None:
+    entry.assign(data)
+    if entry.written is not None:
+        entry.written()
+
+
+def _is_number(kind: DataType) -> bool:
+    return kind.is_integer or kind in (DataType.REAL32, DataType.REAL64)
+
+
+def _access(entry: Entry) -> str:
+    if Access.CONST in entry.access:
+        return "const"
+    return {(True, True): "rw", (True, False): "ro", (False, True): "wo"}.get(
+        (entry.readable, entry.writable), "hidden"
+    )
+
+
+def _range(kind: DataType) -> tuple[float, float]:
+    if kind.is_integer:
+        half = 1 << (kind.bits - 1)
+        return (-half, half - 1) if kind.signed else (0, 2 * half - 1)
+    if not _is_number(kind):
+        return 0, 0
+    most = REAL32_MAX if kind is DataType.REAL32 else REAL64_MAX
+    return -most, most
+
+
+def _value(kind: DataType, value: Setting) -> Value:
+    """Return what the data type takes; FieldError if this is no value of it."""
+    if kind in _TEXTS:
+        return str(value)
+    if _is_number(kind):
+        return value
+    text = str(value)
+    try:
+        if text.startswith(HEX):
+            return bytes.fromhex(text.removeprefix(HEX))
+    except ValueError:
+        pass
+    raise FieldError(f"{kind.name} takes bytes, as {HEX}01ff")
