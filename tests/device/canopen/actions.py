@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.time_of_day import TimeOfDay
 
@@ -46,3 +48,44 @@ class SlaveActions:
         """Compare the latest time stamp."""
         wanted = TimeOfDay(int(milliseconds), int(days))
         assert self.slave.time_of_day == wanted, f"{self.slave.time_of_day}, want {wanted}"
+
+
+class GenericIoActions(SlaveActions):
+    """The physical side of a CiA 401 module."""
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        super().__init__(slave)
+        self._module = Ds401.of(slave)
+        self.verbs |= {"di": self.set_digital, "ai": self.set_analogue}
+        self.verbs |= {"expect_do": self.expect_digital, "expect_ao": self.expect_analogue}
+
+    def set_digital(self, number: str, level: str) -> None:
+        """Set eight lines, in hex."""
+        self._module.set_digital(int(number), int(level, 16))
+
+    def set_analogue(self, number: str, level: str) -> None:
+        """Set a value, in decimal."""
+        self._module.set_analogue(int(number), int(level))
+
+    def expect_digital(self, number: str, level: str) -> None:
+        """Compare eight lines, in hex."""
+        got = self._module.digital_outputs[int(number) - 1].level
+        assert got == int(level, 16), f"outputs are {got:02X}, want {level}"
+
+    def expect_analogue(self, number: str, level: str) -> None:
+        """Compare a value, in decimal."""
+        got = self._module.analogue_outputs[int(number) - 1].level
+        assert got == int(level), f"output is {got}, want {level}"
+
+
+class DriveActions(SlaveActions):
+    """The physical side of a CiA 402 drive."""
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        super().__init__(slave)
+        self._drive = Ds402.of(slave)
+        self.verbs |= {"fault": self.have_fault}
+
+    def have_fault(self, code: str) -> None:
+        """Have a fault, by its error code."""
+        self._drive.fault(int(code, 16))

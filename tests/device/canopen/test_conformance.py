@@ -2,10 +2,14 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.actions import SlaveActions
+from tests.device.canopen.actions import DriveActions, GenericIoActions, SlaveActions
 from tests.device.canopen.conformance import Check, load_all, run_check
-from tests.device.canopen.reference import NODE_ID, make_dictionary
+from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
+from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.runner import Pace, Runner
+from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
 
 CHECKS = load_all()
@@ -13,10 +17,18 @@ every_check = pytest.mark.parametrize("check", CHECKS, ids=[check.id for check i
 
 
 def play(check: Check, pace: Pace) -> list[str]:
-    slave = make_slave(make_dictionary(check.needs), NODE_ID)
+    application, actions = profile(check)
+    dictionary = make_dictionary(check.needs)
+    slave = make_slave(dictionary, NODE_ID, application=application)
     run = Runner(slave, pace)
-    run_check(run, check, SlaveActions(slave))
+    run_check(run, check, actions(slave))
     return run.transcript
+
+
+def profile(check: Check) -> tuple[type[Application], type[SlaveActions]]:
+    if GENERIC_IO in check.needs:
+        return Ds401, GenericIoActions
+    return (Ds402, DriveActions) if DRIVE in check.needs else (Application, SlaveActions)
 
 
 @every_check

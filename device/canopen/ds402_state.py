@@ -1,0 +1,99 @@
+"""The state machine of a drive (CiA 402-2, finite state automaton)."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum, IntFlag, auto
+from typing import Final
+
+
+class Controlword(IntFlag):
+    """Bits of 6040h; 4, 5 and 6 belong to the mode of operation."""
+
+    SWITCH_ON = 0x0001
+    ENABLE_VOLTAGE = 0x0002
+    QUICK_STOP = 0x0004  # active at 0
+    ENABLE_OPERATION = 0x0008
+    START = 0x0010  # new set-point, start homing
+    CHANGE_AT_ONCE = 0x0020
+    RELATIVE = 0x0040
+    FAULT_RESET = 0x0080
+    HALT = 0x0100
+
+
+class Statusword(IntFlag):
+    """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
+
+    VOLTAGE_ENABLED = 0x0010
+    REMOTE = 0x0200
+    TARGET_REACHED = 0x0400
+    MODE_12 = 0x1000  # set-point acknowledge, homing attained, speed is zero, follows the target
+    MODE_13 = 0x2000  # homing error
+
+
+class DriveState(IntEnum):
+    """State by its bits in the statusword."""
+
+    NOT_READY_TO_SWITCH_ON = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY_TO_SWITCH_ON = 0x21
+    SWITCHED_ON = 0x23
+    OPERATION_ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION_ACTIVE = 0x0F
+    FAULT = 0x08
+
+
+class Command(Enum):
+    """What a controlword asks for; switch on also means disable operation."""
+
+    SHUTDOWN = auto()
+    SWITCH_ON = auto()
+    ENABLE_OPERATION = auto()
+    DISABLE_VOLTAGE = auto()
+    QUICK_STOP = auto()
+
+
+_COMMANDS: Final = (
+    (0x87, 0x06, Command.SHUTDOWN),
+    (0x8F, 0x07, Command.SWITCH_ON),
+    (0x8F, 0x0F, Command.ENABLE_OPERATION),
+    (0x82, 0x00, Command.DISABLE_VOLTAGE),
+    (0x86, 0x02, Command.QUICK_STOP),
+)
+"""Mask, value, command."""
+
+_SOD: Final = DriveState.SWITCH_ON_DISABLED
+_READY: Final = DriveState.READY_TO_SWITCH_ON
+_ON: Final = DriveState.SWITCHED_ON
+_ENABLED: Final = DriveState.OPERATION_ENABLED
+_QUICK_STOP: Final = DriveState.QUICK_STOP_ACTIVE
+
+NEXT_STATE: Final = {
+    (_SOD, Command.SHUTDOWN): _READY,  # transition 2
+    (_READY, Command.SWITCH_ON): _ON,  # 3
+    (_READY, Command.ENABLE_OPERATION): _ENABLED,  # 3, then 4 by itself
+    (_READY, Command.DISABLE_VOLTAGE): _SOD,  # 7
+    (_READY, Command.QUICK_STOP): _SOD,  # 7
+    (_ON, Command.ENABLE_OPERATION): _ENABLED,  # 4
+    (_ON, Command.SHUTDOWN): _READY,  # 6
+    (_ON, Command.DISABLE_VOLTAGE): _SOD,  # 10
+    (_ON, Command.QUICK_STOP): _SOD,  # 10
+    (_ENABLED, Command.SWITCH_ON): _ON,  # 5
+    (_ENABLED, Command.SHUTDOWN): _READY,  # 8
+    (_ENABLED, Command.DISABLE_VOLTAGE): _SOD,  # 9
+    (_ENABLED, Command.QUICK_STOP): _QUICK_STOP,  # 11
+    (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
+    (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16
+}
+
+
+def command_of(controlword: int) -> Command | None:
+    """Return what a controlword asks for, None if it asks for nothing.
+
+    >>> command_of(0x0006), command_of(0x0080)
+    (<Command.SHUTDOWN: 1>, None)
+    """
+    for mask, value, command in _COMMANDS:
+        if controlword & mask == value:
+            return command
+    return None
