@@ -2,38 +2,51 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from tickrig.device.canopen.service import Service
 from tickrig.device.core import NEVER
-from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.slave import CanopenSlave
 
 
 class HeartbeatProducer(Service):
     """Sends the NMT state each producer heartbeat time.
 
-    The boot-up message counts as the first heartbeat. A time that is written
-    begins anew, so the first one comes after one period.
+    The boot-up message counts as the first heartbeat. A time that is written,
+    over the bus or from the inside, begins anew, so the first one comes after
+    one period.
     """
 
-    def start(self) -> None:
-        """Take the object into service."""
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._period = node.dictionary.find(0x1017)
         self._due_us = NEVER
-        self._period = self.node.dictionary.find(0x1017)
+        self._begins = False
         if self._period is not None:
-            self._period.written = self._begin
+            self._period.watchers.append(self._begin)
+            self._period.written = self._begin  # the same value, too, begins anew
 
     def booted(self) -> None:
         """Count from the boot-up message."""
         self._begin()
 
-    def _begin(self) -> None:
-        period_us = self._period.number * 1_000 if self._period is not None else 0
-        self._due_us = self.node.now_us + period_us if period_us else NEVER
-        self.schedule(self._due_us)
-
     def tick(self, now_us: int) -> None:
-        """Send one heartbeat."""
+        """Begin to count, or send one heartbeat."""
         node = self.node
-        node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
-        if self._period is not None:
-            self._due_us += self._period.number * 1_000
-            self.schedule(self._due_us)
+        period_us = 1_000 * self._period.number if self._period is not None else 0
+        if self._begins:
+            self._due_us = now_us
+        else:
+            node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
+        self._begins = False
+        self._due_us += period_us
+        self.schedule(self._due_us if period_us else NEVER)
+
+    def _begin(self) -> None:
+        """Count from the next tick on, or from this one; not before the boot-up message."""
+        if self.node.state is not NmtState.INITIALISING:
+            self._begins = True
+            self.schedule(0)

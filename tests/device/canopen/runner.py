@@ -133,7 +133,7 @@ class Runner:
 def matches(pattern: str, text: str) -> bool:
     """Compare frames; a dot stands for any nibble.
 
-    >>> matches("585#4F0110000......", "585#4F01100003000000")
+    >>> matches("585#4F011000........", "585#4F01100003000000")
     True
     """
     return re.fullmatch(pattern, text) is not None

@@ -5,6 +5,7 @@ import pytest
 from tests.device.canopen.bus import Bus
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
@@ -59,6 +60,21 @@ def test_heartbeats_follow_the_boot_up_and_do_not_drift() -> None:
     bus = make_bus(heartbeat_ms=100)
     assert bus.step() == ["705#00"]
     assert [bus.run(100) for _ in range(50)] == [["705#7F"]] * 50
+
+
+def test_a_heartbeat_time_set_from_the_inside_counts_from_the_next_tick() -> None:
+    bus = make_bus()
+    bus.step()
+    bus.slave.dictionary[0x1017, 0].value = 50
+    assert bus.run(50) == []
+    assert bus.run(1) == ["705#7F"]
+    bus.slave.dictionary[0x1017, 0].value = 0
+    assert bus.run(200) == []
+
+
+def test_an_unconfigured_node_sends_no_heartbeat() -> None:
+    bus = Bus(make_slave(make_bus(heartbeat_ms=10).slave.dictionary.copy(), UNCONFIGURED))
+    assert bus.run(100) == []
 
 
 def test_reset_communication_keeps_the_application() -> None:
