@@ -20,9 +20,10 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-def test_the_readme_program_runs() -> None:
-    (program,) = blocks("README.md", "python")
-    exec(compile(program, "README.md", "exec"), {})
+@pytest.mark.parametrize("page", ["README.md", "docs/canopen.md"])
+def test_the_program_of_a_page_runs(page: str) -> None:
+    (program,) = blocks(page, "python")
+    exec(compile(program, page, "exec"), {})
 
 
 @pytest.mark.realtime
