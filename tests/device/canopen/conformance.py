@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
+from tests.device.canopen.check_text import Step, parse_checks
 from tests.device.canopen.macros import MACROS
 from tests.device.canopen.runner import Runner
 
 GOLDEN: Final = Path(__file__).parents[2] / "golden" / "canopen"
-
-Step = dict[str, Any]
 
 
 class Check(NamedTuple):
@@ -35,16 +34,18 @@ class NotConformingError(AssertionError):
 
 
 def load(path: Path) -> list[Check]:
-    """Read the checks of a file."""
+    """Read the checks of a file, JSON or text."""
+    text = path.read_text()
+    rows = json.loads(text)["checks"] if path.suffix == ".json" else parse_checks(text)
     return [
         Check(row["id"], row["title"], frozenset(row.get("needs", ())), tuple(row["steps"]))
-        for row in json.loads(path.read_text())["checks"]
+        for row in rows
     ]
 
 
 def load_all() -> list[Check]:
     """Read all checks there are, those of files that were added too."""
-    return [check for path in sorted(GOLDEN.glob("conformance*.json")) for check in load(path)]
+    return [check for path in sorted(GOLDEN.glob("conformance*")) for check in load(path)]
 
 
 def run_check(run: Runner, check: Check, actions: Actions) -> None:
