@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from tickrig.device.canopen.entry import Entry
     from tickrig.device.canopen.sdo_server import SdoServer
 
-SEGMENT_TIMEOUT_US: Final = 200_000
-"""Silence inside a block after which it is acknowledged as it is: its last segment was lost."""
-
 _END_MASK: Final = 0xE1
 """Command specifier and subcommand of the end; n is between them."""
 
@@ -35,16 +32,16 @@ class BlockDownload:
     """Collects a value in blocks; the object changes when the client has ended the transfer.
 
     A segment out of sequence is dropped, and the block acknowledged at its end
-    with the last one in sequence. If the end of the block was lost, it is
-    acknowledged after `SEGMENT_TIMEOUT_US`; then a new block is waited for, and
-    what comes before its first segment belongs to the old one. The size is
-    judged before the CRC. Inside a block every frame but an abort is a segment.
+    with the last one in sequence. If the end itself is lost, the client must
+    notice, or the transfer times out: a client may be slow inside a block. The
+    size is judged before the CRC. Inside a block every frame but an abort is a
+    segment.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
         self._server, self._entry = server, entry
         self._data, self._in_sequence, self._finished = bytearray(), 0, False
-        self._crc = bool(request[0] & BLOCK_CRC)
+        self._crc = request[0] & BLOCK_CRC
         entry.check_writable()
         self._size: int | None = None
         self._most = entry.size or entry.max_bytes
@@ -52,7 +49,7 @@ class BlockDownload:
             self._size = self._most = int.from_bytes(request[4:], "little")
             entry.check_size(self._size)
         self._block_size = server.block_size
-        command = ServerCommand.BLOCK_DOWNLOAD | BLOCK_CRC
+        command = ServerCommand.BLOCK_DOWNLOAD | self._crc
         server.confirm(command, bytes([self._block_size, 0, 0, 0]))
         server.wait(self._segment)
 
@@ -70,16 +67,7 @@ class BlockDownload:
         if head >= BLOCK_LAST or seqno >= self._block_size:
             self._acknowledge()
         else:
-            self._server.wait(self._segment, SEGMENT_TIMEOUT_US, self._segment_missing)
-
-    def _segment_missing(self) -> None:
-        self._acknowledge()
-        self._server.wait(self._first_segment)
-
-    def _first_segment(self, request: bytes) -> None:
-        """Wait for the first segment of the block that repeats what was lost."""
-        if request[0] == ClientCommand.ABORT or request[0] & BLOCK_SEQNO == 1:
-            self._segment(request)
+            self._server.wait(self._segment)
 
     def _acknowledge(self) -> None:
         """Say how far the block was received, and begin the next."""

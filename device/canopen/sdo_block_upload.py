@@ -30,6 +30,8 @@ class BlockUpload:
     A value no longer than the client's protocol switch threshold is given by
     expedited or segmented upload. A lost segment is sent again from there on,
     in a new block. The block size of the last acknowledgement is not looked at.
+    The server says that it can do the CRC to clients that can: there are clients
+    that check it whenever the server can.
     """
 
     def __init__(self, server: SdoServer, data: bytes, request: bytes) -> None:
@@ -41,8 +43,9 @@ class BlockUpload:
         if threshold and len(data) <= threshold:
             server.upload(data)
             return
-        self._crc = crc16(data) if request[0] & BLOCK_CRC else 0
-        command = ServerCommand.BLOCK_UPLOAD | BLOCK_CRC | BLOCK_SIZE_INDICATED
+        with_crc = request[0] & BLOCK_CRC
+        self._crc = crc16(data) if with_crc else 0
+        command = ServerCommand.BLOCK_UPLOAD | with_crc | BLOCK_SIZE_INDICATED
         server.confirm(command, len(data).to_bytes(4, "little"))
         server.wait(self._start)
 

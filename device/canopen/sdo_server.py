@@ -85,7 +85,6 @@ class SdoServer:
         }
         self._idle: Final[State] = self._without_transfer
         self._state: State = self._idle
-        self._expired: Callable[[], None] = self._time_out
         self.due_us = NEVER
 
     def receive(self, frame: CanFrame) -> None:
@@ -105,26 +104,11 @@ class SdoServer:
         """Send a response that names the object of the transfer."""
         self.respond(bytes([command]) + self._multiplexer + rest)
 
-    def wait(
-        self, state: State, timeout_us: int = TIMEOUT_US, expired: Callable[[], None] | None = None
-    ) -> None:
-        """Let the transfer wait for a request.
-
-        Args:
-            state: takes the request.
-            timeout_us: how long to wait.
-            expired: what to do then, an abort if left out.
-        """
-        self._state, self._expired = state, expired or self._time_out
-        self.due_us = self.node.now_us + timeout_us
+    def wait(self, state: State) -> None:
+        """Let the transfer wait for a request, but not for ever."""
+        self._state = state
+        self.due_us = self.node.now_us + TIMEOUT_US
         self._wake(self.due_us)
-
-    def expire(self) -> None:
-        """Act on a client that has been silent until now."""
-        try:
-            self._expired()
-        except SdoAbort as refused:
-            self.abort(refused.code)
 
     def end(self) -> None:
         """End the transfer."""
@@ -195,6 +179,3 @@ class SdoServer:
 
     def _begin_block_download(self, entry: Entry, request: bytes) -> None:
         BlockDownload(self, entry, request)
-
-    def _time_out(self) -> None:
-        raise SdoAbort(AbortCode.TIMEOUT)

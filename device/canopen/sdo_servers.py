@@ -109,7 +109,7 @@ class SdoServers(Service):
         """Look for clients that have been silent too long."""
         for server in self.servers:
             if server.due_us <= now_us:
-                server.expire()
+                server.abort(AbortCode.TIMEOUT)
         self._due_us = min(server.due_us for server in self.servers)
         self.schedule(self._due_us)
 

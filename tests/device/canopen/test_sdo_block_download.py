@@ -41,7 +41,7 @@ def test_30_bytes_go_in_5_segments() -> None:
 
 def test_without_crc_the_field_is_not_looked_at() -> None:
     bus = booted()
-    assert bus.step("605#C217100002000000") == ["585#A41710007F000000"]  # BD-02
+    assert bus.step("605#C217100002000000") == ["585#A01710007F000000"]  # BD-02
     assert bus.step("605#8164000000000000") == ["585#A2017F0000000000"]
     assert bus.step("605#D5FFFF0000000000") == ENDED
     assert bus.slave.dictionary[0x1017, 0].value == 100
@@ -56,13 +56,12 @@ def test_the_size_may_be_left_out() -> None:
     assert bus.slave.dictionary[0x2007, 0].value == "abc"
 
 
-@pytest.mark.parametrize("missing", range(5))
+@pytest.mark.parametrize("missing", range(4))
 def test_a_lost_segment_is_acknowledged_and_repeated(missing: int) -> None:
     bus = booted()
     bus.step(BEGIN)
     sent = SEGMENTS[:missing] + SEGMENTS[missing + 1 :]
-    answer = bus.step(*sent) or bus.run(200)
-    assert answer == [f"585#A2{missing:02X}7F0000000000"]  # BD-05
+    assert bus.step(*sent) == [f"585#A2{missing:02X}7F0000000000"]  # BD-05
     repeated = [f"605#{int(text[4:6], 16) - missing:02X}{text[6:]}" for text in SEGMENTS[missing:]]
     assert bus.step(*repeated) == [f"585#A2{5 - missing:02X}7F0000000000"]
     assert bus.step(END) == ENDED
@@ -77,33 +76,30 @@ def test_a_segment_that_comes_twice_counts_once() -> None:
     assert bus.step(END) == ENDED
 
 
-def test_segments_of_a_block_given_up_are_not_taken_for_the_next() -> None:
+def test_a_client_may_be_slow_inside_a_block() -> None:
     bus = booted()
     bus.step(BEGIN)
-    assert bus.step(*SEGMENTS[:2]) + bus.run(199) == []
-    assert bus.step() == ["585#A2027F0000000000"]
-    assert bus.step(*SEGMENTS[2:]) == []
-    repeated = ["605#0179206C6F6E6720", "605#02737472696E672E", "605#832E2E0000000000"]
-    assert bus.step(*repeated) == ["585#A2037F0000000000"]
+    for segment in SEGMENTS[:4]:
+        assert bus.step(segment) + bus.run(4_998) == []
+    assert bus.step(SEGMENTS[4]) == ["585#A2057F0000000000"]
+    assert bus.run(4_998) == []
     assert bus.step(END) == ENDED
 
 
-def test_a_client_silent_inside_a_block_is_aborted_in_the_end() -> None:
+@pytest.mark.parametrize("received", range(1, 6))
+def test_a_client_silent_in_a_block_is_aborted_after_5_s(received: int) -> None:
     bus = booted()
     bus.step(BEGIN)
-    bus.step(SEGMENTS[0])
-    assert bus.run(200) == ["585#A2017F0000000000"]
-    assert bus.run(5_000) == ["585#8007200000000405"]
+    bus.step(*SEGMENTS[:received])
+    assert bus.run(4_999) == []
+    assert bus.step() == ["585#8007200000000405"]
     assert bus.run(10_000) == []
 
 
-@pytest.mark.parametrize("given_up", [False, True])
-def test_a_client_may_abort_inside_a_block(given_up: bool) -> None:
+def test_a_client_may_abort_inside_a_block() -> None:
     bus = booted()
     bus.step(BEGIN)
     bus.step(SEGMENTS[0])
-    if given_up:
-        bus.run(200)
     assert bus.step("605#8007200000000008") + bus.run(30) == []  # BD-09
     assert bus.step("605#4001100000000000") == ["585#4F01100000000000"]
     assert bus.slave.dictionary[0x2007, 0].value == "short"

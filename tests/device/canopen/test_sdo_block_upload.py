@@ -24,7 +24,7 @@ def test_15_bytes_come_in_3_segments() -> None:
 
 def test_without_crc_the_field_is_0() -> None:
     bus = booted()
-    assert bus.step("605#A00810007F000000") == BEGUN  # BU-02
+    assert bus.step("605#A00810007F000000") == ["585#C20810000F000000"]  # BU-02
     assert bus.step(START) == NAME_SEGMENTS
     assert bus.step("605#A2037F0000000000") == ["585#D900000000000000"]
 
