@@ -1,0 +1,107 @@
+"""A host on the bus of a rig in virtual time."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.can_end import CanEnd
+from tickrig.emulators.rig import Rig
+from tickrig.host.errors import LinkClosed, LinkTimeout
+from tickrig.wire.can import CanFrame, Frames
+
+
+class Repeat:
+    """A frame that is sent again and again, as a driver's periodic task does.
+
+    Attributes:
+        frame: what is sent next.
+        period_us: how often.
+        due_us: when it is sent next, `NEVER` once it was stopped.
+    """
+
+    def __init__(self, frame: CanFrame, period_us: int, due_us: int) -> None:
+        self.frame, self.period_us, self.due_us = frame, period_us, due_us
+
+    def stop(self) -> None:
+        """Send it no more."""
+        self.due_us = NEVER
+
+
+class CanHost:
+    """A `Link[Frames]` into a rig: waiting makes virtual time pass.
+
+    Args:
+        rig: the rig that is stepped meanwhile.
+        end: an end of one of its buses that no station has.
+    """
+
+    def __init__(self, rig: Rig, end: CanEnd) -> None:
+        self._rig, self._end, self._closed = rig, end, False
+        self._inbox: deque[tuple[int, CanFrame]] = deque()
+        self._repeats: list[Repeat] = []
+
+    @property
+    def now_us(self) -> int:
+        """The rig's time."""
+        return self._rig.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        """Queue frames; no time passes."""
+        self._check_open()
+        self._end.send(self.now_us, traffic)
+
+    def repeat(self, frame: CanFrame, period_us: int) -> Repeat:
+        """Send a frame now and then in each period, until it is stopped."""
+        if period_us < 1:
+            raise ValueError(f"a period of {period_us} us; at least 1 us")
+        self.send((frame,))
+        repeat = Repeat(frame, period_us, self.now_us + period_us)
+        self._repeats.append(repeat)
+        return repeat
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        """Let time pass until a frame has arrived; return all that are there then."""
+        first = self.take(timeout_us)
+        rest = [frame for _, frame in self._inbox]
+        self._inbox.clear()
+        return () if first is None else (first[1], *rest)
+
+    def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
+        """Let time pass until a frame has arrived; return it with its time, None if none came.
+
+        Raises:
+            LinkClosed: the link was closed.
+            LinkTimeout: there is no timeout, and nothing will ever happen.
+        """
+        self._check_open()
+        deadline_us = NEVER if timeout_us is None else self.now_us + max(0, timeout_us)
+        while not self._inbox:
+            self._inbox += self._end.poll_stamped(self.now_us)
+            if not self._inbox:
+                if self.now_us >= deadline_us:
+                    return None
+                self._step(deadline_us)
+        return self._inbox.popleft()
+
+    def close(self) -> None:
+        """Close the link; the rig stays as it is."""
+        self._closed = True
+        self._repeats.clear()
+
+    def _step(self, deadline_us: int) -> None:
+        """Go to the next time at which something may happen here."""
+        self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
+        repeat_us = min((repeat.due_us for repeat in self._repeats), default=NEVER)
+        next_us = min(self._rig.next_us, self._end.due_us, repeat_us, deadline_us)
+        if next_us == NEVER:
+            raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
+        self._rig.run_to(next_us)
+        for repeat in self._repeats:
+            if repeat.due_us <= next_us:
+                self._end.send(next_us, (repeat.frame,))
+                repeat.due_us += repeat.period_us
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise LinkClosed("the link was closed")

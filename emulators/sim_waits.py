@@ -1,0 +1,105 @@
+"""What a library waits on, replaced by what makes virtual time pass."""
+
+from __future__ import annotations
+
+import queue
+from collections import deque
+from collections.abc import Callable
+from typing import Final, Generic, Protocol, TypeVar
+
+LOOK_US: Final = 100
+"""What a look at the clock costs: a loop that does nothing else then ends some day."""
+
+T = TypeVar("T")
+
+
+class Passing(Protocol):
+    """Something whose time can be made to pass."""
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since 1970, on its clock."""
+        ...
+
+    def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Let time pass until `done()`; False if the timeout was first."""
+        ...
+
+
+class SimQueue(Generic[T]):
+    """A `queue.Queue` as one thread needs it: waiting lets time pass."""
+
+    def __init__(self, passing: Passing) -> None:
+        self._passing = passing
+        self._items: deque[T] = deque()
+
+    def put(self, item: T) -> None:
+        """Put something at the end."""
+        self._items.append(item)
+
+    def get(self, block: bool = True, timeout: float | None = None) -> T:
+        """Take the first; raises queue.Empty if there is none in time."""
+        self._passing.wait(lambda: bool(self._items), timeout if block else 0)
+        if not self._items:
+            raise queue.Empty
+        return self._items.popleft()
+
+    def empty(self) -> bool:
+        """Say whether there is nothing in it."""
+        return not self._items
+
+
+class SimCondition:
+    """A `threading.Condition` as one thread needs it: waiting lets time pass."""
+
+    def __init__(self, passing: Passing) -> None:
+        self._passing, self._notified = passing, 0
+
+    def __enter__(self) -> bool:
+        """Nothing to lock."""
+        return True
+
+    def __exit__(self, *exception: object) -> None:
+        """Nothing to unlock."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for the next notification; False if the timeout was first."""
+        before = self._notified
+        return self._passing.wait(lambda: self._notified != before, timeout)
+
+    def notify_all(self) -> None:
+        """Let those who wait go on."""
+        self._notified += 1
+
+
+class SimTime:
+    """The functions of `time` that libraries use, on another clock."""
+
+    def __init__(self, passing: Passing) -> None:
+        self._passing = passing
+
+    def time(self) -> float:
+        """Return the time since 1970 in seconds."""
+        self.sleep(LOOK_US / 1e6)
+        return self._passing.time_s
+
+    def monotonic(self) -> float:
+        """Return a time in seconds of which only differences mean anything."""
+        return self.time()
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        self._passing.wait(lambda: False, seconds)
+
+
+class SimQueues:
+    """The names of `queue` that libraries use."""
+
+    Empty = queue.Empty
+
+    def __init__(self, passing: Passing) -> None:
+        self._passing = passing
+
+    def Queue(self) -> SimQueue[bytes]:  # noqa: N802 - the library calls it so
+        """Return a new queue."""
+        return SimQueue(self._passing)
