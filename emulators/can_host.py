@@ -12,20 +12,27 @@ from tickrig.wire.can import CanFrame, Frames
 
 
 class Repeat:
-    """A frame that is sent again and again, as a driver's periodic task does.
+    """Frames that are sent in turn, one each period, as a driver's periodic task does.
 
     Attributes:
-        frame: what is sent next.
-        period_us: how often.
-        due_us: when it is sent next, `NEVER` once it was stopped.
+        frames: what is sent, from the next time on.
+        due_us: when the next one is sent, `NEVER` once it was stopped.
     """
 
-    def __init__(self, frame: CanFrame, period_us: int, due_us: int) -> None:
-        self.frame, self.period_us, self.due_us = frame, period_us, due_us
+    def __init__(self, frames: Frames, period_us: int, due_us: int) -> None:
+        self.frames, self.due_us = frames, due_us
+        self._period_us, self._sent = period_us, 0
 
     def stop(self) -> None:
-        """Send it no more."""
+        """Send no more."""
         self.due_us = NEVER
+
+    def take(self) -> Frames:
+        """Take the frame that is due."""
+        frame = self.frames[self._sent % len(self.frames)]
+        self._sent += 1
+        self.due_us += self._period_us
+        return (frame,)
 
 
 class CanHost:
@@ -51,12 +58,12 @@ class CanHost:
         self._check_open()
         self._end.send(self.now_us, traffic)
 
-    def repeat(self, frame: CanFrame, period_us: int) -> Repeat:
-        """Send a frame now and then in each period, until it is stopped."""
-        if period_us < 1:
-            raise ValueError(f"a period of {period_us} us; at least 1 us")
-        self.send((frame,))
-        repeat = Repeat(frame, period_us, self.now_us + period_us)
+    def repeat(self, frames: Frames, period_us: int) -> Repeat:
+        """Send a frame now and one in each period, in turn, until it is stopped."""
+        if period_us < 1 or not frames:
+            raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
+        repeat = Repeat(frames, period_us, self.now_us)
+        self.send(repeat.take())
         self._repeats.append(repeat)
         return repeat
 
@@ -99,8 +106,7 @@ class CanHost:
         self._rig.run_to(next_us)
         for repeat in self._repeats:
             if repeat.due_us <= next_us:
-                self._end.send(next_us, (repeat.frame,))
-                repeat.due_us += repeat.period_us
+                self._end.send(next_us, repeat.take())
 
     def _check_open(self) -> None:
         if self._closed:

@@ -100,7 +100,7 @@ class SimNetwork(canopen.Network):
     ) -> SimPeriodic:
         """Send a frame each `period` seconds while time passes."""
         frame = _frame(can_id, data, remote=remote)
-        return SimPeriodic(self.host.repeat(frame, round(period * 1e6)))
+        return SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
 
     def subscribe(self, can_id: int, callback: Callback) -> None:
         """Listen to a CAN-ID, and put the listener on the rig's clock."""
@@ -141,7 +141,8 @@ class SimPeriodic(canopen.network.PeriodicMessageTask):
 
     def update(self, data: Data) -> None:
         """Send other data from the next time on."""
-        self._repeat.frame = self._repeat.frame._replace(data=bytes(data or ()))
+        (frame,) = self._repeat.frames
+        self._repeat.frames = (frame._replace(data=bytes(data or ())),)
 
 
 def _frame(can_id: int, data: Data, *, remote: bool) -> CanFrame:

@@ -8,7 +8,6 @@ from tickrig.emulators.can_host import CanHost
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
 from tickrig.host.errors import LinkClosed, LinkTimeout
-from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
 
 
@@ -49,16 +48,16 @@ def test_frames_that_came_together_are_returned_together_or_one_by_one() -> None
 def test_a_frame_is_repeated_in_virtual_time_until_it_is_stopped() -> None:
     host, wire, _ = hosted()
     log = Log(wire)
-    repeat = host.repeat(CanFrame(0x300), 10_000)
+    repeat = host.repeat(frames("300# 302#"), 10_000)
     host.receive(25_000)
-    repeat.frame = CanFrame(0x301)
+    repeat.frames = frames("301#")
     host.receive(10_000)
     repeat.stop()
     host.receive(100_000)
-    assert log.text == "300# 300# 300# 301#"
+    assert log.text == "300# 302# 300# 301#"
     assert [at_us // 10_000 for at_us in log.times_us] == [0, 1, 2, 3]
-    with pytest.raises(ValueError, match="at least 1 us"):
-        host.repeat(CanFrame(0x300), 0)
+    with pytest.raises(ValueError, match="at least 1 frame and 1 us"):
+        host.repeat(frames("300#"), 0)
 
 
 def test_a_closed_link_says_so() -> None:
