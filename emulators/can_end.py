@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
-from tickrig.device.core import Device
+from tickrig.device.core import NEVER, Device
 from tickrig.emulators.can_controller import CanController
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -83,6 +83,11 @@ class CanEnd:
     def accepts(self, accepts: Accepted) -> None:
         self._accepts = accepts
         self.segment.routes.forget()
+
+    @property
+    def arrived_us(self) -> int:
+        """When the first frame that waits here had ended, `NEVER` if none does."""
+        return self.stamps[0] if self.stamps else NEVER
 
     @property
     def due_us(self) -> int:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Final
 
 from tickrig.device.core import NEVER
 from tickrig.emulators.can_end import CanEnd
 from tickrig.emulators.rig import Rig
 from tickrig.host.errors import LinkClosed, LinkTimeout
 from tickrig.wire.can import CanFrame, Frames
+
+CHUNK_US: Final = 1_000_000
+"""How far the rig runs at once where there is no timeout."""
 
 
 class Repeat:
@@ -45,6 +49,7 @@ class CanHost:
 
     def __init__(self, rig: Rig, end: CanEnd) -> None:
         self._rig, self._end, self._closed = rig, end, False
+        rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self._repeats: list[Repeat] = []
 
@@ -97,16 +102,18 @@ class CanHost:
         self._repeats.clear()
 
     def _step(self, deadline_us: int) -> None:
-        """Go to the next time at which something may happen here."""
+        """Let the rig run until a frame has come, or one is to be repeated."""
         self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
         repeat_us = min((repeat.due_us for repeat in self._repeats), default=NEVER)
-        next_us = min(self._rig.next_us, self._end.due_us, repeat_us, deadline_us)
-        if next_us == NEVER:
-            raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
-        self._rig.run_to(next_us)
+        until_us = min(repeat_us, deadline_us)
+        if until_us == NEVER:
+            if self._rig.next_us == NEVER:
+                raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
+            until_us = self._rig.next_us + CHUNK_US
+        self._rig.run_to(until_us, self._end)
         for repeat in self._repeats:
-            if repeat.due_us <= next_us:
-                self._end.send(next_us, repeat.take())
+            if repeat.due_us <= self.now_us:
+                self._end.send(self.now_us, repeat.take())
 
     def _check_open(self) -> None:
         if self._closed:

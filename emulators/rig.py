@@ -29,6 +29,20 @@ class Joint(Protocol):
         """Hand out what has arrived."""
 
 
+class Host(Protocol):
+    """An end of a wire at which no station is, but somebody who waits."""
+
+    @property
+    def wire(self) -> Wire:
+        """The wire it is an end of."""
+        ...
+
+    @property
+    def arrived_us(self) -> int:
+        """When what waits there had arrived, `NEVER` if nothing does."""
+        ...
+
+
 class Station(Generic[W]):
     """A device on a port.
 
@@ -105,9 +119,13 @@ class Rig:
         if not isinstance(port, WirePort):
             return False
         port.attach(station.device, wake)
-        if port.wire not in self._wires:
-            self._wires += (port.wire,)
+        self.move_on(port.wire)
         return True
+
+    def move_on(self, wire: Wire) -> None:
+        """Let a wire go on with the rig; one with stations does so anyway."""
+        if wire not in self._wires:
+            self._wires += (wire,)
 
     @property
     def next_us(self) -> int:
@@ -120,11 +138,13 @@ class Rig:
         if (next_us := self.next_us) != NEVER:
             self._run(next_us)
 
-    def run_to(self, t_us: int) -> None:
-        """Step through all that happens up to and at `t_us`."""
+    def run_to(self, t_us: int, host: Host | None = None) -> None:
+        """Step through all that happens up to and at `t_us`, or until something is at a host."""
         self._look()
-        while (next_us := self._go_on(t_us)) <= t_us:
+        while (next_us := self._go_on(t_us, host)) <= t_us:
             self._run(next_us)
+            if host is not None and host.arrived_us <= next_us:
+                return
         for wire in self._wires:
             wire.advance(t_us)
         self._idle_to(t_us)
@@ -134,13 +154,15 @@ class Rig:
         self.run_to(self.now_us + duration_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int) -> bool:
-        """Step until `done()`; False if `timeout_us` passed first."""
+        """Step until `done()`, which only looks; False if `timeout_us` passed first."""
         deadline_us = self.now_us + timeout_us
+        self._look()
         while not done():
-            if self.next_us > deadline_us:
+            next_us = min(self._planned_us, self._wires_due_us)
+            if next_us > deadline_us:
                 self._idle_to(deadline_us)
                 return done()
-            self.step()
+            self._run(next_us)
         return True
 
     def _look(self) -> None:
@@ -173,12 +195,14 @@ class Rig:
     def _wires_due_us(self) -> int:
         return min((wire.due_us for wire in self._wires), default=NEVER)
 
-    def _go_on(self, until_us: int) -> int:
-        """Let frames end up to the next tick with work, and return that."""
+    def _go_on(self, until_us: int, host: Host | None) -> int:
+        """Let frames end up to the next tick with work, or one at a host; return its time."""
         while True:
             next_us = self._planned_us
             if not self._wires:
                 return next_us
+            if host is not None and host.arrived_us < next_us:
+                return max(self.now_us, host.arrived_us)
             limit_us = min(next_us - 1, until_us)
             if len(self._wires) > 1:  # what ends on one may let a station send on another
                 limit_us = min(limit_us, self._wires_due_us)
