@@ -75,6 +75,17 @@ def test_a_heartbeat_time_set_from_the_inside_counts_from_the_next_tick() -> Non
 def test_an_unconfigured_node_sends_no_heartbeat() -> None:
     bus = Bus(make_slave(make_bus(heartbeat_ms=10).slave.dictionary.copy(), UNCONFIGURED))
     assert bus.run(100) == []
+    bus.slave.dictionary[0x1017, 0].value = 20
+    assert bus.run(100) == []
+
+
+def test_changes_of_state_are_told() -> None:
+    bus, told = make_bus(), list[tuple[NmtState, NmtState]]()
+    bus.slave.on_state.append(lambda old, new: told.append((old, new)))
+    bus.step("000#0105")
+    bus.step("000#0105")
+    pre_operational = (NmtState.INITIALISING, NmtState.PRE_OPERATIONAL)
+    assert told == [pre_operational, (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)]
 
 
 def test_reset_communication_keeps_the_application() -> None:
