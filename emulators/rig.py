@@ -238,13 +238,16 @@ class Rig:
             received = station.port.poll(now_us)
             if received or self._dense or station.device.due_us <= now_us:
                 sent.append((station.port, station.device.tick(now_us, received)))
-        woken = self._timetable.take(now_us)
+        woken, enter = self._timetable.take(now_us), self._timetable.enter
         self._open_us = now_us + 1
         for station in woken:
-            received = station.port.poll(now_us)
-            device = station.device
+            device, port = station.device, station.port
+            received = port.poll(now_us)
             if received or device.due_us <= now_us:
-                sent.append((station.port, device.tick(now_us, received)))
-            self._enter(station, device.due_us)
+                sent.append((port, device.tick(now_us, received)))
+            if (due_us := device.due_us) < NEVER:
+                tick_us = station.tick_us
+                first_us = now_us + tick_us
+                enter(station, -(-due_us // tick_us) * tick_us if due_us > first_us else first_us)
         for port, traffic in sent:
             port.send(now_us, traffic)
