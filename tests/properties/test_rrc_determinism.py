@@ -33,7 +33,7 @@ Act = tuple[int, bytes | tuple[str, int]]
 """How long to wait in microseconds, then bytes to send or an input to set."""
 
 inputs = st.sampled_from([item for item in INPUTS if item.name != "rrc_power"]).flatmap(
-    lambda item: st.tuples(st.just(item.name), st.integers(item.low, min(item.high, 100)))
+    lambda item: st.tuples(st.just(item.name), st.integers(int(item.low), int(min(item.high, 100))))
 )
 waits = st.sampled_from([0, 1, 3_000, 10_000, 25_000, 100_000, 310_000, 1_500_000])
 acts = st.lists(st.tuples(waits, st.sampled_from(LINES) | inputs), max_size=40)
