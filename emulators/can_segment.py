@@ -89,7 +89,7 @@ class CanSegment:
         """Let everything end that ends by `now_us`."""
         while self.advance_until_heard(now_us):
             pass
-        self.now_us = now_us
+        self.now_us = max(self.now_us, now_us)
 
     def advance_until_heard(self, until_us: int) -> bool:
         """Let everything end up to the first frame that wakes a station; False if none did."""
