@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tickrig.device.core import NEVER
 from tickrig.emulators.can_bridge import CanBridge
-from tickrig.emulators.can_end import CanEnd
+from tickrig.emulators.can_end import Accepted, CanEnd
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.clock import Clock
@@ -16,13 +16,15 @@ from tickrig.emulators.trace import Mark
 from tickrig.emulators.without_echo import CountingPort
 from tickrig.emulators.workbench import Workbench
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
 
 
 class CanEmulator(Workbench):
     """Devices, their bus, their operator, and a rig that runs them.
 
     One more end of the bus belongs to the caller: what it sends is heard by all
-    devices and by the bus outside, and it hears all.
+    devices and by the bus outside, and it hears all. The bus outside, or in its
+    stead an end that only acknowledges, sees to it that the caller is never alone.
 
     Args:
         name: what the devices are called.
@@ -51,11 +53,19 @@ class CanEmulator(Workbench):
         self._wire, self._outside, self._trace = wire, outside, trace
         self._ends = [station.port for station in stations]
         self._host = self._open_end()
-        bridges = [CanBridge(self._open_end(), outside)] if outside else []
+        beyond = self._open_end(None if outside else frozenset())
+        bridges = [CanBridge(beyond, outside)] if outside else []
         self.rig = Rig(*stations, bridges=bridges, clock=clock)
 
-    def _open_end(self) -> CanEnd:
-        end = self._wire.end()
+    def _open_end(self, accepts: Accepted = None) -> CanEnd:
+        """Connect an end that comes back from bus-off at once."""
+        end = self._wire.end(accepts)
+
+        def recover(at_us: int, state: ErrorState) -> None:
+            if state is ErrorState.BUS_OFF:
+                end.recover(at_us)
+
+        end.on_error_state = recover
         self._ends.append(end)
         return end
 

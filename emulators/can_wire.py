@@ -117,6 +117,16 @@ class CanWire:
             apart.leave(end, self.bus.now_us)
             self.bus.join(end, self.bus.now_us)
 
+    def cut_power(self, end: CanEnd) -> None:
+        """Take a node off the bus: what it had to send is lost, its controller begins anew."""
+        self.disconnect(end)
+        apart, now_us = self._apart[end.number], self.bus.now_us
+        apart.leave(end, now_us)
+        end.queue.clear()
+        end.controller.restart()
+        end.open(on_bus=True)
+        apart.join(end, now_us)
+
     def _fault_changed(self, name: str, armed: bool) -> None:
         now_us = self.bus.now_us
         if name == "short":

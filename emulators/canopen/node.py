@@ -146,7 +146,7 @@ class Node:
 
     def _switch(self, off: int) -> None:
         if off:
-            self._wire.disconnect(self.port)
+            self._wire.cut_power(self.port)
         elif not self._on:
             self.slave.reset()
         self._on, self._ticked = not off, self._ticked and not off

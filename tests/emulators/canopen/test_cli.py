@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.emulators.canopen.cli import main
+
+ROOT = Path(__file__).parents[3]
+EDS = "tests/golden/canopen/r1.eds"
+DCF = "tests/emulators/canopen/sample.dcf"
+PROGRAM = "from tickrig.emulators.canopen.cli import main; main(prog_name='canopen-slave-emu')"
+
+
+@pytest.fixture(autouse=True)
+def at_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+
+
+def run(*words: str | Path, text: str | None = None) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words], input=text)
+
+
+def play(scenario: str, *words: str | Path) -> Result:
+    nodes = words or ("--eds", EDS, "--node-id", "5")
+    return run(*nodes, "--scenario", "-", text=scenario)
+
+
+def frames(result: Result) -> list[str]:
+    return re.findall(r"^\(\d{10}\.\d{6}\) \S+ (\S+)$", result.stdout, re.MULTILINE)
+
+
+def test_the_example_of_the_page_prints_what_it_says(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "canopen-slave-emu.md").read_text("utf-8")
+    scenario, log = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "start.txt").write_text(scenario)
+    result = run("--eds", EDS, "--node-id", "5", "--scenario", tmp_path / "start.txt")
+    assert (result.exit_code, result.stdout) == (0, log)
+
+
+def test_the_log_does_not_depend_on_the_process() -> None:
+    words = ["--node", f"1-9={EDS}", "--fault", "corrupt=0.1", "--fault", "3/power_off@20ms-40ms"]
+    scenario = "20ms send 000#0100\n+0s set 4/0x1017 10\n60ms fault duplicate=0.5\n100ms end\n"
+    logs = {
+        subprocess.run(
+            [sys.executable, "-c", PROGRAM, *words, "--scenario", "-"],
+            input=scenario.encode(),
+            env={"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "src")},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for seed in ("0", "1")
+    }
+    assert len(logs) == 1
+    assert len(logs.pop().splitlines()) > 40
+
+
+def test_a_missed_expectation_and_a_refused_value_fail_the_run() -> None:
+    result = play("10ms expect 585#* within 5ms\n20ms end\n")
+    assert result.exit_code == 1
+    assert "0.015000 ? -:1: no line '585#*' within 5 ms of 0.010000\n" in result.stderr
+    assert "expectations met: 0; missed: 1" in result.stderr
+    refused = play("10ms set 0x1014 0x00000601\n20ms end\n")
+    assert refused.exit_code == 1
+    assert "0.010000 ? -:1: 0x1014 1537: refused" in refused.stderr
+
+
+def test_touches_and_watched_things_are_told_beside_the_log() -> None:
+    result = play("10ms watch 0x6200:1 state\n20ms send 000#0105\n30ms send 205#1100\n40ms end\n")
+    assert "0.001000 * state Pre-operational\n" in result.stderr
+    assert "* 0x6200:1 17\n" in result.stderr
+    assert frames(result)[:2] == ["705#00", "000#0105"]
+
+
+def test_states_are_told_with_v() -> None:
+    result = play("20ms send 000#0100\n30ms end\n", "--node", f"5-6={EDS}", "-v")
+    for name in ("5/state", "6/state"):
+        assert f"* {name} Operational\n" in result.stderr
+
+
+def test_a_dcf_gives_the_node_id() -> None:
+    result = play("10ms end\n", "--dcf", DCF)
+    assert frames(result)[0].endswith("#00")
+    assert frames(play("10ms end\n", "--node", DCF)) == frames(result)
+    assert frames(play("10ms end\n", "--dcf", DCF, "--node-id", "7")) == ["707#00"]
+
+
+def test_a_rig_file_names_the_nodes(tmp_path: Path) -> None:
+    eds = ROOT / EDS
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        f'[[node]]\nid = 5\neds = "{eds}"\n[[node]]\nid = "7-8"\neds = "{eds}"\n'
+        f'[[node]]\nid = "lss"\neds = "{eds}"\n[[node]]\neds = "{ROOT / DCF}"\n'
+    )
+    result = play("10ms end\n", "--rig", rig)
+    assert {"705#00", "707#00", "708#00"} < set(frames(result))
+    assert len(frames(result)) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("node = 5", "it consists of tables [[node]]"),
+        ("", "it consists of tables [[node]]"),
+        ("[nodes]", "it consists of tables [[node]], not [nodes]"),
+        ("[[node]]\nid = 1\nedds = 'x'", "node 1: its keys are id and eds"),
+        ("[[node]]\nid = 1", "node 1: eds is the name of an EDS or DCF file"),
+        ("[[node]]\nid = 0\neds = 'x'", "node 1: id 0: a node-ID is 1..127"),
+        ("[[node", "rig.toml: "),
+    ],
+)
+def test_a_wrong_rig_file_is_one_line(tmp_path: Path, text: str, error: str) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(text)
+    result = play("10ms end\n", "--rig", rig)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert error in result.stderr
+
+
+def test_what_is_stored_outlives_the_run(tmp_path: Path) -> None:
+    store = tmp_path / "store.json"
+    words = ("--eds", EDS, "--node-id", "5", "--store", store)
+    save = "10ms send 605#2B17100064000000\n20ms send 605#2310100173617665\n40ms end\n"
+    assert "585#6010100100000000" in frames(play(save, *words))
+    assert json.loads(store.read_bytes())["nodes"]["5"]["parameters"]["1017:00"] == "6400"
+    assert frames(play("250ms end\n", *words)) == ["705#00", "705#7F", "705#7F"]
+
+
+def test_a_store_that_cannot_be_written_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    store = tmp_path / "gone" / "store.json"
+    save = "10ms send 605#2310100173617665\n+20ms send 605#2310100173617665\n50ms end\n"
+    assert play(save, "--eds", EDS, "--node-id", "5", "--store", store).exit_code == 0
+    assert [record.getMessage().split(": ", 1)[1] for record in caplog.records] == [
+        "No such file or directory; the emulator goes on"
+    ]
+
+
+def test_the_trace_is_the_log(tmp_path: Path) -> None:
+    trace = tmp_path / "bus.log"
+    result = play("20ms end\n", "--eds", EDS, "--node-id", "5", "--trace", trace)
+    assert trace.read_text("ascii") == result.stdout
+
+
+def test_lss_finds_a_node_without_node_id() -> None:
+    result = play("10ms send 7E5#4C00000000000000\n20ms end\n", "--eds", EDS, "--node-id", "lss")
+    assert frames(result) == ["7E5#4C00000000000000", "7E4#5000000000000000"]
+    result = play("10ms end\n", "--node", f"lss={EDS}", "--node", f"lss={EDS}", "-v")
+    assert "* lss2/state Initialising\n" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ("", "no node: give --eds FILE --node-id N, --node N=FILE or --rig FILE"),
+        ("--node-id 5", "--node-id belongs to --eds or --dcf; with --node write N=FILE"),
+        (f"--eds {EDS} --dcf {DCF}", "--eds and --dcf name the same thing: give one of them"),
+        (f"--eds {EDS}", f"{EDS} gives no node-ID: add --node-id 1..127, or --node-id lss"),
+        (f"--eds {EDS} --node-id 128", "--node-id: a node-ID is 1..127, a range as 1-20, or lss"),
+        (f"--eds {EDS} --node-id five", "--node-id: a node-ID is 1..127"),
+        (f"--node 9-5={EDS}", f"--node 9-5={EDS}: a node-ID is 1..127"),
+        ("--node 5=", "--node 5=: give ID=FILE, as 5=a.eds"),
+        (f"--node 5={EDS} --node 4-6={EDS}", f"node 5 is there twice: {EDS}, {EDS}"),
+        ("--eds nowhere.eds --node-id 5", "file nowhere.eds: No such file or directory"),
+        ("--rig nowhere.toml", "rig nowhere.toml: No such file or directory"),
+        ("--eds README.md --node-id 5", "README.md: "),
+        (f"--node 5={EDS} -b 5", "bit rate 5 is not in 10000..1000000 bit/s"),
+        (f"--node 5={EDS} --fault fire", "no fault 'fire'; known: drop, corrupt"),
+        (f"--node 5={EDS} --fault drop", "drop wants a rate above 0 and up to 1"),
+        (f"--node 5={EDS} --store README.md", "store README.md: not a store file"),
+        (f"--node 5={EDS} --store .", "store .: Is a directory"),
+        (f"--node 5={EDS} --trace /nowhere/x", "trace /nowhere/x: No such file or directory"),
+    ],
+)
+def test_a_users_mistake_is_one_line_and_status_2(words: str, error: str) -> None:
+    result = run(*words.split(), "--scenario", "-", text="10ms end\n")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1), result.stderr
+    assert result.stderr.startswith(f"Error: {error}")
+
+
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [
+        ("send 705", "-:1: '705' is not a frame like 705#7F"),
+        ("raw 00", "-:1: no action 'raw'; known: send, set, press"),
+        ("set 0x5000 1", "-:1: no input '0x5000'; known: power_off"),
+        ("set 0x6000:1 256", "-:1: 0x6000:1 256 is not in 0..255"),
+        ("press 0x6000:1", "-:1: no button '0x6000:1'; known: none"),
+        ("watch smell", "-:1: no output 'smell'; known: state, node_id, can_state"),
+    ],
+)
+def test_a_wrong_line_of_a_scenario_says_where(line: str, error: str) -> None:
+    result = play(f"1ms {line}\n")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"Error: {error}")
+
+
+def test_without_a_bus_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("can.util.CONFIG_FILES", [])
+    for name in ("CAN_INTERFACE", "CAN_CHANNEL", "CAN_CONFIG"):
+        monkeypatch.delenv(name, raising=False)
+    result = run("--eds", EDS, "--node-id", "5")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "give -i INTERFACE -c CHANNEL" in result.stderr
+
+
+def test_it_tells_its_version_and_its_options() -> None:
+    assert re.fullmatch(r"\S+ \(tickrig\) \S+\n", run("--version").stdout)
+    told = run("--help").stdout
+    for option in ("--eds", "--bus-kwargs", "--store", "--control", "-b, --bitrate"):
+        assert option in told
+
+
+def test_many_values_follow_one_option() -> None:
+    result = run(
+        *("--eds", EDS, "--node-id", "5", "-i", "virtual"),
+        *("--bus-kwargs", "a=1", "b", "--control", "/nowhere/x"),
+    )
+    assert result.stderr == "Error: --bus-kwargs 'b' is not KEY=VALUE\n"
+
+
+def test_the_shell_completes_its_options() -> None:
+    result = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env={
+            "PYTHONPATH": str(ROOT / "src"),
+            "_CANOPEN_SLAVE_EMU_COMPLETE": "bash_complete",
+            "COMP_WORDS": "canopen-slave-emu --st",
+            "COMP_CWORD": "1",
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert result.stdout == "plain,--store\n"
