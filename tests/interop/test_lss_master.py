@@ -33,7 +33,10 @@ def test_fastscan_finds_it_and_gives_it_a_node_id_that_it_keeps(
     lss.RESPONSE_TIMEOUT = 0.4
     with running(bus, *options) as slave:
         assert slave.get("node_id") == 255
-        found, values = lss.fast_scan()
+        for _ in range(3):  # a bit whose answer is late counts as not answered
+            found, values = lss.fast_scan()
+            if found:
+                break
         assert found
         assert list(values) == identity()
         lss.configure_node_id(NODE_ID)
