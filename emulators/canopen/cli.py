@@ -53,7 +53,7 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
 
     \b
     canopen-slave-emu --eds motor.eds --node-id 5 -i socketcan -c vcan0
-    canopen-slave-emu --node 5=a.eds --node 6=b.eds -i udp_multicast -c 239.0.0.1
+    canopen-slave-emu --node 5=a.eds --node 6=b.eds -i udp_multicast -c ff11::1
     canopen-slave-emu --eds motor.eds --node-id lss --store memory.json -c can0 -i socketcan
     canopen-slave-emu --eds motor.eds --node-id 5 --scenario start.txt > run.log
 

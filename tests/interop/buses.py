@@ -11,7 +11,7 @@ from typing import Any
 import can
 
 VCAN = "vcan0"
-GROUP = "239.74.163.2"
+GROUP = "ff11::7469:636b"  # of interface-local scope: what is sent never leaves this machine
 PORT = 20_000 + os.getpid() % 20_000  # so that two runs beside each other do not meet
 
 NO_SOCKETCAN = (
