@@ -115,6 +115,10 @@ class InputBank:
             raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
         return value
 
+    def names(self, kind: Kind) -> tuple[str, ...]:
+        """Return the names of all inputs of a kind."""
+        return tuple(item.name for item in self.table.values() if item.kind is kind)
+
     def find(self, name: str, kind: Kind | None = None) -> Input:
         """Return the description of an input.
 
@@ -124,6 +128,6 @@ class InputBank:
         item = self.table.get(name)
         if item is None or kind not in (None, item.kind):
             wanted = kind.value if kind else "input"
-            known = [i.name for i in self.table.values() if kind in (None, i.kind)]
+            known = self.names(kind) if kind else tuple(self.table)
             raise ValueError(f"no {wanted} {name!r}; known: {', '.join(known) or 'none'}")
         return item

@@ -40,6 +40,10 @@ class Inputs(Protocol):
         """Return the value that it would be set to, or raise as `set` would."""
         ...
 
+    def names(self, kind: Kind) -> tuple[str, ...]:
+        """Return the names of all inputs of a kind."""
+        ...
+
     def find(self, name: str, kind: Kind | None = None) -> Input:
         """Return the description of an input; ValueError if there is none of the kind."""
         ...

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from functools import cached_property
 from typing import Final, Protocol
 
 from tickrig.device.core import NEVER
@@ -161,11 +160,7 @@ class Operator:
     @property
     def faults(self) -> tuple[str, ...]:
         """Names of all faults there are, of the wire and of the device."""
-        return (*self._wire.kinds, *self._physical_faults)
-
-    @cached_property
-    def _physical_faults(self) -> tuple[str, ...]:
-        return tuple(i.name for i in self._inputs.table.values() if i.kind is Kind.FAULT)
+        return (*self._wire.kinds, *self._inputs.names(Kind.FAULT))
 
     @property
     def active_faults(self) -> tuple[str, ...]:

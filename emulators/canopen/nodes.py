@@ -96,12 +96,20 @@ class NodeInputs:
         item = self.table.get(name)
         if item is None or kind not in (None, item.kind):
             wanted = kind.value if kind else "input"
-            raise ValueError(f"no {wanted} {name!r}; known: {self._known(kind)}")
+            names = self.names(kind) if kind else self.table
+            raise ValueError(f"no {wanted} {name!r}; known: {known(names) or 'none'}")
         return item
 
-    def _known(self, kind: Kind | None) -> str:
-        names = (name for name in self.table if kind in (None, self.table[name].kind))
-        return known(names) or "none"
+    def names(self, kind: Kind) -> tuple[str, ...]:
+        """Return the names of all inputs of a kind; objects are levels and texts."""
+        if kind in (Kind.BUTTON, Kind.FAULT):
+            return tuple(
+                self._nodes.full_name(node, name)
+                for node in self._nodes.nodes
+                for name, touch in node.physical.items()
+                if touch.item.kind is kind
+            )
+        return tuple(name for name in self.table if self.table[name].kind is kind)
 
     def _touch(self, name: str) -> Touch:
         node, rest = self._nodes.find(name)

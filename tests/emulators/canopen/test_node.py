@@ -167,6 +167,8 @@ def test_an_input_is_found_by_its_kind() -> None:
     assert inputs.find("power_off", Kind.FAULT).text == "its supply is cut"
     with pytest.raises(ValueError, match="no button '0x1017'; known: none"):
         inputs.find("0x1017", Kind.BUTTON)
+    assert "0x6000:1" in inputs.names(Kind.LEVEL)
+    assert "0x1008" in inputs.names(Kind.TEXT)
     with pytest.raises(ValueError, match="no input 'x'; known: power_off"):
         inputs.find("x")
     for name, value in (("power_off", 2), ("power_off", "x"), ("emergency", -1)):
