@@ -5,8 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.hil.rig_file import RIG, BadRigFile, read_rig_file
+
+# How long an example takes says something about the machine, not about the code.
+settings.register_profile("tickrig", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tickrig")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
