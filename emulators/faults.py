@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic
 
 from tickrig.device.core import W
-from tickrig.emulators.chance import Chance, threshold_of
+from tickrig.emulators.chance import Chance, check_rate, threshold_of
 from tickrig.emulators.port import Port
 
 Fault = Callable[[int, W], W]
@@ -54,12 +54,7 @@ class FaultyPort(Generic[W]):
 
     def check(self, name: str, rate: float | None) -> None:
         """Raise ValueError unless the fault can be armed like this."""
-        rated = self.kinds[name].rated
-        if rated and (rate is None or not 0 < rate <= 1):
-            came = "no rate" if rate is None else f"{rate:g}"
-            raise ValueError(f"{name} wants a rate above 0 and up to 1, as {name}=0.01; got {came}")
-        if not rated and rate is not None:
-            raise ValueError(f"{name} takes no rate, got {rate:g}")
+        check_rate(name, rate, rated=self.kinds[name].rated)
 
     def arm(self, name: str, rate: float | None = None) -> None:
         """Let a fault begin; one of the same name is replaced.
