@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 
 class Kind(Enum):
@@ -51,24 +50,6 @@ class Output:
     name: str
     text: str
     unit: str = ""
-
-
-class Physical(Protocol):
-    """A device that can be touched and looked at between ticks."""
-
-    @property
-    def inputs(self) -> InputBank:
-        """What the world does to the device."""
-        ...
-
-    @property
-    def outputs(self) -> Mapping[str, Output]:
-        """What the world sees of the device."""
-        ...
-
-    def read(self, name: str, /) -> int | str:
-        """Return the present value of one output; KeyError if there is none."""
-        ...
 
 
 class InputBank:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from tickrig.device.canopen.slave import UNCONFIGURED, CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.core import NEVER
 from tickrig.device.physical import Input, Kind, Output
 from tickrig.emulators.can_wire import CanWire
@@ -132,11 +132,6 @@ class Node:
             case "can_state":
                 return ERROR_STATE_NAMES[self.port.controller.state]
         raise KeyError(name)
-
-    @property
-    def waits_for_lss(self) -> bool:
-        """Whether it has no node-ID."""
-        return self.slave.node_id == UNCONFIGURED
 
     def _catch_up(self, now_us: int) -> None:
         """Let what was done since the last tick take effect."""

@@ -14,9 +14,6 @@ from typing import Final, NamedTuple
 
 from tickrig.wire.errors import FramingError
 
-EMCY_COB_ID: Final = 0x080
-"""The EMCY of node n is on this plus n unless 1014h says otherwise."""
-
 TEXT_BYTES: Final = 5
 
 _LAYOUT: Final = struct.Struct("<HB5s")
