@@ -6,9 +6,10 @@ nothing else reaches into a device.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 
 
 class Kind(Enum):
@@ -32,6 +33,7 @@ class Input:
         high: largest value.
         unit: unit of the value, empty for a plain number.
         initial: value at the start of the rig.
+        real: takes fractions.
     """
 
     name: str
@@ -40,7 +42,8 @@ class Input:
     low: float = 0
     high: float = 1
     unit: str = ""
-    initial: int = 0
+    initial: float = 0
+    real: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,28 +55,35 @@ class Output:
     unit: str = ""
 
 
-class InputBank:
-    """The values of a device's physical inputs.
+class QuantityBank:
+    """The values of a device's physical inputs: whole numbers, and fractions where they are real.
 
     A change takes effect at the device's next tick.
 
+    Args:
+        table: the inputs.
+        groups: names of several inputs that are set together, as `stick`.
+        touched: called after each change.
+
     Attributes:
         table: the inputs by name, in order of declaration.
-        groups: names of several inputs that are set together, as `stick`.
         changed: whether anything was set since the device last looked.
     """
 
-    __slots__ = ("_values", "changed", "groups", "table")
+    __slots__ = ("_touched", "_values", "changed", "groups", "table")
 
     def __init__(
-        self, table: Iterable[Input], groups: Mapping[str, tuple[str, ...]] | None = None
+        self,
+        table: Iterable[Input] = (),
+        groups: Mapping[str, tuple[str, ...]] | None = None,
+        touched: Callable[[], None] | None = None,
     ) -> None:
         self.table: Mapping[str, Input] = {item.name: item for item in table}
         self.groups: Mapping[str, tuple[str, ...]] = dict(groups or {})
         self._values = {name: item.initial for name, item in self.table.items()}
-        self.changed = True
+        self._touched, self.changed = touched, True
 
-    def __getitem__(self, name: str) -> int:
+    def __getitem__(self, name: str) -> float:
         """Return the present value of an input."""
         return self._values[name]
 
@@ -81,16 +91,21 @@ class InputBank:
         """Set an input.
 
         Raises:
-            ValueError: no such input, no whole number, or one out of its range.
+            ValueError: no such input, no number of its kind, or one out of its range.
         """
         self._values[name] = self.check(name, value)
         self.changed = True
+        if self._touched is not None:
+            self._touched()
 
-    def check(self, name: str, value: float | str) -> int:
+    def check(self, name: str, value: float | str) -> float:
         """Return the value that the input would be set to, or raise as `set` does."""
         item = self.find(name)
-        if not isinstance(value, int) or isinstance(value, bool):
-            raise ValueError(f"{name} takes a whole number, not {value!r}")
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        fraction = item.real and isinstance(value, float) and isfinite(value)
+        if isinstance(value, str) or not (whole or fraction):
+            kind = "number" if item.real else "whole number"
+            raise ValueError(f"{name} takes a {kind}, not {value!r}")
         if not item.low <= value <= item.high:
             unit = f" {item.unit}" if item.unit else ""
             raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
@@ -112,3 +127,13 @@ class InputBank:
             known = self.names(kind) if kind else tuple(self.table)
             raise ValueError(f"no {wanted} {name!r}; known: {', '.join(known) or 'none'}")
         return item
+
+
+class InputBank(QuantityBank):
+    """The values of a device whose inputs are all whole numbers."""
+
+    __slots__ = ()
+
+    def __getitem__(self, name: str) -> int:
+        """Return the present value of an input."""
+        return int(self._values[name])

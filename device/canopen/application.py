@@ -2,21 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.service import Service
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.physical import Input, Output, QuantityBank
 
 
 class Application(Service):
     """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
 
     By itself it does nothing. A device profile overrides `on_execute`, which is
-    called in the ticks that it asks for: by `request`, by `schedule`, and when one
-    of its `inputs` has changed. It hears of NMT states (`state_changed`), of resets
-    (`start`), of lost masters (`communication_error`) and, if it enters itself in
-    `node.on_sync`, of each SYNC; it tells errors by `node.emergency`.
+    called in the ticks that it asks for: by `request`, by `schedule`, when one
+    of its watched objects has changed, and when a physical input was set. It
+    hears of NMT states (`state_changed`), of resets (`start`), of lost masters
+    (`communication_error`) and, if it enters itself in `node.on_sync`, of each
+    SYNC; it tells errors by `node.emergency`.
+
+    Attributes:
+        inputs: what the world does to the device: `has_inputs` makes them.
+        outputs: what the world sees of it; `read` gives the values.
     """
+
+    outputs: Mapping[str, Output] = MappingProxyType({})
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.inputs = QuantityBank()
+
+    def has_inputs(
+        self, table: Iterable[Input], groups: Mapping[str, tuple[str, ...]] | None = None
+    ) -> None:
+        """Give it physical inputs; setting one asks for `on_execute`."""
+        self.inputs = QuantityBank(table, groups, self.request)
+
+    def read(self, name: str) -> float | str:
+        """Return the present value of a physical output; KeyError if there is none."""
+        raise KeyError(name)
 
     def on_execute(self, now_us: int) -> None:
         """Read inputs, work, write outputs."""
