@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.core import NEVER
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Output
 from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.canopen.touch import (
-    Later,
-    ObjectTouch,
-    Touch,
-    find_object,
-    object_name,
-)
+from tickrig.emulators.canopen.node_inputs import Emergency, Quantity, Switch
+from tickrig.emulators.canopen.touch import ObjectTouch, Touch, find_object, object_name
 from tickrig.emulators.setting import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
@@ -40,14 +36,9 @@ NODE_OUTPUTS: Final = (
     Output("can_state", "fault confinement of its CAN controller"),
 )
 
-ERROR_BITS: Final = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08}
-"""Bit of the error register by the first digit of an emergency error code (CiA 301)."""
-
-COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
-
 
 class Node:
-    """A `Device[Frames]` around a slave.
+    """A `Device[Frames]` around a slave, with the physical side of its application.
 
     Without power it neither sends nor hears, and begins anew when power is back.
     What is done to it from the inside, and what its CAN controller reports,
@@ -62,19 +53,30 @@ class Node:
         wire: its bus.
 
     Attributes:
+        application: what the device does with its objects.
         port: its end of the bus.
+        physical: what the world does to it, by name.
+        groups: names of several of these that are set together.
+        outputs: what the world sees of it, by name.
     """
 
     def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
-        self.name, self.slave = name, slave
+        self.name, self.slave, self.application = name, slave, Application.of(slave)
         self.port = wire.end()
         self.port.on_error_state = self._error_state_changed
         self._wire, self._on, self._ticked = wire, True, False
         self._pending: list[Callable[[], None]] = []
+        bank = self.application.inputs
         self.physical: Mapping[str, Touch] = {
-            "power_off": _Switch("power_off", "its supply is cut", self._switch),
-            "unplugged": _Switch("unplugged", "its CAN plug is pulled", self._plug),
-            "emergency": _Emergency(slave, self._pending.append),
+            "power_off": Switch("power_off", "its supply is cut", self._switch),
+            "unplugged": Switch("unplugged", "its CAN plug is pulled", self._plug),
+            "emergency": Emergency(slave, self._pending.append),
+            **{name: Quantity(bank, item) for name, item in bank.table.items()},
+        }
+        self.groups = bank.groups
+        self.outputs: Mapping[str, Output] = {
+            **{item.name: item for item in NODE_OUTPUTS},
+            **self.application.outputs,
         }
 
     @property
@@ -131,7 +133,7 @@ class Node:
                 return self.slave.node_id
             case "can_state":
                 return ERROR_STATE_NAMES[self.port.controller.state]
-        raise KeyError(name)
+        return self.application.read(name)
 
     def _catch_up(self, now_us: int) -> None:
         """Let what was done since the last tick take effect."""
@@ -157,53 +159,3 @@ class Node:
         self._pending.append(lambda: self.slave.bus_state(state))
         if state is ErrorState.BUS_OFF:
             self.port.recover(now_us)
-
-
-class _Switch:
-    """A physical fault."""
-
-    def __init__(self, name: str, text: str, switch: Callable[[int], None]) -> None:
-        self.item = Input(name, text, Kind.FAULT)
-        self._switch, self._value = switch, 0
-
-    def read(self) -> int:
-        return self._value
-
-    def check(self, value: Setting) -> int:
-        if not isinstance(value, int) or value not in (0, 1):
-            raise ValueError(f"{self.item.name} {value!r} is not in 0..1")
-        return int(value)
-
-    def write(self, value: Setting) -> None:
-        self._value = self.check(value)
-        self._switch(self._value)
-
-
-class _Emergency:
-    """An error that the application sees: its emergency error code, 0 when it is gone."""
-
-    def __init__(self, slave: CanopenSlave, later: Later) -> None:
-        text = "error seen by the application: emergency error code, 0 when it is gone"
-        self.item = Input("emergency", text, high=0xFFFF)
-        self._slave, self._later, self._code = slave, later, 0
-
-    def read(self) -> int:
-        return self._code
-
-    def check(self, value: Setting) -> int:
-        if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
-            raise ValueError(f"emergency {value!r} is not in 0..65535")
-        return value
-
-    def write(self, value: Setting) -> None:
-        old, self._code = self._code, self.check(value)
-        if old and old != self._code:
-            self._later(lambda: self._slave.emergency_clear(old))
-        if code := self._code:
-            self._later(lambda: self._slave.emergency(code, _register_bit(code)))
-
-
-def _register_bit(code: int) -> int:
-    if code in COMMUNICATION_ERRORS:
-        return 0x10
-    return ERROR_BITS.get(code >> 12, 0x01)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 
 from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.physical import Input, Kind, Output
-from tickrig.emulators.canopen.node import NODE_OUTPUTS, Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.touch import Touch
 from tickrig.emulators.names import known
 from tickrig.emulators.setting import Setting
@@ -33,7 +32,7 @@ class Nodes:
                 self.full_name(node, item.name), item.text, item.unit
             )
             for node in nodes
-            for item in NODE_OUTPUTS
+            for item in node.outputs.values()
         }
 
     @property
@@ -70,13 +69,17 @@ class NodeInputs:
 
     Attributes:
         table: the inputs by name; a variable may be named with its sub-index too.
+        groups: names of several inputs that are set together.
     """
-
-    groups: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
     def __init__(self, nodes: Nodes) -> None:
         self.changed = False
         self.table: Mapping[str, Input] = _Table(nodes)
+        self.groups: Mapping[str, tuple[str, ...]] = {
+            nodes.full_name(node, name): tuple(nodes.full_name(node, item) for item in members)
+            for node in nodes.nodes
+            for name, members in node.groups.items()
+        }
         self._nodes = nodes
 
     def __getitem__(self, name: str) -> Setting:

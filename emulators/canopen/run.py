@@ -126,7 +126,8 @@ class CanopenRun(EmulatorRun):
             return None
         transcript = FrameTranscript(bench, say)
         if options.verbose:
-            transcript.watch(0, *(name for name in bench.device.outputs if name.endswith("state")))
+            outputs = bench.device.outputs.items()
+            transcript.watch(0, *(name for name, item in outputs if not item.unit))
         return Player(bench, scenario, transcript, stays=options.in_real_time)
 
     def _greet(self, bench: Workbench) -> None:
