@@ -1,0 +1,1 @@
+"""Bodies of mobile robots: what turning wheels do to them."""
