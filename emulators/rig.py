@@ -7,6 +7,7 @@ from typing import Any, Final, Generic, Protocol
 
 from tickrig.device.core import NEVER, Device, W
 from tickrig.emulators.clock import Clock, VirtualClock
+from tickrig.emulators.coupling import Coupling
 from tickrig.emulators.port import Port, Wire, WirePort
 from tickrig.emulators.timetable import Timetable
 
@@ -58,11 +59,7 @@ class Station(Generic[W]):
 
     def wake_us(self, now_us: int) -> int:
         """Return the first tick after `now_us` at which this station has work."""
-        first = now_us - now_us % self.tick_us + self.tick_us
-        due = min(self.device.due_us, self.port.due_us)
-        if due <= first:
-            return first
-        return NEVER if due >= NEVER else -(-due // self.tick_us) * self.tick_us
+        return _next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
 
 
 class Rig:
@@ -81,6 +78,7 @@ class Rig:
     Args:
         stations: the devices, each on its port.
         bridges: joints with the outside world (real time).
+        couplings: what joins the devices beside their wires, in the order in which they act.
         clock: a `VirtualClock` unless given.
         dense: run every tick of every device.
 
@@ -94,14 +92,16 @@ class Rig:
         self,
         *stations: Station[Any],
         bridges: Sequence[Joint] = (),
+        couplings: Sequence[Coupling] = (),
         clock: Clock | None = None,
         dense: bool = False,
     ) -> None:
         self.now_us = self.late_us = self.late_steps = 0
-        self._bridges, self._dense = tuple(bridges), dense
+        self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
         self._jumps = not dense and isinstance(self._clock, VirtualClock)
-        self._periods = tuple(sorted({station.tick_us for station in stations}))
+        periods = {station.tick_us for station in stations}
+        self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
         self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
         self._wires: tuple[Wire, ...] = ()
         attached = [station for station in stations if self._attach(station)]
@@ -186,6 +186,8 @@ class Rig:
         if self._jumps:
             for station in self._looked_at:
                 next_us = min(next_us, station.wake_us(now_us))
+            for coupling in self._couplings:
+                next_us = min(next_us, _next_tick_us(now_us, coupling.due_us, coupling.tick_us))
         else:
             for tick_us in self._periods:
                 next_us = min(next_us, now_us - now_us % tick_us + tick_us)
@@ -226,6 +228,7 @@ class Rig:
         for wire in self._wires:
             wire.advance(now_us)
         self._tick(now_us)
+        self._couple(now_us)
         for bridge in self._bridges:
             bridge.give_out(now_us)
 
@@ -251,3 +254,19 @@ class Rig:
                 enter(station, -(-due_us // tick_us) * tick_us if due_us > first_us else first_us)
         for port, traffic in sent:
             port.send(now_us, traffic)
+
+    def _couple(self, now_us: int) -> None:
+        """Let couplings act, and devices whose inputs they set have work."""
+        acting = [coupling for coupling in self._couplings if now_us % coupling.tick_us == 0]
+        for coupling in acting:
+            coupling.act(now_us)
+        if acting:
+            self._look()
+
+
+def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
+    """Return the first tick after `now_us` that is not before `due_us`."""
+    first_us = now_us - now_us % tick_us + tick_us
+    if due_us <= first_us:
+        return first_us
+    return NEVER if due_us >= NEVER else -(-due_us // tick_us) * tick_us
