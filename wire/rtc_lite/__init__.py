@@ -1,0 +1,1 @@
+"""RTC-Lite: the frames between a proxy component and the small device behind it."""

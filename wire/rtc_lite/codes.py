@@ -1,0 +1,84 @@
+"""The letters of RTC-Lite: commands, status, states, execution contexts, link faults.
+
+The paper (Suzuki et al., RTComponent-Lite-0.4.0, RSJ 2007) names two command
+bytes and no values. The letters are those of RTno wherever it has one
+(DECISION L9).
+"""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+from typing import Final
+
+
+class Command(Enum):
+    """Cmnd0 selects the RTC object, Cmnd1 what it does; request and reply carry the same two."""
+
+    INITIALIZE = b"CI"
+    PROFILE = b"CZ"
+    STATE = b"CX"
+    PING = b"CY"
+    FINALIZE = b"CF"
+    ACTIVATE = b"AA"
+    DEACTIVATE = b"AD"
+    EXECUTE = b"AE"
+    ABORT = b"AB"
+    ERROR = b"AC"
+    RESET = b"AR"
+    STARTUP = b"AS"
+    SHUTDOWN = b"AH"
+    CONTEXT = b"BB"
+    RATE = b"BW"
+    IN_PROFILE = b"PP"
+    WRITE = b"PS"
+    OUT_PROFILE = b"QQ"
+    DATA = b"QV"
+    POLL = b"QG"
+    CHECKSUM_FAULT = b"FH"
+    TIMEOUT_FAULT = b"FK"
+    UNKNOWN_FAULT = b"FU"
+
+
+class LinkFault(IntEnum):
+    """What a receiver says of bytes that are no request (DECISION L7)."""
+
+    TIMEOUT = 1
+    CHECKSUM = 3
+    UNKNOWN = 65
+
+
+FAULT_COMMANDS: Final = {
+    LinkFault.TIMEOUT: Command.TIMEOUT_FAULT,
+    LinkFault.CHECKSUM: Command.CHECKSUM_FAULT,
+    LinkFault.UNKNOWN: Command.UNKNOWN_FAULT,
+}
+"""The frame in which each fault is told."""
+
+
+class Status(IntEnum):
+    """First byte of a reply."""
+
+    OK = ord("@")
+    ERROR = ord("x")  # a callback returned an error
+    WRONG_STATE = ord("H")  # precondition not met
+    NO_IN_PORT = ord("F")
+    NO_OUT_PORT = ord("D")
+    EMPTY = ord("I")  # the out-port holds no new data
+    UNSUPPORTED = ord("!")
+
+
+class State(IntEnum):
+    """Life-cycle state of the component on the device."""
+
+    CREATED = ord("C")
+    INACTIVE = ord("I")
+    ACTIVE = ord("A")
+    ERROR = ord("E")
+    NONE = ord("N")  # finalized
+
+
+class ContextType(IntEnum):
+    """Who makes the component execute."""
+
+    PROXY = 0x21  # the proxy's execution context, one AE a period
+    TIMER = 0x22  # a timer of the device

@@ -1,0 +1,137 @@
+r"""What the data of frames means, beside a single byte.
+
+>>> PortData(b"in", b"\x2a\x00\x00\x00").encode().hex(" ")
+'02 04 69 6e 2a 00 00 00'
+>>> from tickrig.wire.rtc_lite.codes import Command
+>>> parse_reply(Frame(Command.ACTIVATE, b"xE"))
+Reply(status=120, fields=b'E')
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.wire.errors import FieldError, FramingError
+from tickrig.wire.rtc_lite.codes import Status
+from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES
+
+PORT_COUNTS_BYTES: Final = 2
+"""Length of the name and length of the data stand before them."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortData:
+    """Data on its way to an in-port (PS) or from an out-port (QV).
+
+    Attributes:
+        name: of the port, as it was on the wire.
+        data: the marshalled value.
+    """
+
+    name: bytes
+    data: bytes
+
+    def __post_init__(self) -> None:
+        """Refuse what does not fit into a frame."""
+        size = PORT_COUNTS_BYTES + len(self.name) + len(self.data)
+        if size > MAX_DATA_BYTES:
+            raise FieldError(f"name and data make {size} data bytes, {MAX_DATA_BYTES} fit")
+
+    def encode(self) -> bytes:
+        """Write the data of the frame."""
+        return bytes([len(self.name), len(self.data)]) + self.name + self.data
+
+
+@dataclass(frozen=True, slots=True)
+class PortProfile:
+    """A port as the device describes it (PP, QQ).
+
+    Attributes:
+        code: letter of its type; it may be one that nobody knows.
+        name: of the port.
+    """
+
+    code: str
+    name: bytes
+
+    def encode(self) -> bytes:
+        """Write the data of the frame."""
+        return bytes([1 + len(self.name)]) + self.code.encode("latin-1") + self.name
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentProfile:
+    """What follows the ports: how many there were, and the type of the component (CZ).
+
+    Attributes:
+        in_ports: how many PP frames were sent.
+        out_ports: how many QQ frames were sent.
+        type_name: the type of the component.
+    """
+
+    in_ports: int
+    out_ports: int
+    type_name: bytes
+
+    def encode(self) -> bytes:
+        """Write the fields of the reply."""
+        return bytes([self.in_ports, self.out_ports, len(self.type_name)]) + self.type_name
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What a device answers.
+
+    Attributes:
+        status: a `Status`, or a number that nobody knows.
+        fields: what follows it: state, sequence number, context type.
+    """
+
+    status: int
+    fields: bytes = b""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the device did what it was asked for."""
+        return self.status == Status.OK
+
+    def encode(self) -> bytes:
+        """Write the data of the frame."""
+        return bytes([self.status]) + self.fields
+
+
+def parse_port_data(data: bytes) -> PortData:
+    """Read the data of PS or QV; FramingError if its lengths do not fit."""
+    size = 2 + data[0] + data[1] if len(data) >= PORT_COUNTS_BYTES else PORT_COUNTS_BYTES
+    if len(data) != size:
+        raise FramingError(f"{data.hex(' ')} has {len(data)} bytes, {size} were expected")
+    end = PORT_COUNTS_BYTES + data[0]
+    return PortData(data[PORT_COUNTS_BYTES:end], data[end:])
+
+
+def parse_port_profile(data: bytes) -> PortProfile:
+    """Read the data of PP or QQ; FramingError if its length does not fit."""
+    if not data or not 1 <= data[0] == len(data) - 1:
+        raise FramingError(f"{data.hex(' ')} is not a length, a letter and a name")
+    return PortProfile(chr(data[1]), data[2:])
+
+
+def parse_component_profile(fields: bytes) -> ComponentProfile:
+    """Read the fields of the reply to CZ; FramingError if their length does not fit."""
+    if len(fields) < 3 or len(fields) != 3 + fields[2]:
+        raise FramingError(f"{fields.hex(' ')} is not two numbers, a length and a name")
+    return ComponentProfile(fields[0], fields[1], fields[3:])
+
+
+def parse_reply(frame: Frame) -> Reply:
+    """Read the data of a reply.
+
+    Raises:
+        FramingError: a frame that is no reply, or whose length does not fit.
+    """
+    data, layout = frame.data, REPLIES[frame.command]
+    if not data or layout(data) != len(data):
+        raise FramingError(f"{frame.command.value.decode()} {data.hex(' ')} is not a reply")
+    return Reply(data[0], data[1:])
