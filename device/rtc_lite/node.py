@@ -1,0 +1,182 @@
+"""A small device with a component: what it does in each tick of 1 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.device.physical import InputBank, Output
+from tickrig.device.rtc_lite.component import Component
+from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.life_cycle import LifeCycle
+from tickrig.device.rtc_lite.receiver import Receiver
+from tickrig.device.rtc_lite.server import Server
+from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
+from tickrig.device.rtc_lite.timer import Timer
+from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
+from tickrig.wire.rtc_lite.decoder import Decoder
+from tickrig.wire.rtc_lite.frame import Frame, fault_frame
+from tickrig.wire.rtc_lite.layout import REQUESTS
+from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
+
+TICK_US: Final = 1_000
+"""How often the main loop of the device looks at the line; a choice, the paper names none."""
+
+TIMED: Final = (State.ACTIVE, State.ERROR)
+"""States in which the timer of the device runs."""
+
+
+@dataclass(slots=True)
+class RtcLiteNode:
+    """A PIC with an RTC-Lite component (Suzuki et al., RSJ 2007); a `Device[bytes]`.
+
+    In each tick: bytes from the line, time-outs, requests in order, timer. A
+    callback takes effect at once; with a dead time its answer comes late, and
+    until then the node only fills its receive buffer of 64 bytes.
+
+    Not emulated: service ports, configuration sets, the baud rate generator,
+    framing errors of the UART, a watchdog, sleep.
+
+    Args:
+        make: makes the component, at the start and at each power-up.
+        config: framing, execution context, rates.
+
+    Attributes:
+        inputs: what the world does to it, see `terminals.INPUTS`.
+
+    Raises:
+        ValueError: a component that a PIC has no room for.
+    """
+
+    make: Callable[[], Component]
+    config: NodeConfig = field(default_factory=NodeConfig)
+    inputs: InputBank = field(init=False)
+    _on: bool = field(init=False)
+    _life: LifeCycle = field(init=False)
+    _receiver: Receiver = field(init=False)
+    _timer: Timer = field(init=False)
+    _server: Server = field(init=False)
+    _unsent: bytes = field(init=False)
+    _free_us: int = field(init=False)  # when the processor is free again
+
+    def __post_init__(self) -> None:
+        """Begin without power."""
+        self.inputs = new_inputs(self.make())
+        self.reset()
+
+    @property
+    def tick_us(self) -> int:
+        """The period of the main loop."""
+        return TICK_US
+
+    @property
+    def due_us(self) -> int:
+        """When anything would happen without input."""
+        if self.inputs.changed:
+            return 0
+        if not self._on:
+            return NEVER
+        if self._free_us:
+            return self._free_us
+        return min(self._receiver.due_us, self._timer.due_us)
+
+    @property
+    def component(self) -> Component:
+        """The component as it is; a power cut makes a new one."""
+        return self._life.component
+
+    @property
+    def outputs(self) -> dict[str, Output]:
+        """What `read` knows."""
+        return output_table(self.component)
+
+    def reset(self) -> None:
+        """Forget everything but configuration and physical inputs, as a power cut does."""
+        component = self.make()
+        component.inputs = self.inputs
+        rtno = self.config.framing is Framing.RTNO
+        self._life, self._timer = LifeCycle(component), Timer(self.config.rate_hz)
+        self._receiver = Receiver(
+            RtnoDecoder() if rtno else Decoder(REQUESTS, self.config.checksum)
+        )
+        self._server = Server(self._life, self.config.context, self._timer)
+        self._unsent, self._free_us, self._on = b"", 0, False
+        self.inputs.changed = True
+
+    def read(self, name: str, /) -> float | str:
+        """Return one of `outputs` as it was left by the latest tick; KeyError if unknown."""
+        life = self._life
+        own: dict[str, float | str] = {
+            "state": life.state.name.capitalize() if self._on else "Off",
+            "callback": life.latest,
+            "executed": life.executed,
+            "dropped_bytes": self._receiver.dropped,
+        }
+        return own[name] if name in own else port_text(life.component, name)
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        """Run one pass of the main loop."""
+        if self.inputs["power_cut"]:
+            if self._on:
+                self.reset()
+            self.inputs.changed = False
+            return b""
+        self.inputs.changed = False
+        if not self._on:
+            self._boot()
+        sent = self._finish(now_us) if self._free_us <= now_us else b""
+        self._receiver.push(now_us, rx)
+        self._work(now_us)
+        return sent if self._free_us else sent + self._take()
+
+    def _finish(self, now_us: int) -> bytes:
+        """Give out the answer that was due, and look how long the line has been silent."""
+        self._free_us = 0
+        sent = self._take()
+        if self._receiver.expired(now_us):
+            self._send(now_us, [fault_frame(LinkFault.TIMEOUT)])
+        return sent
+
+    def _take(self) -> bytes:
+        sent, self._unsent = self._unsent, b""
+        return sent
+
+    def _boot(self) -> None:
+        """Begin with power; RTno initializes by itself, RTC-Lite is told to (DECISION L11)."""
+        self._on = True
+        if self.config.framing is Framing.RTNO:
+            self._life.obey(Command.INITIALIZE)
+
+    def _work(self, now_us: int) -> None:
+        """Answer requests, then run the timer, while the processor is free."""
+        while not self._free_us and (found := self._receiver.pull()) is not None:
+            calls = self._life.calls
+            if isinstance(found, LinkFault):
+                answer = [fault_frame(found)]
+            else:
+                answer = self._server.answer(found)
+            self._send(now_us, answer, self._life.calls - calls)
+            self._mind_timer(now_us)
+        if not self._free_us and self._timer.elapsed(now_us):
+            calls = self._life.calls
+            self._send(now_us, self._server.execute(), self._life.calls - calls)
+
+    def _mind_timer(self, now_us: int) -> None:
+        """Let the timer run in the states in which it has something to do."""
+        if self.config.context is ContextType.TIMER and self._life.state in TIMED:
+            self._timer.run(now_us)
+        else:
+            self._timer.stop()
+
+    def _send(self, now_us: int, frames: list[Frame], calls: int = 0) -> None:
+        """Send frames, once the processor has done what led to them."""
+        if self.config.framing is Framing.RTNO:
+            self._unsent += b"".join(map(encode_packet, frames))
+        else:
+            self._unsent += b"".join(frame.encode(self.config.checksum) for frame in frames)
+        busy_us = calls * self.inputs["callback_ms"] * 1_000
+        if self.inputs["slow_answer"]:
+            busy_us += self.config.slow_answer_us
+        self._free_us = now_us + busy_us if busy_us else 0

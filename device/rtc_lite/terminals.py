@@ -1,0 +1,61 @@
+"""The physical side of a node: its supply, its processor, and what can be seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.device.rtc_lite.component import Component
+from tickrig.device.rtc_lite.ports import Port
+
+INPUTS: Final = (
+    Input("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
+    Input("power_cut", "the supply is off, and everything is forgotten", Kind.FAULT),
+    Input("slow_answer", "the processor is busy elsewhere: each answer is late", Kind.FAULT),
+)
+"""Every node has these; a component may add its own."""
+
+OUTPUTS: Final = (
+    Output("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
+    Output("callback", "the callback that ran last"),
+    Output("executed", "how often on_execute ran"),
+    Output("dropped_bytes", "bytes that found the receive buffer full"),
+)
+"""Every node has these; each port adds its value."""
+
+
+def new_inputs(component: Component) -> InputBank:
+    """Return the inputs of a node at rest.
+
+    Raises:
+        ValueError: the component has an input of a name that the node has itself.
+    """
+    names = {item.name for item in INPUTS}
+    for item in component.physical:
+        if item.name in names:
+            raise ValueError(f"{type(component).__name__}: two inputs are called {item.name!r}")
+        names.add(item.name)
+    return InputBank((*INPUTS, *component.physical))
+
+
+def output_table(component: Component) -> dict[str, Output]:
+    """Return the outputs of a node: its own, and the ports as `in.NAME` and `out.NAME`."""
+    ports = [
+        *(Output(f"in.{name.decode()}", "value of this in-port") for name in component.in_ports),
+        *(Output(f"out.{name.decode()}", "value of this out-port") for name in component.out_ports),
+    ]
+    return {output.name: output for output in (*OUTPUTS, *ports)}
+
+
+def port_text(component: Component, name: str) -> float | str:
+    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if there is none."""
+    side, _, port = name.partition(".")
+    ports: dict[str, Mapping[bytes, Port[Any]]] = {
+        "in": component.in_ports,
+        "out": component.out_ports,
+    }
+    value = ports[side][port.encode()].value
+    if isinstance(value, tuple):
+        return " ".join(str(+element) for element in value)
+    return int(value) if isinstance(value, bool) else value

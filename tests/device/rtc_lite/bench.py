@@ -1,0 +1,123 @@
+"""A node on the bench, and a component that fails as told and notes what is called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tests.wire.rtc_lite_vectors import raw
+from tickrig.device.rtc_lite.component import ERROR, Component, Result
+from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
+from tickrig.device.rtc_lite.relays import Echo
+from tickrig.wire.rtc_lite.codes import Command
+from tickrig.wire.rtc_lite.frame import Frame
+
+
+class Recorder(Echo):
+    """An echo.
+
+    Attributes:
+        failing: names of the callbacks that return an error.
+        called: names of those that ran.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.failing: set[str] = set()
+        self.called: list[str] = []
+
+    def _note(self, name: str) -> Result:
+        self.called.append(name)
+        return ERROR if name in self.failing else None
+
+    def on_initialize(self) -> Result:
+        return self._note("on_initialize")
+
+    def on_finalize(self) -> Result:
+        return self._note("on_finalize")
+
+    def on_startup(self) -> Result:
+        return self._note("on_startup")
+
+    def on_shutdown(self) -> Result:
+        return self._note("on_shutdown")
+
+    def on_activated(self) -> Result:
+        return self._note("on_activated")
+
+    def on_deactivated(self) -> Result:
+        return self._note("on_deactivated")
+
+    def on_execute(self) -> Result:
+        return self._note("on_execute") or Echo.on_execute(self)
+
+    def on_aborting(self) -> Result:
+        return self._note("on_aborting")
+
+    def on_error(self) -> Result:
+        return self._note("on_error")
+
+    def on_reset(self) -> Result:
+        return self._note("on_reset")
+
+
+class NodeBench:
+    """A node whose ticks are stepped one by one.
+
+    Attributes:
+        node: the device.
+        now_us: time of the latest tick.
+    """
+
+    def __init__(
+        self, make: Callable[[], Component] = Recorder, config: NodeConfig | None = None
+    ) -> None:
+        self.node = RtcLiteNode(make, config or NodeConfig())
+        self.now_us = 0
+
+    @property
+    def recorder(self) -> Recorder:
+        component = self.node.component
+        assert isinstance(component, Recorder)
+        return component
+
+    @property
+    def state(self) -> str:
+        return str(self.node.read("state"))
+
+    def push(self, data: bytes = b"") -> bytes:
+        """Run one tick."""
+        self.now_us += TICK_US
+        return self.node.tick(self.now_us, data)
+
+    def say(self, *frames: str) -> str:
+        """Run one tick with frames in hex, and return the answer in hex."""
+        return self.push(raw(*frames)).hex(" ").upper()
+
+    def ask(self, request: str) -> str:
+        """Run one tick with a request written without header and checksum, as `AE`.
+
+        The answer is written in the same way, frames with a space between them.
+        """
+        data = request.encode("latin-1")
+        sent = self.push(Frame(Command(data[:2]), data[2:]).encode())
+        return " ".join(part[:-1].decode("latin-1") for part in sent.split(b"\n")[1:])
+
+    def run(self, duration_us: int) -> bytes:
+        """Run ticks without input."""
+        return b"".join(self.push() for _ in range(duration_us // TICK_US))
+
+    def enter(self, state: str) -> NodeBench:
+        """Go to a state from power-up on, and forget what was called on the way."""
+        path = {
+            "Created": "CX",
+            "Inactive": "CI",
+            "Active": "CI AA",
+            "Error": "CI AA AB",
+            "None": "CI CF",
+        }
+        for request in path[state].split():
+            self.ask(request)
+        assert self.state == state
+        self.recorder.called.clear()
+        return self
