@@ -1,0 +1,207 @@
+"""A motor with its power stage, gear, load, encoders and control loops."""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import floor, inf
+
+from tickrig.device.servo.loops import Loops
+from tickrig.device.servo.parameters import ServoParameters
+from tickrig.device.servo.plant import Plant
+from tickrig.device.servo.readings import Readings
+from tickrig.device.servo.setting import Setting
+
+STEP_US = 1_000
+SLOW_US = 20_000  # between two looks at heat and overload
+RESISTANCE_STEP = 0.005  # how far the resistance may be off before it is followed
+
+
+class Demand(Enum):
+    """What the drive wants of the motor."""
+
+    NOTHING = "nothing"
+    CURRENT = "current"
+    VELOCITY = "velocity"
+    POSITION = "position"
+
+
+class Servo(Readings):
+    """A motor with power stage, gear, load, encoders and loops, in steps of 1 ms.
+
+    Call `step_to(now_us)` first, then set what the world does and what the
+    drive wants: it holds from that instant. A value that was set already
+    changes nothing, so a drive may repeat itself in each tick. While
+    `resting`, nothing moves and time passes at no cost; the temperatures
+    follow in closed form.
+
+    Not emulated: see `Plant`, `ThermalModel` and `Loops`; the velocity is
+    measured without noise, the supply gives and takes any current.
+
+    Attributes:
+        supply_v: supply of the power stage.
+        load_nm: external torque at the output shaft; positive drives it forward.
+        load_kg_m2: inertia at the output shaft beside what is always there.
+        blocked: the shaft is held.
+        encoder_unplugged: the counts stand still, and are lost.
+        phase_open: no current can flow.
+        ambient_c: temperature of the air.
+        current_limit_a: what the drive allows; the stage may allow less.
+        counts: position of the motor.
+        current_limited: limit or voltage cut the demand in the latest step.
+        resting: without a new demand or input nothing would change.
+        now_us: time of the latest control step.
+    """
+
+    __slots__ = (
+        "_blocked",
+        "_current_limit_a",
+        "_demand",
+        "_limit_a",
+        "_limit_v",
+        "_load_kg_m2",
+        "_load_nm",
+        "_loops",
+        "_lost_counts",
+        "_off",
+        "_phase_open",
+        "_values",
+    )
+
+    load_nm = Setting(0.0)
+    load_kg_m2 = Setting(0.0)
+    blocked = Setting(False)
+    phase_open = Setting(False)
+    current_limit_a = Setting(inf)
+
+    def __init__(self, parameters: ServoParameters) -> None:
+        super().__init__(parameters)
+        self._loops, self._lost_counts = Loops(parameters), 0.0
+        self._demand, self._values = Demand.NOTHING, (0.0, 0.0, 0.0)
+        self.changed()
+
+    # what the drive wants
+
+    def release(self) -> None:
+        """Switch the power stage off; the shaft coasts."""
+        if self._want(Demand.NOTHING, 0.0, 0.0, 0.0):
+            self._loops.integral_a = 0.0
+
+    def drive_current(self, current_a: float) -> None:
+        """Impose a current."""
+        if self._want(Demand.CURRENT, current_a, 0.0, 0.0):
+            self._loops.integral_a = 0.0
+
+    def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
+        """Keep a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
+        self._want(Demand.VELOCITY, 0.0, velocity, acceleration)
+
+    def drive_position(
+        self, position: float, velocity: float = 0.0, acceleration: float = 0.0
+    ) -> None:
+        """Keep a position, counts; velocity and acceleration are fed forward."""
+        self._want(Demand.POSITION, position, velocity, acceleration)
+
+    def _want(self, demand: Demand, value: float, velocity: float, acceleration: float) -> bool:
+        """Take a demand; return whether it is of another kind."""
+        other = demand is not self._demand
+        if other or (value, velocity, acceleration) != self._values:
+            if self.resting:
+                self._wake()
+            self._demand, self._values = demand, (value, velocity, acceleration)
+        return other
+
+    # time
+
+    def changed(self) -> None:
+        """Take over what the world does and what the drive allows."""
+        if self.resting:
+            self._wake()
+        plant, parameters = self._plant, self.parameters
+        ratio = parameters.gear.ratio
+        plant.bear(self.load_nm / ratio, parameters.gear.efficiency)
+        inertia = parameters.inertia_kg_m2 + self.load_kg_m2 / ratio**2
+        if inertia != plant.inertia_kg_m2:
+            plant.shape(inertia, plant.resistance_ohm)
+        if self.blocked != plant.blocked:
+            plant.hold(self.blocked)
+        self._heat.ambient_c = self.ambient_c
+        self._off = self.phase_open or self.supply_v < parameters.stage.supply_min_v
+        self._limit_v = self.supply_v * parameters.stage.duty_max
+        self._limit_a = max(min(self.current_limit_a, self._heat.limit_a), 0.0)
+
+    def step_to(self, now_us: int) -> None:
+        """Let time pass in control steps until `now_us`."""
+        while not self.resting and now_us - self.now_us >= STEP_US:
+            self._step()
+        self.now_us += (now_us - self.now_us) // STEP_US * STEP_US
+
+    def _step(self) -> None:
+        """Let one control step pass."""
+        plant, loops = self._plant, self._loops
+        position, current, integral, cut = (
+            plant.position,
+            plant.current_a,
+            loops.integral_a,
+            loops.cut,
+        )
+        loops.cut = self._push(plant, loops)
+        self.current_limited = loops.cut != 0
+        if self.encoder_unplugged:
+            self._lost_counts = plant.position - self.counts
+        else:
+            self.counts = floor(plant.position - self._lost_counts + 0.5)
+        self.now_us += STEP_US
+        if self.now_us - self._heat.since_us >= SLOW_US:
+            self._look()
+        if (
+            plant.speed_rad_s == 0.0
+            and plant.position == position
+            and plant.current_a == current
+            and loops.integral_a == integral
+            and loops.cut == cut
+        ):
+            self._rest()
+
+    def _push(self, plant: Plant, loops: Loops) -> int:
+        """Act on the demand; return the direction in which it was cut."""
+        demand, (value, velocity, acceleration) = self._demand, self._values
+        if demand is Demand.NOTHING or self._off:
+            plant.open()
+            return 0
+        speed = 0.0 if self.encoder_unplugged else plant.speed_rad_s
+        if demand is Demand.POSITION:
+            current = loops.follow(value, self.counts, velocity, acceleration, speed)
+        elif demand is Demand.VELOCITY:
+            current = loops.turn(velocity, acceleration, speed)
+        else:
+            current = value
+        limit = self._limit_a
+        if current > limit:
+            return plant.drive(limit, self._limit_v) or 1
+        if current < -limit:
+            return plant.drive(-limit, self._limit_v) or -1
+        return plant.drive(current, self._limit_v)
+
+    def _look(self) -> None:
+        """Take heat and overload of the latest steps into account."""
+        plant, heat = self._plant, self._heat
+        heat.pass_time(self.now_us, plant.square_a2s)
+        plant.square_a2s = 0.0
+        resistance = heat.resistance_ohm
+        if abs(resistance - plant.resistance_ohm) > RESISTANCE_STEP * resistance:
+            plant.shape(plant.inertia_kg_m2, resistance)
+        self._limit_a = max(min(self.current_limit_a, heat.limit_a), 0.0)
+
+    def _rest(self) -> None:
+        """Rest, unless the current will not stay as it is."""
+        self._look()
+        current, limit = self._plant.current_a, self._limit_a
+        by_voltage = self.current_limited and abs(current) != limit  # follows the resistance
+        self.resting = not by_voltage and self._heat.bears(current)
+
+    def _wake(self) -> None:
+        """Take the time of rest into account."""
+        plant, rested_us = self._plant, self.now_us - self._heat.since_us
+        plant.square_a2s = plant.current_a**2 * rested_us / 1_000_000
+        self.resting = False
+        self._look()
