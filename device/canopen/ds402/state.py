@@ -18,16 +18,20 @@ class Controlword(IntFlag):
     RELATIVE = 0x0040
     FAULT_RESET = 0x0080
     HALT = 0x0100
+    CHANGE_ON_SET_POINT = 0x0200
 
 
 class Statusword(IntFlag):
     """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
 
     VOLTAGE_ENABLED = 0x0010
+    WARNING = 0x0080
     REMOTE = 0x0200
     TARGET_REACHED = 0x0400
+    INTERNAL_LIMIT = 0x0800
     MODE_12 = 0x1000  # set-point acknowledge, homing attained, speed is zero, follows the target
-    MODE_13 = 0x2000  # homing error
+    MODE_13 = 0x2000  # homing error, following error
+    HOMED = 0x8000  # of the manufacturer: the position refers to the home position
 
 
 class DriveState(IntEnum):
@@ -83,8 +87,12 @@ NEXT_STATE: Final = {
     (_ENABLED, Command.DISABLE_VOLTAGE): _SOD,  # 9
     (_ENABLED, Command.QUICK_STOP): _QUICK_STOP,  # 11
     (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
-    (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16
+    (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
 }
+"""Transitions 0, 1, 13, 14 and 15 are made by the drive, by a fault and by its reset."""
+
+POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
+"""States in which the motor may have torque."""
 
 
 def command_of(controlword: int) -> Command | None:

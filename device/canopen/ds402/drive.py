@@ -1,0 +1,344 @@
+"""A drive (CiA 402-2): its objects, its modes of operation and its motor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import IntEnum
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.ds402 import indices, terminals
+from tickrig.device.canopen.ds402.automaton import Automaton
+from tickrig.device.canopen.ds402.axis import Axis
+from tickrig.device.canopen.ds402.faults import COMMUNICATION_ERRORS, ErrorCode, register_of
+from tickrig.device.canopen.ds402.limits import Limits
+from tickrig.device.canopen.ds402.mode import Mode
+from tickrig.device.canopen.ds402.modes import MODES, supported
+from tickrig.device.canopen.ds402.motor import IdealMotor, Motor
+from tickrig.device.canopen.ds402.parameters import Parameters
+from tickrig.device.canopen.ds402.reference import Control, Reference
+from tickrig.device.canopen.ds402.settings import CONFIGURATION, Settings, read_settings
+from tickrig.device.canopen.ds402.state import (
+    Controlword,
+    DriveState,
+    Statusword,
+    command_of,
+)
+from tickrig.device.canopen.ds402.stopping import Stopping
+from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
+from tickrig.device.canopen.ds402.switches import Switches
+from tickrig.device.canopen.ds402.telling import Telling
+from tickrig.device.canopen.slave import TICK_US, CanopenSlave
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.nmt import NmtState
+
+if TYPE_CHECKING:
+    from tickrig.device.servo.servo import Servo
+
+TARGETS: Final = (
+    *(indices.TARGET_TORQUE, indices.TARGET_POSITION, indices.TARGET_VELOCITY),
+    *(indices.POSITION_OFFSET, indices.VELOCITY_OFFSET, indices.TORQUE_OFFSET),
+    indices.INTERPOLATION_DATA,
+)
+
+
+COOLING_US: Final = 1_000_000
+"""Period in which a drive at rest looks at its temperature."""
+
+
+class AbortConnection(IntEnum):
+    """What a lost connection does (6007h)."""
+
+    NO_ACTION = 0
+    FAULT = 1
+    DISABLE_VOLTAGE = 2
+    QUICK_STOP = 3
+
+
+class Ds402(Application):
+    """A drive of one axis.
+
+    The controlword acts when it changes; from Ready to switch on, Enable operation
+    leads through Switched on at once. A lost connection and NMT Stop act as 6007h
+    says while the motor has power. A mode that the drive has not is refused with
+    0609 0030h. Without a servo, the motor is an ideal one.
+
+    Not emulated: a brake, the velocity mode 2 of frequency converters, touch probes.
+
+    Args:
+        node: the slave.
+        slot: its place in the tick.
+        servo: motor, power stage and load.
+
+    Attributes:
+        modes: the modes that the drive has, by number.
+        bounds: what it takes for sound.
+        axis: motor, reference and zero.
+        control: the loop that the motor works with in this tick.
+        controlword: as it was written last.
+        mode: the mode of operation at work.
+        mode_number: its number, as in 6061h.
+        fresh: a SYNC came or a target changed since the last step.
+        limited: a limit cut something in this step (bit 11 of the statusword).
+    """
+
+    modes: ClassVar[dict[int, type[Mode]]] = MODES
+    bounds: ClassVar[Bounds] = Bounds()
+    outputs = terminals.OUTPUTS
+
+    axis: Axis
+    motor: Motor
+    reference: Reference
+    switches: Switches
+    control: Control
+    mode: Mode
+    mode_number: int
+
+    def __init__(self, node: CanopenSlave, slot: int, servo: Servo | None = None) -> None:
+        super().__init__(node, slot)
+        self._servo = servo
+        motor: Motor = servo or IdealMotor()
+        self.parameters = Parameters(node.dictionary)
+        self.axis = Axis(motor, read_settings(self.parameters, motor.counts_per_turn))
+        self.motor, self.reference, self.switches = motor, self.axis.reference, Switches()
+        self.automaton, self.stopping, self.limits = Automaton(self), Stopping(self), Limits(self)
+        self.supervision, self.telling = Supervision(self, self.bounds), Telling(self)
+        self.control, self.controlword = Control.POSITION, 0
+        self.mode, self.mode_number = Mode(self), 0
+        self.fresh = self.limited = False
+        self._stale, self._codes = True, list[int]()
+        self._lost: set[int] = set()
+        self._wired: tuple[ErrorCode, ...] = ()
+        self._winding_dc = 0
+        plant = () if servo is None else terminals.PLANT_INPUTS
+        self.has_inputs((*terminals.DRIVE_INPUTS, *plant))
+        self._listen()
+
+    def _listen(self) -> None:
+        parameters = self.parameters
+        parameters.watch((indices.CONTROLWORD,), self._controlled)
+        parameters.watch((indices.MODES_OF_OPERATION,), self._change_mode)
+        parameters.watch(TARGETS, self._refresh)
+        parameters.watch(CONFIGURATION, self._outdate)
+        mode = self.node.dictionary.find(indices.MODES_OF_OPERATION)
+        if mode is not None:
+            mode.guard = self._known_mode
+        self.node.on_sync.append(self._sync)
+
+    @property
+    def state(self) -> DriveState:
+        """The state of the drive."""
+        return self.automaton.state
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is in Operation enabled."""
+        return self.automaton.state is DriveState.OPERATION_ENABLED
+
+    @property
+    def settings(self) -> Settings:
+        """The present configuration."""
+        return self.axis.settings
+
+    @property
+    def following_error(self) -> float:
+        """Counts from the motor to the reference."""
+        return self.reference.position - self.motor.counts
+
+    def read(self, name: str) -> float | str:
+        """Return a physical output."""
+        return terminals.READ[name](self)
+
+    def target_velocity(self, offset: int = 0) -> float:
+        """Return 60FFh and an offset in counts per second, cut to the limits."""
+        settings = self.settings
+        wanted = self.parameters.number(indices.TARGET_VELOCITY) + offset
+        return self.limits.velocity(wanted * settings.units.per_velocity)
+
+    def within(self, counts: float) -> float:
+        """Return a position in counts, cut to the software limits."""
+        return self.limits.position(counts)
+
+    def fault(self, code: int) -> None:
+        """Have a fault with an emergency error code."""
+        if code not in self._codes:
+            self._note(code)
+            self.node.emergency(code, register_of(code))
+
+    @property
+    def statusword(self) -> int:
+        """Present value of 6041h."""
+        supervision, mode = self.supervision, self.mode
+        status = self.state | Statusword.REMOTE
+        if self.motor.supply_mv >= self.bounds.supply_mv[0]:
+            status |= Statusword.VOLTAGE_ENABLED
+        if supervision.warns:
+            status |= Statusword.WARNING
+        if self.limited:
+            status |= Statusword.INTERNAL_LIMIT
+        if self.enabled:
+            status |= mode.flags
+            if mode.tells_following_error and supervision.not_following:
+                status |= Statusword.MODE_13
+        return status
+
+    def wired_faults(self) -> Iterator[ErrorCode]:
+        """Give the faults that the electronics see; a short circuit needs power to be seen."""
+        for code in self._wired:
+            if code is not ErrorCode.OVER_CURRENT or self.automaton.powered:
+                yield code
+
+    def begin_mode(self) -> None:
+        """Begin the chosen mode anew."""
+        self.mode = self.modes[self.mode_number](self)
+        self.mode.enter()
+
+    def operate(self, now_us: int) -> bool:
+        """Make a step of the mode; say whether nothing is left to do."""
+        mode = self.mode
+        self.control = mode.control
+        step = mode.halt if mode.halts and mode.halted else mode.run
+        return self.limits.guard(step, now_us) if mode.minds_limits else step(now_us)
+
+    def power_on(self) -> None:
+        """Count from 0 on."""
+        self.motor.release()
+        self.axis.zero, self.axis.homed = float(self.motor.counts), False
+
+    def start(self) -> None:
+        """Switch off."""
+        self._codes, self._lost = [], set()
+        self.automaton.restart()
+        self.controlword = self.parameters.number(indices.CONTROLWORD)
+        self.parameters.write(indices.SUPPORTED_MODES, supported(self.modes))
+        self._outdate()
+        self._change_mode()
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """Remember that the connection is lost."""
+        if code in COMMUNICATION_ERRORS:
+            self._lost.add(code)
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """Remember that it is there again."""
+        self._lost.discard(code)
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Take NMT Stop for a lost connection."""
+        if new is NmtState.STOPPED:
+            self.communication_error()
+
+    def communication_error(self) -> None:
+        """Act as 6007h says, while the motor has power."""
+        if self.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):
+            return
+        match self.parameters.number(indices.ABORT_CONNECTION):
+            case AbortConnection.FAULT:
+                self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
+            case AbortConnection.DISABLE_VOLTAGE:
+                self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+            case AbortConnection.QUICK_STOP:
+                self.automaton.enter(DriveState.QUICK_STOP_ACTIVE)
+            case _:  # no action, or what a manufacturer might mean
+                return
+        self.request()
+
+    def on_execute(self, now_us: int) -> None:
+        """Measure, watch, make a step, command the motor, tell."""
+        self.motor.step_to(now_us)
+        self._look()
+        for code in self.supervision.find(now_us):
+            self.fault(code)
+        self.limited = False
+        settled = self.automaton.run(now_us)
+        if self.automaton.powered:
+            self.axis.command(self.control)
+        else:
+            self.axis.release()
+        self.fresh = False
+        self.telling.tell()
+        self._sleep(now_us, settled and not self.supervision.waiting)
+
+    def _look(self) -> None:
+        """Follow configuration, physical inputs and the shaft."""
+        if self._stale:
+            self._stale = False
+            self.axis.configure(read_settings(self.parameters, self.motor.counts_per_turn))
+        if self.inputs.changed:
+            self.inputs.changed = False
+            self._touched()
+        self.switches.look(self.motor.shaft_deg)
+        self.axis.wrap()
+
+    def _touched(self) -> None:
+        inputs = self.inputs
+        self.switches.set(inputs)
+        self._wired = tuple(code for name, code in terminals.WIRED.items() if inputs[name])
+        if self._servo is not None:
+            terminals.load(self._servo, inputs)
+
+    def _sleep(self, now_us: int, settled: bool) -> None:
+        """Come back in the next tick, or each second while the winding cools, or never."""
+        if not (settled and self.motor.resting):
+            self.schedule(now_us + TICK_US)
+        elif self._winding_dc != self.motor.winding_dc:
+            self._winding_dc = self.motor.winding_dc
+            self.schedule(now_us + COOLING_US)
+
+    def _controlled(self) -> None:
+        """Obey a new controlword."""
+        before, self.controlword = self.controlword, self.parameters.number(indices.CONTROLWORD)
+        rising, falling = self.controlword & ~before, before & ~self.controlword
+        command = command_of(self.controlword)
+        if self.state is DriveState.FAULT and rising & Controlword.FAULT_RESET:
+            self._reset_fault()
+        elif command is not None:
+            self.automaton.obey(command)
+        if self.enabled:
+            if rising & Controlword.START:
+                self.mode.start()
+            if falling & Controlword.START:
+                self.mode.stop()
+        self.request()
+
+    def _note(self, code: int) -> None:
+        self._codes.append(code)
+        self.parameters.write(indices.ERROR_CODE, code)
+        self.automaton.react(code)
+        self.request()
+
+    def _reset_fault(self) -> None:
+        """Leave Fault if no cause is left: transition 15."""
+        present = {*self.supervision.present(), *self._lost}
+        if present.isdisjoint(self._codes):
+            for code in self._codes:
+                self.node.emergency_clear(code)
+            self._codes = []
+            self.parameters.write(indices.ERROR_CODE, 0)
+            self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+
+    def _change_mode(self) -> None:
+        number = self.parameters.number(indices.MODES_OF_OPERATION)
+        if number in self.modes:
+            self.mode_number = number
+            self.parameters.write(indices.MODES_OF_OPERATION_DISPLAY, number)
+            if self.enabled:
+                self.begin_mode()
+        self.request()
+
+    def _sync(self, counter: int) -> None:
+        self.fresh = True
+
+    def _refresh(self) -> None:
+        self.fresh = True
+        self.request()
+
+    def _outdate(self) -> None:
+        self._stale = True
+        self.request()
+
+    def _known_mode(self, value: Value) -> None:
+        if value not in self.modes:
+            raise SdoAbort(AbortCode.VALUE_RANGE)

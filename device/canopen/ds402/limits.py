@@ -1,0 +1,79 @@
+"""Where a drive may go and how fast: limit switches, software limits, velocity (CiA 402-2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tickrig.device.canopen.ds402.reference import Control
+from tickrig.device.canopen.ds402.stopping import Ramp
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.ds402.drive import Ds402
+
+
+class Limits:
+    """Cuts what a mode wants, and stops the motor at the end of its way.
+
+    A pressed limit switch, and a software limit that could not be kept otherwise,
+    stop the motor with the quick stop deceleration; it can be moved back. Each
+    cut sets bit 11 of the statusword.
+
+    Args:
+        drive: the drive.
+    """
+
+    def __init__(self, drive: Ds402) -> None:
+        self._drive = drive
+
+    def velocity(self, wanted: float) -> float:
+        """Return a velocity, cut to the largest one."""
+        most = self._drive.settings.max_velocity
+        return self._cut(wanted, -most, most)
+
+    def position(self, counts: float) -> float:
+        """Return a position, cut to the software limits."""
+        return self._cut(counts, *self._drive.axis.ends)
+
+    def current(self, wanted_a: float) -> float:
+        """Return a current, cut to the torque limits of both directions."""
+        settings = self._drive.settings
+        backward, forward = settings.limits_a
+        most = settings.max_current_a
+        return self._cut(wanted_a, -min(backward, most), min(forward, most))
+
+    def guard(self, step: Callable[[int], bool], now_us: int) -> bool:
+        """Make a step of a mode, or brake if it leads beyond a limit."""
+        drive, reference = self._drive, self._drive.reference
+        position, velocity = reference.position, reference.velocity
+        settled = step(now_us)
+        if not self._beyond():
+            return settled
+        drive.limited = True
+        reference.place(position, velocity)
+        return drive.stopping.brake(Ramp.QUICK_STOP)
+
+    def _beyond(self) -> bool:
+        """Say whether the reference leads on where the motor must not go."""
+        drive, reference = self._drive, self._drive.reference
+        towards = reference.velocity
+        if drive.control is Control.CURRENT:
+            towards = towards or reference.current_a
+        if not towards:
+            return False
+        word = drive.switches
+        forward = towards * drive.axis.forward > 0
+        if word.positive_limit if forward else word.negative_limit:
+            return True
+        if drive.control is Control.POSITION:
+            return False
+        low, high = drive.axis.ends
+        room = high - reference.position if towards > 0 else reference.position - low
+        braking = reference.velocity**2 / (2 * drive.settings.quick_stop_deceleration)
+        return room <= braking
+
+    def _cut(self, wanted: float, low: float, high: float) -> float:
+        cut = max(low, min(high, wanted))
+        if cut != wanted:
+            self._drive.limited = True
+        return cut

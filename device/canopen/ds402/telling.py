@@ -1,0 +1,66 @@
+"""Actual values: what a drive writes into its objects at the end of a tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.parameters import clamped
+from tickrig.device.canopen.entry import Entry
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.ds402.drive import Ds402
+
+Measure = Callable[["Ds402"], int]
+
+
+def _velocity(drive: Ds402, counts_s: float) -> int:
+    return round(counts_s / drive.settings.units.per_velocity)
+
+
+def _per_mille(drive: Ds402, current_a: float) -> int:
+    return round(1_000 * current_a / drive.settings.rated_current_a)
+
+
+MEASURES: Final[dict[tuple[int, int], Measure]] = {
+    (indices.STATUSWORD, 0): lambda drive: drive.statusword,
+    (indices.POSITION_DEMAND, 0): lambda drive: drive.axis.position_of(drive.reference.position),
+    (indices.POSITION_ACTUAL_INTERNAL, 0): lambda drive: drive.motor.counts,
+    (indices.POSITION_ACTUAL, 0): lambda drive: drive.axis.position,
+    (indices.VELOCITY_DEMAND, 0): lambda drive: _velocity(drive, drive.reference.velocity),
+    (indices.VELOCITY_ACTUAL, 0): lambda drive: _velocity(drive, drive.motor.velocity_counts_s),
+    (indices.TORQUE_DEMAND, 0): lambda drive: _per_mille(drive, drive.reference.current_a),
+    (indices.TORQUE_ACTUAL, 0): lambda drive: _per_mille(drive, drive.motor.current_ma / 1_000),
+    (indices.CURRENT_ACTUAL, 0): lambda drive: _per_mille(drive, drive.motor.current_ma / 1_000),
+    (indices.SUPPLY_VOLTAGE, 0): lambda drive: drive.motor.supply_mv,
+    (indices.FOLLOWING_ERROR_ACTUAL, 0): lambda drive: round(
+        drive.following_error / drive.settings.units.per_position
+    ),
+    (indices.POSITION_DEMAND_INTERNAL, 0): lambda drive: round(drive.reference.position),
+    (indices.DIGITAL_INPUTS, 0): lambda drive: drive.switches.word,
+}
+"""What the objects say, by (index, sub-index)."""
+
+
+class Telling:
+    """Writes those objects that the device has.
+
+    Args:
+        drive: whose objects they are.
+    """
+
+    def __init__(self, drive: Ds402) -> None:
+        self._drive = drive
+        self._rows: list[tuple[Entry, Measure]] = []
+        for at, measure in MEASURES.items():
+            entry = drive.node.dictionary.find(*at)
+            if entry is not None:
+                self._rows.append((entry, measure))
+
+    def tell(self) -> None:
+        """Write all of them; a value out of the range of its object is cut."""
+        for entry, measure in self._rows:
+            size, signed = entry.size, entry.data_type.signed
+            value = clamped(measure(self._drive), 8 * size, signed=signed)
+            entry.assign(value.to_bytes(size, "little", signed=signed))
