@@ -8,6 +8,11 @@ from typing import Final
 from tickrig.emulators.emulated import Emulated
 from tickrig.emulators.rrc.build import NAME as RRC
 from tickrig.emulators.rrc.build import build_rrc
+from tickrig.emulators.rtc_lite.build import NAME as RTC_LITE
+from tickrig.emulators.rtc_lite.build import build_rtc_lite
 from tickrig.emulators.trace import Config
 
-DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {RRC: build_rrc}
+DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {
+    RRC: build_rrc,
+    RTC_LITE: build_rtc_lite,
+}

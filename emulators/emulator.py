@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from tickrig.device.core import NEVER
@@ -9,13 +11,14 @@ from tickrig.emulators.bridge import Bridge
 from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.clock import Clock
 from tickrig.emulators.emulated import Emulated
-from tickrig.emulators.faults import FaultyPort
+from tickrig.emulators.faults import FaultKind, FaultyPort
 from tickrig.emulators.port import Port
 from tickrig.emulators.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.tap import Tap
 from tickrig.emulators.trace import Mark
+from tickrig.emulators.wire_log import Splitter, WireLog
 from tickrig.emulators.workbench import Workbench
 
 
@@ -23,6 +26,21 @@ class Outside(Port[bytes], Protocol):
     """Where the host is: a pty."""
 
     lost: int
+
+
+@dataclass(frozen=True, slots=True)
+class LineKind:
+    """What the serial line of a kind of device is like.
+
+    Attributes:
+        baud: bit rate in bit/s.
+        faults: the wire faults that can be armed.
+        splitter: makes what cuts one direction for the log, into lines unless given.
+    """
+
+    baud: int = 115_200
+    faults: Mapping[str, FaultKind[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
+    splitter: Callable[[Mark], Splitter] | None = None
 
 
 class Emulator(Workbench):
@@ -36,6 +54,7 @@ class Emulator(Workbench):
         seed: seed of the wire faults' chance.
         trace: where to record the run.
         link: path under which the host finds it, for people.
+        line: what the line is like.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -48,11 +67,15 @@ class Emulator(Workbench):
         seed: int = 0,
         trace: TraceFile | None = None,
         link: str = "",
+        line: LineKind | None = None,
     ) -> None:
         self._trace, self._outside = trace, outside
-        self._line = SerialLine()
-        port = FaultyPort(self._line.a, BYTE_FAULTS, seed)
+        line = line or LineKind()
+        self._line = SerialLine(line.baud)
+        port = FaultyPort(self._line.a, line.faults, seed)
         super().__init__(name, device, port, link)
+        if line.splitter is not None:
+            self.log = WireLog(splitter=line.splitter)
         station = Station(TracedDevice(device, trace) if trace else device, port)
         bridges = [Bridge(self._line.b, Tap(outside, self.log.hear))] if outside else []
         self.rig = Rig(station, bridges=bridges, clock=clock)

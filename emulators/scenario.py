@@ -207,7 +207,7 @@ class ScenarioParser:
 def _line_senders(encoders: Mapping[str, Encoder]) -> dict[str, Sender]:
     """Return the verbs of a serial line."""
     lines: dict[str, Encoder] = {"send": lambda text: text + b"\n", **encoders}
-    return {**{verb: _line_sender(encode) for verb, encode in lines.items()}, "raw": _parse_raw}
+    return {**{verb: _line_sender(encode) for verb, encode in lines.items()}, "raw": parse_raw}
 
 
 def _line_sender(encode: Encoder) -> Sender:
@@ -218,7 +218,12 @@ def _line_sender(encode: Encoder) -> Sender:
     return parse
 
 
-def _parse_raw(rest: str) -> Send:
+def parse_raw(rest: str) -> Send:
+    """Read what stands behind `raw`: bytes in hex.
+
+    Raises:
+        ValueError: something else.
+    """
     try:
         data = bytes.fromhex(rest)
     except ValueError:

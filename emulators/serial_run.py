@@ -11,13 +11,13 @@ from pathlib import Path
 import click
 
 from tickrig.emulators.emulated import Emulated
-from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.emulator import Emulator, LineKind
 from tickrig.emulators.player import Player
 from tickrig.emulators.pty_port import PtyPort
 from tickrig.emulators.recorder import TraceFile
 from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.run import EmulatorRun, RunOptions, say
-from tickrig.emulators.scenario import Encoder, Line, ScenarioParser
+from tickrig.emulators.scenario import Encoder, Line, ScenarioParser, Sender
 from tickrig.emulators.trace import Config, Header
 from tickrig.emulators.transcript import Transcript
 from tickrig.emulators.wire_log import WireLine
@@ -37,6 +37,11 @@ class Options(RunOptions):
         return not self.scenario or bool(self.link or self.control or self.panel)
 
 
+def _picocom(link: str) -> str:
+    command = f"picocom -b 115200 --imap lfcrlf --omap crlf --echo {link}"
+    return f" Talk to it with\n  {command}"
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """What the command line of one kind of device adds.
@@ -47,6 +52,9 @@ class Kind:
         encoders: further verbs of its scenarios.
         is_event: which lines -v shows.
         panel: runs the operator panel until it is left.
+        senders: the verbs of its scenarios that send, where the line carries no text.
+        line: baud rate, wire faults and the cutting of the log.
+        talk: how a person talks to it at a path, empty if that takes a program.
     """
 
     name: str
@@ -54,6 +62,9 @@ class Kind:
     encoders: Mapping[str, Encoder] = field(default_factory=dict)
     is_event: Callable[[WireLine], bool] = lambda line: True
     panel: Callable[[Emulator], None] | None = None
+    senders: Mapping[str, Sender] | None = None
+    line: LineKind = field(default_factory=LineKind)
+    talk: Callable[[str], str] = _picocom
 
 
 class SerialRun(EmulatorRun):
@@ -75,8 +86,10 @@ class SerialRun(EmulatorRun):
     def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
         if self._options.panel:
             self._check_panel()
-        bench = Emulator(self._kind.name, self._device)
-        return bench, ScenarioParser(self._device, bench.operator, self._kind.encoders)
+        kind = self._kind
+        bench = Emulator(kind.name, self._device, line=kind.line)
+        parser = ScenarioParser(self._device, bench.operator, kind.encoders, senders=kind.senders)
+        return bench, parser
 
     def _check_panel(self) -> None:
         if self._options.scenario or self._options.verbose:
@@ -97,6 +110,7 @@ class SerialRun(EmulatorRun):
             seed=options.seed,
             trace=self._open_trace(),
             link=str(options.link or pty.path) if pty else "",
+            line=self._kind.line,
         )
 
     def _open_pty(self, stack: ExitStack) -> PtyPort:
@@ -139,8 +153,8 @@ class SerialRun(EmulatorRun):
             return
         click.echo(bench.link)
         control = self._options.control
-        say(f"{self._kind.title} at {bench.link}, 115200 8N1. Ctrl-C ends. Talk to it with")
-        say(f"  picocom -b 115200 --imap lfcrlf --omap crlf --echo {bench.link}")
+        kind, talk = self._kind, self._kind.talk(bench.link)
+        say(f"{kind.title} at {bench.link}, {kind.line.baud} 8N1. Ctrl-C ends.{talk}")
         say(
             f"  tickrig ctl {control} describe"
             if control

@@ -1,4 +1,4 @@
-"""The latest lines on a serial line, both ways."""
+"""The latest lines, or frames, on a serial line, both ways."""
 
 from __future__ import annotations
 
@@ -27,25 +27,37 @@ class WireLine:
     data: bytes
 
 
+Splitter = Callable[[int, bytes], list[bytes]]
+"""Told when bytes were heard; gives what has become whole."""
+
+
+def _line_splitter(mark: Mark) -> Splitter:
+    splitter = LineSplitter()
+    return lambda at_us, data: splitter.push(data)
+
+
 class WireLog:
     """Cuts what it hears into lines, keeps the latest, and tells its listeners.
 
     Args:
         keep: how many lines are kept.
+        splitter: makes what cuts the bytes of one direction, into lines unless given.
 
     Attributes:
         listeners: told each line when it is whole.
     """
 
-    def __init__(self, keep: int = 500) -> None:
+    def __init__(
+        self, keep: int = 500, splitter: Callable[[Mark], Splitter] = _line_splitter
+    ) -> None:
         self.listeners: list[Callable[[WireLine], None]] = []
         self._lines: deque[WireLine] = deque(maxlen=keep)
-        self._splitters = {Mark.TO_DEVICE: LineSplitter(), Mark.FROM_DEVICE: LineSplitter()}
+        self._splitters = {mark: splitter(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
         self._count = 0
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
-        for line in self._splitters[mark].push(data):
+        for line in self._splitters[mark](at_us, data):
             self._count += 1
             whole = WireLine(self._count, at_us, mark, line)
             self._lines.append(whole)

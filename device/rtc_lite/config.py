@@ -11,6 +11,7 @@ from tickrig.wire.rtc_lite.frame import Checksum
 
 RATE_HZ: Final = range(1, 1_001)
 """Rates that a tick of 1 ms can hold."""
+DEFAULT_RATE_HZ: Final = 10
 
 
 class Framing(StrEnum):
@@ -38,7 +39,7 @@ class NodeConfig:
     framing: Framing = Framing.LITE
     checksum: Checksum = Checksum.SUM8
     context: ContextType = ContextType.PROXY
-    rate_hz: int = 10
+    rate_hz: int = DEFAULT_RATE_HZ
     slow_answer_us: int = 200_000
 
     def __post_init__(self) -> None:

@@ -42,8 +42,12 @@ _PROFILES: Final = (Command.IN_PROFILE, Command.OUT_PROFILE)
 
 def encode_packet(frame: Frame) -> bytes:
     """Write a frame of the device as RTno would; KeyError if RTno has no letter for it."""
-    data = _packet_data(frame)
-    body = LETTERS[frame.command] + bytes([len(data)]) + data
+    return pack(LETTERS[frame.command], _packet_data(frame))
+
+
+def pack(letter: bytes, data: bytes) -> bytes:
+    """Write a packet of either direction."""
+    body = letter + bytes([len(data)]) + data
     return HEADER + body + bytes([sum(body) & 0xFF])
 
 

@@ -1,0 +1,1 @@
+"""RTC-Lite nodes on a pty or in virtual time: `rtc-lite-emu`."""

@@ -1,0 +1,133 @@
+"""The command `rtc-lite-emu`."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import click
+
+from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, Framing, NodeConfig
+from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.refused import Refused
+from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
+from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component, told
+from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
+from tickrig.emulators.rtc_lite.frame_log import frame_splitter
+from tickrig.emulators.rtc_lite.verbs import verbs
+from tickrig.emulators.serial_options import line_options
+from tickrig.emulators.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.wire_log import WireLine
+from tickrig.wire.rtc_lite.codes import Command, ContextType
+from tickrig.wire.rtc_lite.frame import Checksum
+
+ROUTINE: Final = tuple(
+    command.value
+    for command in (Command.PING, Command.EXECUTE, Command.ERROR, Command.WRITE, Command.DATA)
+)
+"""What -v leaves out: the traffic of each period."""
+
+
+def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:
+    return [name for name in COMPONENTS if name.startswith(word)]
+
+
+@click.command()
+@click.option(
+    "--node",
+    default="echo",
+    metavar="NAME",
+    help="Component: echo, lite-a, lite-b, or FILE.py:Class.  [echo]",
+    shell_complete=_complete_node,
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=57_600,
+    help="Bit rate of the line, 8N1.  [57600]",
+)
+@click.option(
+    "--timer",
+    "timer_hz",
+    type=click.IntRange(1, 1_000),
+    metavar="HZ",
+    help="Execute by a timer of the device (type 22h) instead of by the proxy (21h).",
+)
+@click.option(
+    "--framing",
+    type=click.Choice([framing.value for framing in Framing]),
+    default=Framing.LITE.value,
+    help="Frames of RTC-Lite, or packets of RTno.  [lite]",
+)
+@click.option(
+    "--checksum",
+    type=click.Choice([checksum.value for checksum in Checksum]),
+    default=Checksum.SUM8.value,
+    help="How frames are summed up.  [sum8]",
+)
+@line_options("flip, drop, dup, cut, noise, ping")
+@click.pass_context
+def main(  # noqa: PLR0913, PLR0917 - options, by keyword
+    context: click.Context,
+    /,
+    node: str,
+    baud: int,
+    timer_hz: int | None,
+    framing: str,
+    checksum: str,
+    **options: Any,
+) -> None:
+    """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
+
+    It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
+    as fast as it goes, with the same transcript each time, exit status 1 if
+    something expected did not come. Together with --link or --control it is
+    played in real time.
+
+    \b
+    Faults: power_cut the supply, slow_answer; on the line noise=0.01 bytes of
+    chance, flip=0.001 bits turned over, ping=0.5 every second PING unanswered.
+
+    \b
+    rtc-lite-emu --link /tmp/lite-a --node lite-a
+    rtc-lite-emu --link /tmp/lite --node my_node.py:Thermometer --timer 10 -v
+    rtc-lite-emu --link /tmp/lite --control /tmp/lite.ctl --fault power_cut@5s-9s
+    echo '0 send CX' | rtc-lite-emu --scenario -
+
+    \b
+    Completion of options and nodes in the shell:
+    eval "$(_RTC_LITE_EMU_COMPLETE=bash_source rtc-lite-emu)"
+    """  # noqa: D301 - click wants the backspace
+    ec = ContextType.TIMER if timer_hz else ContextType.PROXY
+    try:
+        config = NodeConfig(Framing(framing), Checksum(checksum), ec, timer_hz or DEFAULT_RATE_HZ)
+        device = RtcLiteNode(find_component(node), config)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    kind = Kind(
+        NAME,
+        f"RTC-Lite node {device.component.type_name}",
+        is_event=_is_event,
+        senders=verbs(device.component, config),
+        line=LineKind(baud, LINE_FAULTS, frame_splitter(config)),
+        talk=lambda link: " Its proxy opens this path.",
+    )
+    run = SerialRun(kind, device, config_to_trace(node, config), Options(**options))
+    context.exit(_run(run, node))
+
+
+def _run(run: SerialRun, node: str) -> int:
+    """Run, and say in a line what a user's callback raised."""
+    if node in COMPONENTS:
+        return run.run()
+    file = node.rpartition(":")[0]
+    try:
+        return run.run()
+    except click.ClickException:
+        raise
+    except Exception as error:  # a user's callback may raise anything
+        raise Refused(f"{node}: {told(error, file)}") from error
+
+
+def _is_event(line: WireLine) -> bool:
+    return line.data[:2] not in ROUTINE

@@ -1,0 +1,48 @@
+r"""Cut what passes on the line into frames, as the log, transcripts and `expect` show them.
+
+A frame is shown without header and checksum, as `CX`, `CX@I` or
+`QV\x03\x04out*\x00\x00\x00`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
+from tickrig.emulators.trace import Mark
+from tickrig.emulators.wire_log import Splitter
+from tickrig.wire.rtc_lite.codes import LinkFault
+from tickrig.wire.rtc_lite.decoder import Decoder
+from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
+
+SHOWN: Final = {
+    LinkFault.CHECKSUM: b"(wrong checksum)",
+    LinkFault.UNKNOWN: b"(unknown frame)",
+    LinkFault.TIMEOUT: b"(broken off)",
+}
+"""What is shown of bytes that are no frame."""
+
+
+def frame_splitter(config: NodeConfig) -> Callable[[Mark], Splitter]:
+    """Return what makes the splitter of each direction; packets of RTno are shown as they come."""
+    if config.framing is Framing.RTNO:
+        return lambda mark: lambda at_us, data: [data]
+
+    def make(mark: Mark) -> Splitter:
+        layouts = REQUESTS if mark is Mark.TO_DEVICE else REPLIES
+        receiver = Receiver(Decoder(layouts, config.checksum))
+        return lambda at_us, data: _split(receiver, at_us, data)
+
+    return make
+
+
+def _split(receiver: Receiver, at_us: int, data: bytes) -> list[bytes]:
+    """Listen as a node listens, with the same time-outs."""
+    out = [SHOWN[LinkFault.TIMEOUT]] if receiver.expired(at_us) else []
+    for at in range(0, len(data), BUFFER_BYTES):
+        receiver.push(at_us, data[at : at + BUFFER_BYTES])
+        while (found := receiver.pull()) is not None:
+            out.append(SHOWN[found] if isinstance(found, LinkFault) else found.body)
+    return out
