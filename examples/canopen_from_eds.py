@@ -19,11 +19,12 @@ def main() -> None:
     master = {10_000: "000#0105", 200_000: "205#5A"}  # start the node, write its outputs
     for now_us in range(0, 1_000_000, slave.tick_us):
         if now_us == 100_000:
-            module.set_digital(1, 0x81)
+            module.inputs.set("di1", 1)
+            module.inputs.set("di8", 1)
         sent = [CanFrame.parse(master[now_us])] if now_us in master else []
         for frame in (*sent, *slave.tick(now_us, tuple(sent))):
             print(f"{now_us / 1e6:.3f} {frame}")
-    print(f"the outputs are {module.digital_outputs[0].level:02X}h")
+    print(f"the outputs are {module.read('do'):02X}h")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.mpdo_producer import DamProducer
@@ -29,11 +29,13 @@ class PdoProducer(Service):
         tpdos: those that the dictionary has.
         quiet: keys of entries whose change is no event, because a profile judges
             it; to be set before the node is Operational.
+        on_sent: told the mapped objects of each TPDO that has been sent.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.quiet: set[int] = set()
+        self.on_sent: list[Callable[[list[Entry]], None]] = []
         self.tpdos = [
             Tpdo(self, index - TPDO_PARAMETERS[0] + 1)
             for index in node.dictionary.objects

@@ -95,6 +95,8 @@ class Tpdo:
     def transmit(self) -> None:
         """Send the mapped objects."""
         self.node.send(self._can_id, self.pack())
+        for told in self.producer.on_sent:
+            told(self.entries)
 
     def send(self, data: bytes) -> None:
         """Send these bytes."""

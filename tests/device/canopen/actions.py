@@ -51,7 +51,7 @@ class SlaveActions:
 
 
 class GenericIoActions(SlaveActions):
-    """The physical side of a CiA 401 module."""
+    """The physical side of a CiA 401 module: eight lines at once, channels in counts."""
 
     def __init__(self, slave: CanopenSlave) -> None:
         super().__init__(slave)
@@ -61,20 +61,22 @@ class GenericIoActions(SlaveActions):
 
     def set_digital(self, number: str, level: str) -> None:
         """Set eight lines, in hex."""
-        self._module.set_digital(int(number), int(level, 16))
+        for bit in range(8):
+            line = 8 * (int(number) - 1) + bit + 1
+            self._module.inputs.set(f"di{line}", int(level, 16) >> bit & 1)
 
     def set_analogue(self, number: str, level: str) -> None:
         """Set a value, in decimal."""
-        self._module.set_analogue(int(number), int(level))
+        self._module.inputs.set(f"ai{number}", int(level))
 
     def expect_digital(self, number: str, level: str) -> None:
         """Compare eight lines, in hex."""
-        got = self._module.digital_outputs[int(number) - 1].level
+        got = int(self._module.read("do")) >> 8 * (int(number) - 1) & 0xFF
         assert got == int(level, 16), f"outputs are {got:02X}, want {level}"
 
     def expect_analogue(self, number: str, level: str) -> None:
         """Compare a value, in decimal."""
-        got = self._module.analogue_outputs[int(number) - 1].level
+        got = self._module.read(f"ao{number}")
         assert got == int(level), f"output is {got}, want {level}"
 
 

@@ -6,7 +6,7 @@ from tests.device.canopen.bus import Bus
 from tests.device.canopen.profile_objects import GENERIC_IO, make_dictionary
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.ds401_inputs import FILTER_US
+from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.core import NEVER
 
@@ -25,20 +25,21 @@ class Bench(Bus):
         return self.slave.dictionary[index, sub].value
 
     def digital(self, level: int) -> list[str]:
-        self.module.set_digital(1, level)
+        for bit in range(8):
+            self.module.inputs.set(f"di{bit + 1}", level >> bit & 1)
         return self.step()
 
     def analogue(self, level: int) -> list[str]:
-        self.module.set_analogue(1, level)
+        self.module.inputs.set("ai1", level)
         return self.step()
 
     @property
     def output(self) -> int:
-        return self.module.digital_outputs[0].level
+        return int(self.module.read("do")) & 0xFF
 
     @property
-    def analogue_output(self) -> int:
-        return self.module.analogue_outputs[0].level
+    def analogue_output(self) -> float:
+        return self.module.read("ao1")
 
 
 @pytest.fixture
@@ -107,7 +108,8 @@ def test_analogue_changes_are_sent_only_if_6423h_says_so(running: Bench) -> None
         (4, {0x6426: 10}, -10, 11),
         (8, {0x6427: 10}, 50, -11),
         (16, {0x6428: 10}, -50, 11),
-        (5, {0x6424: 100, 0x6426: 150}, 120, 151),
+        (5, {0x6424: 100, 0x6426: 150}, 99, 100),
+        (5, {0x6424: 1000, 0x6426: 150}, 150, 151),
         (0x40, {}, 0, 0),
     ],
 )
@@ -148,7 +150,7 @@ def test_stop_puts_error_values_out_and_start_takes_them_back(running: Bench) ->
     running.step("205#5A00", "305#0100020000000000")
     running.step("000#0205")
     assert running.output == 0x53
-    assert [channel.level for channel in running.module.analogue_outputs[:2]] == [32767, 2]
+    assert [running.module.read(name) for name in ("ao1", "ao2")] == [32767, 2]
     running.step("000#0105")
     assert (running.output, running.analogue_output) == (0x5A, 1)
 

@@ -1,0 +1,107 @@
+"""Which objects are of one family, by width (CiA 401, object dictionary).
+
+Objects of several widths name the same physical lines: 6100h:01 shows what 6000h:01
+and 6000h:02 show. Indices as two public profile tables have them (CanFestival,
+DS-401.prf; tonyrog/canopen, DS-401.def), the meaning of single ones as in the
+manuals of Turck BL20, WAGO 750 and VIPA 300V.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.entry import Entry
+from tickrig.wire.canopen.datatypes import DataType
+
+
+class DigitalObjects(NamedTuple):
+    """The index of what is said of each line, by lines in an element.
+
+    Single lines have eight indices in a row, each of up to 128 lines.
+    """
+
+    single: int
+    by_8: int
+    by_16: int
+    by_32: int
+
+
+READ_INPUT: Final = DigitalObjects(0x6020, 0x6000, 0x6100, 0x6120)
+POLARITY_INPUT: Final = DigitalObjects(0x6030, 0x6002, 0x6102, 0x6122)
+FILTER_INPUT: Final = DigitalObjects(0x6038, 0x6003, 0x6103, 0x6123)
+INTERRUPT_ANY_CHANGE: Final = DigitalObjects(0x6050, 0x6006, 0x6106, 0x6126)
+INTERRUPT_LOW_TO_HIGH: Final = DigitalObjects(0x6060, 0x6007, 0x6107, 0x6127)
+INTERRUPT_HIGH_TO_LOW: Final = DigitalObjects(0x6070, 0x6008, 0x6108, 0x6128)
+WRITE_OUTPUT: Final = DigitalObjects(0x6220, 0x6200, 0x6300, 0x6320)
+POLARITY_OUTPUT: Final = DigitalObjects(0x6240, 0x6202, 0x6302, 0x6322)
+ERROR_MODE_OUTPUT: Final = DigitalObjects(0x6250, 0x6206, 0x6306, 0x6326)
+ERROR_VALUE_OUTPUT: Final = DigitalObjects(0x6260, 0x6207, 0x6307, 0x6327)
+FILTER_MASK_OUTPUT: Final = DigitalObjects(0x6270, 0x6208, 0x6308, 0x6328)
+
+SINGLE_BANKS: Final = 8
+SINGLE_BANK_LINES: Final = 128
+
+DIGITAL_INTERRUPT_ENABLE: Final = 0x6005
+ANALOGUE_INTERRUPT_ENABLE: Final = 0x6423
+INTERRUPT_TRIGGER: Final = 0x6421
+INTERRUPT_SOURCE: Final = 0x6422
+
+
+class AnalogueObjects(NamedTuple):
+    """The indices of analogue channels of one direction.
+
+    Attributes:
+        integers: values of 8, 16 and 32 bit.
+        real: value as REAL32.
+        real_offset: added to the value as REAL32.
+        real_scaling: factor before the offset is added.
+        integer_offset: added to an integer value.
+        integer_scaling: factor before the offset is added.
+    """
+
+    integers: tuple[int, int, int]
+    real: int
+    real_offset: int
+    real_scaling: int
+    integer_offset: int
+    integer_scaling: int
+
+
+ANALOGUE_INPUT: Final = AnalogueObjects(
+    (0x6400, 0x6401, 0x6402), 0x6403, 0x642E, 0x642F, 0x6431, 0x6432
+)
+ANALOGUE_OUTPUT: Final = AnalogueObjects(
+    (0x6410, 0x6411, 0x6412), 0x6413, 0x6441, 0x6442, 0x6446, 0x6447
+)
+INTEGER_LIMITS: Final = 0x6424
+"""Upper limit; after it lower limit, delta, negative delta, positive delta."""
+REAL_LIMITS: Final = 0x6429
+"""The same five as REAL32."""
+ANALOGUE_ERROR_MODE: Final = 0x6443
+INTEGER_ERROR_VALUE: Final = 0x6444
+REAL_ERROR_VALUE: Final = 0x6445
+
+
+def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
+    """Give the numbers that an object holds, each with its sub-index; it may have gaps."""
+    if index in dictionary.objects:
+        for sub in range(1, 255):
+            entry = find_number(dictionary, index, sub)
+            if entry is not None:
+                yield sub, entry
+
+
+def find_number(dictionary: Dictionary, index: int, sub: int) -> Entry | None:
+    """Return an entry that is a number, None if there is none."""
+    entry = dictionary.find(index, sub)
+    if entry is None or not (entry.data_type.is_integer or entry.data_type is DataType.REAL32):
+        return None
+    return entry
+
+
+def channels(dictionary: Dictionary, objects: AnalogueObjects) -> list[int]:
+    """Return the numbers of the channels that a device has, 1..254."""
+    indices = (*objects.integers, objects.real)
+    return sorted({sub for index in indices for sub, _ in elements(dictionary, index)})

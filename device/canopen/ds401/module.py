@@ -1,0 +1,198 @@
+"""A generic I/O module (CiA 401)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tickrig.device.canopen.application import Application, number_of
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds401 import terminals
+from tickrig.device.canopen.ds401.analogue_input import AnalogueInput
+from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
+from tickrig.device.canopen.ds401.converter import Converter
+from tickrig.device.canopen.ds401.device_faults import (
+    INPUT_OVERCURRENT,
+    INTERNAL_FAILURE,
+    OUTPUT_OVERLOAD,
+    FaultDetector,
+)
+from tickrig.device.canopen.ds401.digital_inputs import DigitalInputs
+from tickrig.device.canopen.ds401.digital_outputs import DigitalOutputs
+from tickrig.device.canopen.ds401.families import (
+    ANALOGUE_INPUT,
+    ANALOGUE_INTERRUPT_ENABLE,
+    ANALOGUE_OUTPUT,
+    DIGITAL_INTERRUPT_ENABLE,
+    channels,
+)
+from tickrig.device.canopen.ds401.interrupt_source import InterruptSource
+from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.pdo_producer import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.wire.canopen.nmt import NmtState
+
+
+class Ds401(Application):
+    """Digital and analogue inputs and outputs, as the dictionary has them.
+
+    Events are judged once a tick. A change of an input is an event for TPDOs only
+    if the interrupt masks, or the trigger with its limits and deltas, say so (see
+    `EventRule`). Stop, a communication error and a failure of the device put the
+    error values out; an output leaves its error value when the node becomes
+    Operational or when it is written with another value.
+
+    Without 6005h digital events are on, without 6423h analogue ones.
+
+    Not emulated: joysticks; objects of the manufacturer (6404h, 6414h); SI units
+    (6430h, 6450h are kept and mean nothing); the conversion time.
+
+    Args:
+        inputs: converters of the analogue inputs, from the first one on; plain counts without.
+        outputs: those of the analogue outputs.
+    """
+
+    def __init__(
+        self,
+        node: CanopenSlave,
+        slot: int,
+        *,
+        inputs: Sequence[Converter] = (),
+        outputs: Sequence[Converter] = (),
+    ) -> None:
+        super().__init__(node, slot)
+        dictionary = node.dictionary
+        self._digital_inputs = DigitalInputs(dictionary)
+        self._digital_outputs = DigitalOutputs(dictionary)
+        self._analogue_inputs = _analogue_inputs(dictionary, inputs)
+        self._analogue_outputs = _analogue_outputs(dictionary, outputs)
+        self._channels = {
+            entry.key: channel for channel in self._analogue_inputs for entry in channel.entries
+        }
+        self._source = InterruptSource(dictionary)
+        self._digital_enable = dictionary.find(DIGITAL_INTERRUPT_ENABLE)
+        self._analogue_enable = dictionary.find(ANALOGUE_INTERRUPT_ENABLE)
+        self._faults = self._make_faults()
+        self._lines = terminals.digital_input_names(self._digital_inputs.lines)
+        self._terminals = terminals.outputs(self._digital_outputs, self._analogue_outputs)
+        self.outputs = {name: item for name, (item, _) in self._terminals.items()}
+        self._has_physical_inputs()
+        self._watch_objects()
+
+    def power_on(self) -> None:
+        """Take inputs as they are, begin with outputs at rest."""
+        producer = PdoProducer.of(self.node)
+        producer.on_sent = [self._sent]
+        producer.quiet |= {view.entry.key for view in self._digital_inputs.value.views}
+        producer.quiet |= {*self._channels, *(entry.key for entry in self._source.entries)}
+        self._digital_inputs.power_on(self._level)
+        self._digital_outputs.power_on()
+        for output in self._analogue_outputs:
+            output.power_on()
+
+    def start(self) -> None:
+        """Judge what is an event from now on; look for faults anew."""
+        self._faults.forget()
+        self._fail(failed=False)
+        for channel in self._analogue_inputs:
+            channel.begin(self.inputs[channel.name])
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Leave error values in Operational, put them out in Stopped."""
+        if new is NmtState.OPERATIONAL:
+            self._fail(failed=self._faults.stops_outputs)
+        elif new is NmtState.STOPPED:
+            self._fail(failed=True)
+
+    def communication_error(self) -> None:
+        """Put error values out."""
+        self._fail(failed=True)
+
+    def read(self, name: str) -> float:
+        """Return the present value of a physical output; KeyError if there is none."""
+        return self._terminals[name][1]()
+
+    def on_execute(self, now_us: int) -> None:
+        """Look for faults, read inputs, tell events, put outputs out."""
+        if self._faults.look(self.inputs):
+            self._fail(failed=True)
+        digital = self._digital_inputs.update(self._level, now_us)
+        if number_of(self._digital_enable, 1):
+            self._tell(digital)
+        self._read_analogue()
+        self._digital_outputs.update()
+        for output in self._analogue_outputs:
+            output.update()
+        self.schedule(self._digital_inputs.due_us)
+
+    @property
+    def _level(self) -> int:
+        """The digital inputs as the world sets them; line 1 is the lowest bit."""
+        return sum(1 << bit for bit, name in enumerate(self._lines) if self.inputs[name])
+
+    def _read_analogue(self) -> None:
+        enabled = bool(number_of(self._analogue_enable, 1))
+        for channel in self._analogue_inputs:
+            if channel.update(self.inputs[channel.name], enabled=enabled):
+                self._source.note(channel.number)
+                self._tell(channel.entries)
+
+    def _tell(self, entries: list[Entry]) -> None:
+        producer = PdoProducer.of(self.node)
+        for entry in entries:
+            producer.request_for(entry)
+
+    def _sent(self, entries: list[Entry]) -> None:
+        for entry in entries:
+            if (channel := self._channels.get(entry.key)) is not None:
+                channel.sent()
+
+    def _fail(self, *, failed: bool) -> None:
+        self._digital_outputs.fail(failed=failed)
+        for output in self._analogue_outputs:
+            output.failed = failed
+        self.request()
+
+    def _make_faults(self) -> FaultDetector:
+        faults = [INTERNAL_FAILURE]
+        if self._analogue_inputs:
+            faults.append(INPUT_OVERCURRENT)
+        if self._digital_outputs.lines or self._analogue_outputs:
+            faults.append(OUTPUT_OVERLOAD)
+        return FaultDetector(self.node, faults)
+
+    def _has_physical_inputs(self) -> None:
+        lines = terminals.digital_inputs(self._lines)
+        analogue = (channel.input for channel in self._analogue_inputs)
+        faults = (fault.input for fault in self._faults.faults)
+        self.has_inputs((*lines, *analogue, *faults), terminals.groups(self._lines))
+
+    def _watch_objects(self) -> None:
+        self.watch(self._digital_inputs.settings())
+        self.watch(self._digital_outputs.objects())
+        self.watch([self._analogue_enable] if self._analogue_enable is not None else [])
+        for channel in self._analogue_inputs:
+            self.watch(channel.objects())
+        for output in self._analogue_outputs:
+            self.watch(output.objects())
+
+
+def _analogue_inputs(
+    dictionary: Dictionary, converters: Sequence[Converter]
+) -> list[AnalogueInput]:
+    return [
+        AnalogueInput(dictionary, number, _at(converters, number))
+        for number in channels(dictionary, ANALOGUE_INPUT)
+    ]
+
+
+def _analogue_outputs(
+    dictionary: Dictionary, converters: Sequence[Converter]
+) -> list[AnalogueOutput]:
+    return [
+        AnalogueOutput(dictionary, number, _at(converters, number))
+        for number in channels(dictionary, ANALOGUE_OUTPUT)
+    ]
+
+
+def _at(converters: Sequence[Converter], number: int) -> Converter | None:
+    return converters[number - 1] if number <= len(converters) else None

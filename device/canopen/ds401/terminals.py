@@ -1,0 +1,53 @@
+"""The terminals of a module: what its physical inputs and outputs are called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Final
+
+from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
+from tickrig.device.canopen.ds401.digital_outputs import DigitalOutputs
+from tickrig.device.physical import Input, Output
+
+GROUP_LINES: Final = 8
+
+Terminal = tuple[Output, Callable[[], float]]
+
+
+def digital_input_names(lines: int) -> tuple[str, ...]:
+    """Return `di1` to the last one."""
+    return tuple(f"di{line}" for line in range(1, lines + 1))
+
+
+def digital_inputs(names: Sequence[str]) -> Iterator[Input]:
+    """Give the digital inputs; 1 is high."""
+    for line, name in enumerate(names, 1):
+        yield Input(name, f"digital input {line}")
+
+
+def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the names of eight digital inputs at once: `di`, then `di9_16` and so on."""
+    found = {}
+    for first in range(0, len(names), GROUP_LINES):
+        members = tuple(names[first : first + GROUP_LINES])
+        found[f"di{first + 1}_{first + len(members)}" if first else "di"] = members
+    return found
+
+
+def outputs(digital: DigitalOutputs, analogue: Iterable[AnalogueOutput]) -> dict[str, Terminal]:
+    """Return the outputs by name, each with what reads it: `do1`.., `do` and `ao1`.."""
+    found = [_line(digital, line) for line in range(1, digital.lines + 1)]
+    if found:
+        everything = Output("do", "all digital outputs as a number, output 1 is bit 0")
+        found.append((everything, lambda: digital.level))
+    found += (_channel(output) for output in analogue)
+    return {item.name: (item, read) for item, read in found}
+
+
+def _line(digital: DigitalOutputs, line: int) -> Terminal:
+    output = Output(f"do{line}", f"digital output {line}")
+    return output, lambda: digital.level >> line - 1 & 1
+
+
+def _channel(output: AnalogueOutput) -> Terminal:
+    return output.output, lambda: output.level

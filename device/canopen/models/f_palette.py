@@ -1,0 +1,87 @@
+"""f-palette-CANopen: 8 digital inputs, 8 digital outputs, 8 analogue inputs (NEDO report, table 7).
+
+Its documents are lost; channels, node-ID and converter are decision K22 of the project.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.canopen.communication_profile import (
+    CommunicationProfile,
+    Pdo,
+    add_communication,
+)
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds401 import Converter, Ds401
+from tickrig.device.canopen.objects import RO, ROT, RW, RWW, Objects
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.wire.canopen.datatypes import DataType
+
+NODE_ID: Final = 16
+ANALOGUE_INPUTS: Final = 8
+
+ADC: Final = Converter("v", "V", low=0.0, high=5.0, high_raw=4095, shift=3)
+"""12 bit, left-justified in INTEGER16: 0..32760."""
+
+BOOL: Final = DataType.BOOLEAN
+U8: Final = DataType.UNSIGNED8
+U32: Final = DataType.UNSIGNED32
+I16: Final = DataType.INTEGER16
+I32: Final = DataType.INTEGER32
+
+PROFILE: Final = CommunicationProfile(
+    device_type=0x0007_0191,
+    name="f-palette",
+    hardware="K22",
+    software="tickrig",
+    product_code=1,
+    rpdos=(Pdo(0x200, (0x6200_0108,)),),
+    tpdos=(
+        Pdo(0x180, (0x6000_0108,)),
+        Pdo(0x280, (0x6401_0110, 0x6401_0210, 0x6401_0310, 0x6401_0410)),
+        Pdo(0x380, (0x6401_0510, 0x6401_0610, 0x6401_0710, 0x6401_0810)),
+    ),
+)
+
+
+def dictionary() -> Dictionary:
+    """Make the object dictionary."""
+    objects = Objects()
+    add_communication(objects, PROFILE)
+    _add_digital(objects)
+    _add_analogue(objects)
+    return objects.dictionary()
+
+
+def make(node: CanopenSlave, slot: int) -> Ds401:
+    """Make the application, for `make_slave`."""
+    return Ds401(node, slot, inputs=(ADC,) * ANALOGUE_INPUTS)
+
+
+def _add_digital(objects: Objects) -> None:
+    objects.array(0x6000, "Read input 8-bit", 1, U8, ROT)
+    objects.array(0x6002, "Polarity input 8-bit", 1, U8, RW)
+    objects.array(0x6003, "Filter constant input 8-bit", 1, U8, RW)
+    objects.variable(0x6005, "Global interrupt enable digital", BOOL, RW, 1)
+    objects.array(0x6006, "Interrupt mask any change 8-bit", 1, U8, RW, 0xFF)
+    objects.array(0x6007, "Interrupt mask low to high 8-bit", 1, U8, RW)
+    objects.array(0x6008, "Interrupt mask high to low 8-bit", 1, U8, RW)
+    objects.array(0x6200, "Write output 8-bit", 1, U8, RWW)
+    objects.array(0x6202, "Polarity output 8-bit", 1, U8, RW)
+    objects.array(0x6206, "Error mode output 8-bit", 1, U8, RW, 0xFF)
+    objects.array(0x6207, "Error value output 8-bit", 1, U8, RW)
+    objects.array(0x6208, "Filter mask output 8-bit", 1, U8, RW, 0xFF)
+
+
+def _add_analogue(objects: Objects) -> None:
+    count = ANALOGUE_INPUTS
+    objects.array(0x6401, "Read analogue input 16-bit", count, I16, ROT)
+    objects.array(0x6421, "Analogue input interrupt trigger selection", count, U8, RW, 7)
+    objects.array(0x6422, "Analogue input interrupt source", 1, U32, RO)
+    objects.variable(0x6423, "Analogue input global interrupt enable", BOOL, RW, 0)
+    objects.array(0x6424, "Analogue input interrupt upper limit", count, I32, RW)
+    objects.array(0x6425, "Analogue input interrupt lower limit", count, I32, RW)
+    objects.array(0x6426, "Analogue input interrupt delta", count, U32, RW)
+    objects.array(0x6427, "Analogue input interrupt negative delta", count, U32, RW)
+    objects.array(0x6428, "Analogue input interrupt positive delta", count, U32, RW)
