@@ -1,0 +1,283 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from tests.device.canopen.motor_core_unit.bench import (
+    ANGLE,
+    CURRENT,
+    FAULT,
+    FREE,
+    LIMITED,
+    ON,
+    PRE_OPERATIONAL,
+    REACHED,
+    RESET,
+    START,
+    STOP,
+    VELOCITY,
+    UnitBench,
+)
+from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.core import NEVER
+
+ENCODER_DEG = 360 / 409_600
+"""A count of the motor encoder, at the shaft."""
+
+POTENTIOMETER = [
+    (0, 0.0),
+    (8192, 45.0014),
+    (16384, 90.0027),
+    (24568, 134.9602),
+    (32760, 179.9615),
+]
+"""6411h:01 and angle (shared vectors rtc-canopen.json, fig120_pot)."""
+
+
+@pytest.fixture
+def bench() -> UnitBench:
+    return UnitBench()
+
+
+@pytest.mark.parametrize(("reference", "angle_deg"), POTENTIOMETER)
+def test_an_angle_is_exact_to_the_digits_and_the_shaft_settles_on_it(
+    bench: UnitBench, reference: int, angle_deg: float
+) -> None:
+    bench.begin(ANGLE, reference)
+    assert round(bench.see("target_deg"), 4) == angle_deg
+    bench.pass_ms(1_500)
+    assert bench.see("angle_deg") == pytest.approx(angle_deg, abs=2 * ENCODER_DEG)
+    assert bench.read(0x6401, 1) == pytest.approx(reference, abs=1)
+    assert bench.status == ON | REACHED
+
+
+def test_an_angle_is_reached_after_the_time_of_the_trapezoid(bench: UnitBench) -> None:
+    bench.begin(ANGLE)
+    bench.pass_ms(500)
+    bench.refer(16384)
+    bench.pass_ms(340)
+    assert bench.status == ON
+    bench.pass_ms(20)
+    assert bench.status == ON | REACHED
+
+
+def test_the_shaft_follows_the_planned_motion(bench: UnitBench) -> None:
+    bench.begin(ANGLE, 32760)
+    behind = []
+    for _ in range(60):
+        bench.pass_ms(10)
+        since_us = bench.now_us - bench.unit._begin_us
+        planned_deg, _, _ = bench.unit._motion._trajectory.at(since_us)
+        behind.append(abs(bench.see("angle_deg") - planned_deg))
+    assert max(behind) < 0.1
+
+
+def test_the_velocity_limit_holds_in_angle_mode(bench: UnitBench) -> None:
+    bench.begin(ANGLE)
+    bench.refer(32767, velocity_limit=8192)
+    seen = []
+    for _ in range(300):
+        bench.pass_ms(10)
+        seen.append(bench.see("velocity_deg_s"))
+    assert max(seen) == pytest.approx(90, rel=0.05)
+    assert bench.see("angle_deg") == pytest.approx(180, abs=2 * ENCODER_DEG)
+
+
+def test_the_angle_offset_moves_the_zero(bench: UnitBench) -> None:
+    bench.write(0x2011, 30_000)
+    bench.begin(ANGLE, 8192)
+    bench.pass_ms(1_000)
+    assert bench.see("angle_deg") == pytest.approx(75.0014, abs=2 * ENCODER_DEG)
+    assert bench.read(0x6401, 1) == pytest.approx(8192, abs=1)
+
+
+def test_a_full_scale_scales_references_and_measurements(bench: UnitBench) -> None:
+    bench.write(0x2010, 90_000, sub=1)
+    bench.begin(ANGLE, 16384)
+    bench.pass_ms(1_000)
+    assert bench.see("angle_deg") == pytest.approx(45.0014, abs=2 * ENCODER_DEG)
+    assert bench.read(0x6401, 1) == pytest.approx(16384, abs=1)
+
+
+def test_a_measured_value_beyond_full_scale_stays_there(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 32767)
+    bench.pass_ms(1_000)
+    assert bench.see("angle_deg") > 300
+    assert bench.read(0x6401, 1) == 32767
+    bench.write(0x2010, 0, sub=1)
+    bench.pass_ms(20)
+    assert bench.read(0x6401, 1) == 32767
+
+
+def test_a_velocity_is_ramped_and_kept(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 16384)
+    bench.pass_ms(30)
+    assert bench.status == ON
+    assert 0 < bench.see("velocity_deg_s") < 180
+    bench.pass_ms(500)
+    assert bench.status == ON | REACHED
+    assert bench.see("velocity_deg_s") == pytest.approx(180, rel=0.01)
+    assert bench.read(0x6401, 2) == pytest.approx(16384, rel=0.01)
+
+
+def test_a_current_makes_the_torque_of_the_table(bench: UnitBench) -> None:
+    """15/7 Nm/A, 0.05 kg m^2, 0.5 Nm of friction (K19)."""
+    bench.begin(CURRENT, 3277)
+    bench.pass_ms(110)
+    assert bench.see("current_a") == pytest.approx(1.0, rel=0.02)
+    assert bench.read(0x6401, 3) == pytest.approx(3277, rel=0.02)
+    before = bench.see("velocity_deg_s")
+    bench.pass_ms(50)
+    acceleration_rad_s2 = (bench.see("velocity_deg_s") - before) / 0.05 / 57.2958
+    assert acceleration_rad_s2 == pytest.approx((15 / 7 - 0.5) / 0.05, rel=0.1)
+
+
+def test_a_current_limit_holds(bench: UnitBench) -> None:
+    bench.begin(VELOCITY)
+    bench.refer(32767, current_limit=3277)
+    seen, status = [], 0
+    for _ in range(100):
+        bench.pass_ms(2)
+        seen.append(bench.see("current_a"))
+        status |= bench.status
+    assert max(seen) == pytest.approx(1.0, abs=0.05)
+    assert status & LIMITED
+
+
+def test_free_lets_the_shaft_coast_to_a_stop(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 32767)
+    bench.pass_ms(500)
+    bench.write(0x2000, FREE)
+    bench.pass_ms(20)
+    assert (bench.status, bench.see("current_a")) == (0, 0)
+    assert bench.see("velocity_deg_s") > 300
+    bench.pass_ms(2_000)
+    assert bench.see("velocity_deg_s") == 0
+
+
+@pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL])
+@pytest.mark.parametrize("mode", [CURRENT, VELOCITY, ANGLE])
+def test_whoever_leaves_operational_brakes_and_holds(
+    bench: UnitBench, mode: int, command: str
+) -> None:
+    bench.begin(mode, 4_000 if mode == CURRENT else 10_000)
+    bench.pass_ms(100)
+    before_deg = bench.see("angle_deg")
+    assert bench.see("velocity_deg_s") > 100
+    bench.send(command)
+    bench.pass_ms(500)
+    assert abs(bench.see("velocity_deg_s")) < 0.1
+    assert bench.see("angle_deg") - before_deg < 360**2 / 3_600
+    assert bench.status == ON
+    bench.refer(-10_000)
+    bench.pass_ms(100)
+    assert abs(bench.see("velocity_deg_s")) < 0.1
+
+
+def test_a_reference_acts_again_when_the_node_is_operational_again(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 16384)
+    bench.pass_ms(100)
+    bench.send(PRE_OPERATIONAL)
+    bench.pass_ms(500)
+    bench.send(START)
+    bench.pass_ms(500)
+    assert bench.see("velocity_deg_s") == pytest.approx(180, rel=0.01)
+
+
+@pytest.mark.parametrize("first", [CURRENT, VELOCITY, ANGLE])
+@pytest.mark.parametrize("second", [VELOCITY, ANGLE])
+def test_a_mode_begins_with_the_motion_that_is(bench: UnitBench, first: int, second: int) -> None:
+    bench.begin(first, 4_000 if first == CURRENT else 12_000)
+    bench.pass_ms(120)
+    bench.write(0x2000, second)
+    fastest = 0.0
+    before = bench.see("velocity_deg_s")
+    for _ in range(40):
+        bench.pass_ms(1)
+        now = bench.see("velocity_deg_s")
+        fastest, before = max(fastest, abs(now - before)), now
+    assert before != 0
+    assert fastest < 6  # 3.6 per ms by plan
+
+
+def test_the_current_has_no_step_within_a_control_tick(bench: UnitBench) -> None:
+    bench.begin(CURRENT, 10_000)
+    seen = []
+    for _ in range(12):
+        bench.pass_ms(1)
+        seen.append(bench.see("current_a"))
+    steps = [after - before for before, after in pairwise(seen)]
+    assert max(steps) < 0.6
+
+
+@pytest.mark.parametrize("mode", [4, 255])
+def test_a_mode_that_is_none_is_refused(bench: UnitBench, mode: int) -> None:
+    with pytest.raises(SdoAbort, match="VALUE_TOO_HIGH"):
+        bench.write(0x2000, mode)
+
+
+def test_a_mode_that_is_none_is_free_where_nobody_could_refuse_it(bench: UnitBench) -> None:
+    bench.begin(ANGLE, 8192)
+    bench.slave.dictionary[0x2000, 0].value = 9
+    bench.pass_ms(20)
+    assert (bench.unit.read("mode"), bench.status) == ("free", 0)
+
+
+def test_a_reset_of_the_node_lets_go_of_the_motor(bench: UnitBench) -> None:
+    bench.begin(ANGLE, 8192)
+    bench.pass_ms(500)
+    bench.send(RESET)
+    bench.pass_ms(20)
+    assert (bench.read(0x2000), bench.status, bench.see("current_a")) == (0, 0, 0)
+
+
+def test_the_gear_encoder_knows_the_angle_after_a_power_cut(bench: UnitBench) -> None:
+    bench.begin(ANGLE, -24568)
+    bench.pass_ms(1_000)
+    bench.slave.reset()
+    bench.send()
+    bench.begin(ANGLE, -24568)
+    assert bench.read(0x6401, 1) == pytest.approx(-24568, abs=2)
+    bench.pass_ms(500)
+    assert bench.see("angle_deg") == pytest.approx(-134.9602, abs=0.006)
+
+
+def test_a_shaft_coasts_while_the_power_is_cut(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 32767)
+    bench.pass_ms(500)
+    bench.slave.reset()
+    bench.now_us += 5_000_000
+    bench.send()
+    assert bench.see("velocity_deg_s") == 0
+
+
+def test_a_unit_at_rest_waits_for_nothing_but_its_temperature(bench: UnitBench) -> None:
+    bench.begin(ANGLE, 8192)
+    bench.pass_ms(2_000)
+    assert bench.slave.due_us > bench.now_us + 10_000
+    bench.pass_ms(7_200_000)
+    assert bench.slave.due_us == NEVER
+    assert bench.see("winding_c") == pytest.approx(25, abs=0.2)
+
+
+def test_what_an_observer_sees_has_names(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 100)
+    bench.pass_ms(10)
+    assert set(bench.unit.outputs) == {
+        *("angle_deg", "velocity_deg_s", "current_a", "winding_c"),
+        *("target_deg", "mode", "status"),
+    }
+    assert {name: bench.unit.read(name) for name in ("mode", "status")} == {
+        "mode": "velocity",
+        "status": "on",
+    }
+    with pytest.raises(KeyError, match="colour"):
+        bench.unit.read("colour")
+
+
+def test_the_supply_is_measured(bench: UnitBench) -> None:
+    bench.set("supply_v", 24.5)
+    bench.pass_ms(20)
+    assert bench.read(0x6401, 4) == 2_450
+    assert not bench.status & FAULT
