@@ -68,6 +68,15 @@ class Axis:
         away = position - (self.reference.position - self.zero) / unit
         return self.reference.position + ((away + span / 2) % span - span / 2) * unit
 
+    def clamp(self, counts: float) -> float:
+        """Return the nearest counts within the software limits."""
+        low, high = self.ends
+        return max(low, min(high, counts))
+
+    def per_mille_of(self, current_a: float) -> int:
+        """Return a current in thousandths of the rated one; the user's sign."""
+        return round(1_000 * current_a / self.settings.rated_current_a) * self.forward
+
     def wrap(self) -> None:
         """Move the zero by a whole range when the motor has left the range."""
         low, high = self.settings.position_range
@@ -75,14 +84,16 @@ class Axis:
         turns = (round((self.motor.counts - self.zero) / unit) - low) // (high - low + 1)
         self.zero += turns * (high - low + 1) * unit
 
-    def place_home(self, position: int) -> None:
-        """Call the present place a position of the user: homing is attained."""
-        self.zero = self.motor.counts - position * self.settings.units.per_position
+    def place_home(self, position: int, counts: int) -> None:
+        """Call a place a position of the user: homing is attained."""
+        self.zero = counts - position * self.settings.units.per_position
         self.homed = True
 
     def command(self, control: Control) -> None:
         """Have the motor do what the reference says; what is not controlled follows it."""
         motor, reference = self.motor, self.reference
+        if control is not Control.CURRENT:
+            reference.current_a = motor.current_ma / 1_000
         if control is Control.POSITION:
             motor.drive_position(reference.position, reference.velocity, reference.acceleration)
         elif control is Control.VELOCITY:

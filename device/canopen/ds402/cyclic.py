@@ -8,6 +8,7 @@ from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.mode import Mode
 from tickrig.device.canopen.ds402.reference import STEP_S, Control
 from tickrig.device.canopen.ds402.state import Statusword
+from tickrig.device.canopen.ds402.taken_target import TakenTarget
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -15,50 +16,34 @@ if TYPE_CHECKING:
 STEP_US: Final = 1_000
 
 
-class CyclicPosition(Mode):
+class CyclicPosition(TakenTarget):
     """Goes to the target position within an interpolation period, on a straight line.
 
     A SYNC begins a line, and so does another target without SYNC. At the end of
-    the line it stays. When the mode begins, the target position becomes that of
-    the reference, so that nothing moves before the master says so.
+    the line it stays.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
     """
 
-    halts = False
     tells_following_error = True
+    index = indices.TARGET_POSITION
+    offset = indices.POSITION_OFFSET
 
     def __init__(self, drive: Ds402) -> None:
         super().__init__(drive)
-        self._left = 0
+        self.flags, self._left = Statusword.MODE_12, 0
 
-    def enter(self) -> None:
-        """Take the present position for the target."""
-        self.drive.parameters.write(indices.TARGET_POSITION, self._present)
-
-    @property
-    def _present(self) -> int:
-        offset = self.drive.parameters.number(indices.POSITION_OFFSET)
-        return self.drive.axis.position_of(self.reference.position) - offset
-
-    def run(self, now_us: int) -> bool:
-        """Follow the line."""
+    def follow(self, now_us: int) -> bool:
+        """Make a step along the line."""
         drive, reference = self.drive, self.reference
         if drive.fresh:
             self._left = max(1, drive.settings.interpolation_us // STEP_US)
-        self.flags = Statusword.MODE_12
-        if self._left:
-            self._step(self._target())
-            self._left -= 1
-            return False
-        reference.place(reference.position)
-        return True
-
-    def _target(self) -> float:
-        drive = self.drive
-        number = drive.parameters.number
-        position = number(indices.TARGET_POSITION) + number(indices.POSITION_OFFSET)
-        return drive.within(drive.axis.counts_near(position))
+        if not self._left:
+            reference.place(reference.position)
+            return True
+        self._step(self.target())
+        self._left -= 1
+        return False
 
     def _step(self, target: float) -> None:
         drive, reference = self.drive, self.reference

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Final
 
@@ -28,7 +28,7 @@ from tickrig.device.canopen.ds402.state import (
 from tickrig.device.canopen.ds402.stopping import Stopping
 from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
 from tickrig.device.canopen.ds402.switches import Switches
-from tickrig.device.canopen.ds402.telling import Telling
+from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer, Telling
 from tickrig.device.canopen.slave import TICK_US, CanopenSlave
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import Value
@@ -74,7 +74,11 @@ class Ds402(Application):
 
     Attributes:
         modes: the modes that the drive has, by number.
+        measures: what its objects tell.
         bounds: what it takes for sound.
+        encoder_error: what it calls a pulled encoder.
+        limits_are_faults: the end of the way is a fault, not just a stop.
+        more_targets: objects of a maker whose change is a new target.
         axis: motor, reference and zero.
         control: the loop that the motor works with in this tick.
         controlword: as it was written last.
@@ -84,8 +88,12 @@ class Ds402(Application):
         limited: a limit cut something in this step (bit 11 of the statusword).
     """
 
-    modes: ClassVar[dict[int, type[Mode]]] = MODES
+    modes: ClassVar[Mapping[int, type[Mode]]] = MODES
+    measures: ClassVar[Mapping[Multiplexer, Measure]] = MEASURES
     bounds: ClassVar[Bounds] = Bounds()
+    encoder_error: ClassVar[ErrorCode] = ErrorCode.INCREMENTAL_SENSOR
+    limits_are_faults: ClassVar[bool] = False
+    more_targets: ClassVar[tuple[int, ...]] = ()
     outputs = terminals.OUTPUTS
 
     axis: Axis
@@ -104,7 +112,10 @@ class Ds402(Application):
         self.axis = Axis(motor, read_settings(self.parameters, motor.counts_per_turn))
         self.motor, self.reference, self.switches = motor, self.axis.reference, Switches()
         self.automaton, self.stopping, self.limits = Automaton(self), Stopping(self), Limits(self)
-        self.supervision, self.telling = Supervision(self, self.bounds), Telling(self)
+        self.supervision, self.telling = (
+            Supervision(self, self.bounds),
+            Telling(self, self.measures),
+        )
         self.control, self.controlword = Control.POSITION, 0
         self.mode, self.mode_number = Mode(self), 0
         self.fresh = self.limited = False
@@ -120,7 +131,7 @@ class Ds402(Application):
         parameters = self.parameters
         parameters.watch((indices.CONTROLWORD,), self._controlled)
         parameters.watch((indices.MODES_OF_OPERATION,), self._change_mode)
-        parameters.watch(TARGETS, self._refresh)
+        parameters.watch((*TARGETS, *self.more_targets), self._refresh)
         parameters.watch(CONFIGURATION, self._outdate)
         mode = self.node.dictionary.find(indices.MODES_OF_OPERATION)
         if mode is not None:
@@ -156,6 +167,11 @@ class Ds402(Application):
         settings = self.settings
         wanted = self.parameters.number(indices.TARGET_VELOCITY) + offset
         return self.limits.velocity(wanted * settings.units.per_velocity)
+
+    def target_current(self, offset: int = 0) -> float:
+        """Return 6071h and an offset in amperes, cut to the limits."""
+        per_mille = (self.parameters.number(indices.TARGET_TORQUE) + offset) * self.axis.forward
+        return self.limits.current(per_mille * self.settings.rated_current_a / 1_000)
 
     def within(self, counts: float) -> float:
         """Return a position in counts, cut to the software limits."""
@@ -275,7 +291,11 @@ class Ds402(Application):
     def _touched(self) -> None:
         inputs = self.inputs
         self.switches.set(inputs)
-        self._wired = tuple(code for name, code in terminals.WIRED.items() if inputs[name])
+        wired = (
+            (terminals.SHORT_CIRCUIT, ErrorCode.OVER_CURRENT),
+            (terminals.ENCODER_UNPLUGGED, self.encoder_error),
+        )
+        self._wired = tuple(code for name, code in wired if inputs[name])
         if self._servo is not None:
             terminals.load(self._servo, inputs)
 

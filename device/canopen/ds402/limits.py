@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from tickrig.device.canopen.ds402.faults import ErrorCode
 from tickrig.device.canopen.ds402.reference import Control
 from tickrig.device.canopen.ds402.stopping import Ramp
 
@@ -17,7 +18,8 @@ class Limits:
 
     A pressed limit switch, and a software limit that could not be kept otherwise,
     stop the motor with the quick stop deceleration; it can be moved back. Each
-    cut sets bit 11 of the statusword.
+    cut sets bit 11 of the statusword. For a drive whose `limits_are_faults`, it is a
+    fault too.
 
     Args:
         drive: the drive.
@@ -47,30 +49,37 @@ class Limits:
         drive, reference = self._drive, self._drive.reference
         position, velocity = reference.position, reference.velocity
         settled = step(now_us)
-        if not self._beyond():
+        code = self._beyond()
+        if code is None:
             return settled
         drive.limited = True
         reference.place(position, velocity)
+        if drive.limits_are_faults:
+            drive.fault(code)
         return drive.stopping.brake(Ramp.QUICK_STOP)
 
-    def _beyond(self) -> bool:
-        """Say whether the reference leads on where the motor must not go."""
+    def _beyond(self) -> ErrorCode | None:
+        """Return what ends the way on which the reference leads, None while it is free."""
         drive, reference = self._drive, self._drive.reference
         towards = reference.velocity
         if drive.control is Control.CURRENT:
             towards = towards or reference.current_a
         if not towards:
-            return False
-        word = drive.switches
-        forward = towards * drive.axis.forward > 0
-        if word.positive_limit if forward else word.negative_limit:
-            return True
-        if drive.control is Control.POSITION:
-            return False
+            return None
+        if towards * drive.axis.forward > 0:
+            if drive.switches.positive_limit:
+                return ErrorCode.POSITIVE_LIMIT
+        elif drive.switches.negative_limit:
+            return ErrorCode.NEGATIVE_LIMIT
+        ends = drive.control is not Control.POSITION and self._room(towards) <= 0
+        return ErrorCode.SOFTWARE_LIMIT if ends else None
+
+    def _room(self, towards: float) -> float:
+        """Return the counts that are left before the motor has to brake for a software limit."""
+        drive, reference = self._drive, self._drive.reference
         low, high = drive.axis.ends
-        room = high - reference.position if towards > 0 else reference.position - low
-        braking = reference.velocity**2 / (2 * drive.settings.quick_stop_deceleration)
-        return room <= braking
+        way = high - reference.position if towards > 0 else reference.position - low
+        return way - reference.velocity**2 / (2 * drive.settings.quick_stop_deceleration)
 
     def _cut(self, wanted: float, low: float, high: float) -> float:
         cut = max(low, min(high, wanted))

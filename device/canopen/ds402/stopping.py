@@ -76,16 +76,16 @@ class Stopping:
 
     def brake(self, ramp: int) -> bool:
         """Make a step of a ramp; say whether the motor stands, or has not to be slowed down."""
-        drive, reference, settings = self._drive, self._drive.reference, self._drive.settings
+        drive, settings = self._drive, self._drive.settings
         if ramp == Ramp.NONE:
             return True
         if drive.control is Control.CURRENT:
-            drive.control, reference.current_a = Control.VELOCITY, 0.0
+            drive.control = Control.VELOCITY
         deceleration = {
             Ramp.SLOW_DOWN: settings.deceleration,
             Ramp.QUICK_STOP: settings.quick_stop_deceleration,
         }.get(Ramp(ramp), inf)
-        return reference.ramp(0.0, deceleration, deceleration) and drive.axis.stands
+        return drive.reference.ramp(0.0, deceleration, deceleration) and drive.axis.stands
 
 
 def _guard(allowed: tuple[int, ...]) -> Callable[[Value], None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402 import indices
@@ -12,6 +12,7 @@ from tickrig.device.canopen.entry import Entry
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
 
+Multiplexer = tuple[int, int]
 Measure = Callable[["Ds402"], int]
 
 
@@ -19,20 +20,20 @@ def _velocity(drive: Ds402, counts_s: float) -> int:
     return round(counts_s / drive.settings.units.per_velocity)
 
 
-def _per_mille(drive: Ds402, current_a: float) -> int:
-    return round(1_000 * current_a / drive.settings.rated_current_a)
-
-
-MEASURES: Final[dict[tuple[int, int], Measure]] = {
+MEASURES: Final[Mapping[Multiplexer, Measure]] = {
     (indices.STATUSWORD, 0): lambda drive: drive.statusword,
     (indices.POSITION_DEMAND, 0): lambda drive: drive.axis.position_of(drive.reference.position),
     (indices.POSITION_ACTUAL_INTERNAL, 0): lambda drive: drive.motor.counts,
     (indices.POSITION_ACTUAL, 0): lambda drive: drive.axis.position,
     (indices.VELOCITY_DEMAND, 0): lambda drive: _velocity(drive, drive.reference.velocity),
     (indices.VELOCITY_ACTUAL, 0): lambda drive: _velocity(drive, drive.motor.velocity_counts_s),
-    (indices.TORQUE_DEMAND, 0): lambda drive: _per_mille(drive, drive.reference.current_a),
-    (indices.TORQUE_ACTUAL, 0): lambda drive: _per_mille(drive, drive.motor.current_ma / 1_000),
-    (indices.CURRENT_ACTUAL, 0): lambda drive: _per_mille(drive, drive.motor.current_ma / 1_000),
+    (indices.TORQUE_DEMAND, 0): lambda drive: drive.axis.per_mille_of(drive.reference.current_a),
+    (indices.TORQUE_ACTUAL, 0): lambda drive: drive.axis.per_mille_of(
+        drive.motor.current_ma / 1_000
+    ),
+    (indices.CURRENT_ACTUAL, 0): lambda drive: drive.axis.per_mille_of(
+        drive.motor.current_ma / 1_000
+    ),
     (indices.SUPPLY_VOLTAGE, 0): lambda drive: drive.motor.supply_mv,
     (indices.FOLLOWING_ERROR_ACTUAL, 0): lambda drive: round(
         drive.following_error / drive.settings.units.per_position
@@ -48,12 +49,13 @@ class Telling:
 
     Args:
         drive: whose objects they are.
+        measures: what they tell.
     """
 
-    def __init__(self, drive: Ds402) -> None:
+    def __init__(self, drive: Ds402, measures: Mapping[Multiplexer, Measure]) -> None:
         self._drive = drive
         self._rows: list[tuple[Entry, Measure]] = []
-        for at, measure in MEASURES.items():
+        for at, measure in measures.items():
             entry = drive.node.dictionary.find(*at)
             if entry is not None:
                 self._rows.append((entry, measure))

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402 import switches
-from tickrig.device.canopen.ds402.faults import ErrorCode
 from tickrig.device.physical import Input, Kind, Output, QuantityBank
 
 if TYPE_CHECKING:
@@ -32,12 +31,6 @@ PLANT_INPUTS: Final = (
     Input("motor_phase_open", "a wire of the motor is broken", Kind.FAULT),
 )
 """Of a drive whose motor has physics."""
-
-WIRED: Final = {
-    SHORT_CIRCUIT: ErrorCode.OVER_CURRENT,
-    ENCODER_UNPLUGGED: ErrorCode.INCREMENTAL_SENSOR,
-}
-"""Faults that the electronics of a drive see at once."""
 
 OUTPUTS: Final = {
     item.name: item

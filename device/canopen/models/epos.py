@@ -1,0 +1,219 @@
+"""A positioning drive like Maxon's EPOS 24/5 with a wheel of beego (decision K21).
+
+Objects, units and defaults follow the EPOS Firmware Specification as far as CiA 402
+has the same; docs/epos.md says what is ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar, Final
+
+from tickrig.device.canopen.communication_profile import (
+    OFF,
+    U8,
+    U16,
+    U32,
+    CommunicationProfile,
+    Pdo,
+    add_communication,
+)
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds402 import maxon, modes
+from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.ds402.faults import ErrorCode
+from tickrig.device.canopen.ds402.mode import Mode
+from tickrig.device.canopen.ds402.supervision import Bounds
+from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer
+from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Element, Objects
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.servo import Servo
+from tickrig.wire.canopen.datatypes import DataType
+
+NODE_ID: Final = 1
+"""beego: 1 is the left wheel, 2 the right one."""
+
+I8: Final = DataType.INTEGER8
+I16: Final = DataType.INTEGER16
+I32: Final = DataType.INTEGER32
+
+SERVO_DRIVE: Final = 0x0002_0192
+"""Device type: CiA 402, servo drive."""
+
+RPM: Final = 0xA4
+I32_MAX: Final = (1 << 31) - 1
+I32_MIN: Final = -(1 << 31)
+NO_LIMIT: Final = 0xFFFF_FFFF
+
+PROFILE: Final = CommunicationProfile(
+    device_type=SERVO_DRIVE,
+    name="EPOS",
+    hardware="24/5",
+    software="tickrig",
+    product_code=0x6210,
+    rpdos=(
+        Pdo(0x200, (0x6040_0010, 0x60FF_0020)),
+        Pdo(0x300, (0x6040_0010, 0x607A_0020)),
+        Pdo(OFF | 0x400),
+        Pdo(OFF | 0x500),
+    ),
+    tpdos=(
+        Pdo(0x180, (0x6041_0010, 0x6064_0020), inhibit_100us=100),
+        Pdo(OFF | 0x280, (0x606C_0020, 0x6077_0010, 0x6061_0008), inhibit_100us=100),
+        Pdo(OFF | 0x380),
+        Pdo(OFF | 0x480),
+    ),
+)
+
+
+class Epos(Ds402):
+    """A drive with Maxon's own modes, units and error codes.
+
+    Velocities are revolutions of the motor per minute, accelerations the same per
+    second, positions counts of the motor's encoder. Bits 8 and 15 of the statusword:
+    the current offset is measured, and the position refers to a home position.
+
+    Not emulated: gains of the loops, digital and analogue inputs, master encoder and
+    step modes, RS232.
+    """
+
+    modes: ClassVar[Mapping[int, type[Mode]]] = {**modes.MODES, **maxon.MODES}
+    measures: ClassVar[Mapping[Multiplexer, Measure]] = {
+        **MEASURES,
+        (0x6041, 0): lambda drive: drive.statusword | 0x0100 | 0x8000 * drive.axis.homed,
+        (0x6078, 0): lambda drive: drive.motor.current_ma,
+    }
+    bounds: ClassVar[Bounds] = Bounds(supply_mv=(10_000, 30_000))
+    encoder_error = ErrorCode.POSITION_SENSOR
+    limits_are_faults = True
+    more_targets = maxon.SETTINGS
+
+
+def dictionary() -> Dictionary:
+    """Make the object dictionary."""
+    objects = Objects()
+    add_communication(objects, PROFILE)
+    _add_setting_values(objects)
+    _add_control(objects)
+    _add_options(objects)
+    _add_position(objects)
+    _add_velocity(objects)
+    _add_torque(objects)
+    _add_profile(objects)
+    _add_homing(objects)
+    _add_cyclic(objects)
+    return objects.dictionary()
+
+
+def make(node: CanopenSlave, slot: int) -> Epos:
+    """Make the application, for `make_slave`."""
+    return Epos(node, slot, Servo(EPOS_WHEEL))
+
+
+def _add_setting_values(objects: Objects) -> None:
+    objects.variable(0x2030, "Current mode setting value", I16, RWW)
+    objects.variable(0x2062, "Position mode setting value", I32, RWW)
+    objects.variable(0x206B, "Velocity mode setting value", I32, RWW)
+
+
+def _add_control(objects: Objects) -> None:
+    objects.variable(0x603F, "Error code", U16, ROT)
+    objects.variable(0x6040, "Controlword", U16, RWW)
+    objects.variable(0x6041, "Statusword", U16, ROT)
+    objects.variable(0x6060, "Modes of operation", I8, RWW, 1)
+    objects.variable(0x6061, "Modes of operation display", I8, ROT)
+    objects.variable(0x60FD, "Digital inputs", U32, ROT)
+    objects.variable(0x6402, "Motor type", U16, RO, 1)
+    objects.variable(0x6502, "Supported drive modes", U32, RO)
+
+
+def _add_options(objects: Objects) -> None:
+    for index, name, default in (
+        (0x6007, "Abort connection option code", 1),
+        (0x605A, "Quick stop option code", 2),
+        (0x605B, "Shutdown option code", 0),
+        (0x605C, "Disable operation option code", 1),
+        (0x605D, "Halt option code", 1),
+        (0x605E, "Fault reaction option code", 2),
+    ):
+        objects.variable(index, name, I16, RW, default)
+
+
+def _add_position(objects: Objects) -> None:
+    objects.variable(0x6062, "Position demand value", I32, ROT)
+    objects.variable(0x6063, "Position actual internal value", I32, ROT)
+    objects.variable(0x6064, "Position actual value", I32, ROT)
+    objects.variable(0x6065, "Following error window", U32, RW, 2_000)
+    objects.variable(0x6066, "Following error time out", U16, RW)
+    objects.variable(0x6067, "Position window", U32, RW, NO_LIMIT)
+    objects.variable(0x6068, "Position window time", U16, RW)
+    objects.variable(0x607A, "Target position", I32, RWW)
+    limits = (("Minimal position limit", I32_MIN), ("Maximal position limit", I32_MAX))
+    rows = [Element(sub, name, I32, RW, value) for sub, (name, value) in enumerate(limits, 1)]
+    objects.record(0x607D, "Software position limit", rows)
+    objects.variable(0x607E, "Polarity", U8, RW)
+    objects.variable(0x60F4, "Following error actual value", I32, ROT)
+    objects.variable(0x60FC, "Position demand internal value", I32, ROT)
+
+
+def _add_velocity(objects: Objects) -> None:
+    objects.variable(0x606B, "Velocity demand value", I32, ROT)
+    objects.variable(0x606C, "Velocity actual value", I32, ROT)
+    objects.variable(0x606D, "Velocity window", U16, RW)
+    objects.variable(0x606E, "Velocity window time", U16, RW)
+    objects.variable(0x606F, "Velocity threshold", U16, RW)
+    objects.variable(0x6070, "Velocity threshold time", U16, RW)
+    objects.variable(0x608B, "Velocity notation index", I8, CONST, 0)
+    objects.variable(0x608C, "Velocity dimension index", U8, CONST, RPM)
+    objects.variable(0x60FF, "Target velocity", I32, RWW)
+
+
+def _add_torque(objects: Objects) -> None:
+    objects.variable(0x6071, "Target torque", I16, RWW)
+    objects.variable(0x6072, "Max torque", U16, RWW, 2_900)
+    objects.variable(0x6073, "Max current", U16, RW, 2_900)
+    objects.variable(0x6074, "Torque demand", I16, ROT)
+    objects.variable(0x6075, "Motor rated current", U32, RW, 3_440)
+    objects.variable(0x6076, "Motor rated torque", U32, RW, 85)
+    objects.variable(0x6077, "Torque actual value", I16, ROT)
+    objects.variable(0x6078, "Current actual value", I16, ROT)
+    objects.variable(0x6079, "DC link circuit voltage", U32, ROT)
+    objects.variable(0x6087, "Torque slope", U32, RW, 10_000)
+    objects.variable(0x60E0, "Positive torque limit value", U16, RWW, 2_900)
+    objects.variable(0x60E1, "Negative torque limit value", U16, RWW, 2_900)
+
+
+def _add_profile(objects: Objects) -> None:
+    objects.variable(0x607F, "Max profile velocity", U32, RW, 25_000)
+    objects.variable(0x6080, "Max motor speed", U32, RW, 25_000)
+    objects.variable(0x6081, "Profile velocity", U32, RW, 1_000)
+    objects.variable(0x6083, "Profile acceleration", U32, RW, 10_000)
+    objects.variable(0x6084, "Profile deceleration", U32, RW, 10_000)
+    objects.variable(0x6085, "Quick stop deceleration", U32, RW, 10_000)
+    objects.variable(0x6086, "Motion profile type", I16, RW)
+
+
+def _add_homing(objects: Objects) -> None:
+    objects.variable(0x607C, "Home offset", I32, RW)
+    objects.variable(0x6098, "Homing method", I8, RW, 7)
+    speeds = (("Speed for switch search", 100), ("Speed for zero search", 10))
+    rows = [Element(sub, name, U32, RW, value) for sub, (name, value) in enumerate(speeds, 1)]
+    objects.record(0x6099, "Homing speeds", rows)
+    objects.variable(0x609A, "Homing acceleration", U32, RW, 1_000)
+
+
+def _add_cyclic(objects: Objects) -> None:
+    objects.variable(0x60B0, "Position offset", I32, RWW)
+    objects.variable(0x60B1, "Velocity offset", I32, RWW)
+    objects.variable(0x60B2, "Torque offset", I16, RWW)
+    objects.variable(0x60C0, "Interpolation sub mode select", I16, RW)
+    rows = [Element(1, "Interpolation data record 1", I32, RWW)]
+    objects.record(0x60C1, "Interpolation data record", rows)
+    rows = [
+        Element(1, "Interpolation time period value", U8, RW, 10),
+        Element(2, "Interpolation time index", I8, RW, -3),
+    ]
+    objects.record(0x60C2, "Interpolation time period", rows)
+    objects.variable(0x60C5, "Max acceleration", U32, RW, NO_LIMIT)
+    objects.variable(0x60C6, "Max deceleration", U32, RW, NO_LIMIT)
