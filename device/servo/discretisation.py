@@ -1,18 +1,20 @@
 """The exact answer of winding and shaft to one control step.
 
-Between two control steps voltage, friction and load are constant, and
-
     L di/dt = u - R i - k w
     J dw/dt = k i - b w + m        m: torque of load and friction
 
-is linear: the state at the end of the step is a matrix times the state at its
-start. The matrix comes from the exponential of the system once for each
+is linear, so the state after a step is a matrix times the state before it. As
+long as the voltage allows, the current regulator, which is much faster than a
+step, leads the current on a straight line to its demand; else the voltage is
+constant. The matrices come from exponentials of the two systems, once for each
 inertia and resistance, so no step is too long and none can become unstable.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from tickrig.device.servo.parameters import MotorParameters
 
 STEP_S = 0.001
 
@@ -24,18 +26,18 @@ Matrix = list[list[float]]
 class Discretisation:
     """One control step of winding and shaft as rows of numbers.
 
-    The rows of an imposed current multiply (current before, speed before,
-    current after, torque); those of an imposed voltage (current before, speed
-    before, voltage, torque).
+    The rows of a led current multiply (current before, speed before, current
+    after, torque); those of a constant voltage (current before, speed before,
+    voltage, torque).
 
     Attributes:
-        speed: speed after the step, current imposed, rad/s.
-        angle: way of the shaft, current imposed, rad.
-        voltage: voltage that imposes the current, V.
-        current_u: current after the step, voltage imposed, A.
-        speed_u: speed after the step, voltage imposed, rad/s.
-        angle_u: way of the shaft, voltage imposed, rad.
-        square: weights of (di^2, di dw, dw^2) in the integral of the squared current;
+        speed: speed after the step, current led, rad/s.
+        angle: way of the shaft, current led, rad.
+        voltage: constant voltage that ends at a current after the step, V.
+        current_u: current after the step, voltage constant, A.
+        speed_u: speed after the step, voltage constant, rad/s.
+        angle_u: way of the shaft, voltage constant, rad.
+        square_u: weights of (di^2, di dw, dw^2) in the integral of the squared current;
             di and dw are distances from the state to which a constant voltage leads.
     """
 
@@ -45,56 +47,32 @@ class Discretisation:
     current_u: Row
     speed_u: Row
     angle_u: Row
-    square: tuple[float, float, float]
+    square_u: tuple[float, float, float]
 
 
-def discretise(r: float, el: float, k: float, j: float, b: float) -> Discretisation:
-    """Work out the step of a motor.
-
-    Args:
-        r: resistance, ohm.
-        el: inductance, H.
-        k: torque constant, Nm/A.
-        j: inertia, kg m2.
-        b: viscous friction, Nm s.
-    """
-    system = [  # of current, speed, angle, voltage, torque
-        [-r / el, -k / el, 0.0, 1 / el, 0.0],
-        [k / j, -b / j, 0.0, 0.0, 1 / j],
-        [0.0, 1.0, 0.0, 0.0, 0.0],
-        [0.0] * 5,
-        [0.0] * 5,
+def discretise(
+    motor: MotorParameters, resistance_ohm: float, inertia_kg_m2: float
+) -> Discretisation:
+    """Work out the step of a motor with its present resistance and inertia."""
+    k, el = motor.torque_constant_nm_a, motor.inductance_h
+    dw_di, dw_dw, dw_dm = k / inertia_kg_m2, -motor.viscous_nm_s / inertia_kg_m2, 1 / inertia_kg_m2
+    di_di, di_dw = -resistance_ohm / el, -k / el
+    led = [  # of speed, angle, current, slope of the current, torque
+        [dw_dw, 0.0, dw_di, 0.0, dw_dm],
+        [1.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
     ]
-    current, speed, angle = (
-        (row[0], row[1], row[3], row[4])
-        for row in exponential([[x * STEP_S for x in row] for row in system])[:3]
-    )
-    i, w, u, m = current
+    constant = [  # of current, speed, angle, voltage, torque
+        [di_di, di_dw, 0.0, 1 / el, 0.0],
+        [dw_di, dw_dw, 0.0, 0.0, dw_dm],
+        [0.0, 1.0, 0.0, 0.0, 0.0],
+    ]
+    speed, angle = ((i - s / STEP_S, w, s / STEP_S, m) for w, _, i, s, m in _step(led)[:2])
+    current_u, speed_u, angle_u = ((i, w, u, m) for i, w, _, u, m in _step(constant)[:3])
+    i, w, u, m = current_u
+    square_u = _square((di_di, di_dw), (dw_di, dw_dw), i, w)
     voltage = (-i / u, -w / u, 1 / u, -m / u)
-    return Discretisation(
-        speed=_impose(speed, voltage),
-        angle=_impose(angle, voltage),
-        voltage=voltage,
-        current_u=current,
-        speed_u=speed,
-        angle_u=angle,
-        square=_square(system, i, w),
-    )
-
-
-def coast(j: float, b: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Work out the step of a shaft without current: weights of (speed, torque).
-
-    Args:
-        j: inertia, kg m2.
-        b: viscous friction, Nm s.
-
-    Returns:
-        Those of the speed after the step, and those of the way of the shaft.
-    """
-    system = [[-b / j, 0.0, 1 / j], [1.0, 0.0, 0.0], [0.0] * 3]
-    speed, angle, _ = exponential([[x * STEP_S for x in row] for row in system])
-    return (speed[0], speed[2]), (angle[0], angle[2])
+    return Discretisation(speed, angle, voltage, current_u, speed_u, angle_u, square_u)
 
 
 def exponential(matrix: Matrix) -> Matrix:
@@ -122,15 +100,23 @@ def _product(a: Matrix, b: Matrix) -> Matrix:
     return [[sum(map(float.__mul__, row, column)) for column in columns] for row in a]
 
 
-def _impose(row: Row, voltage: Row) -> Row:
-    """Put the voltage that imposes a current into a row of an imposed voltage."""
-    i, w, u, m = row
-    return i + u * voltage[0], w + u * voltage[1], u * voltage[2], m + u * voltage[3]
+def _step(system: Matrix) -> Matrix:
+    """Return the step of a system whose last two inputs are constant."""
+    return exponential([[x * STEP_S for x in row] for row in [*system, [0.0] * 5, [0.0] * 5]])
 
 
-def _square(system: Matrix, i: float, w: float) -> tuple[float, float, float]:
-    """Solve the Lyapunov equation of the squared current over one step."""
-    (a, b), (c, d) = system[0][:2], system[1][:2]
+def _square(
+    current: tuple[float, float], speed: tuple[float, float], i: float, w: float
+) -> tuple[float, float, float]:
+    """Solve the Lyapunov equation of the squared current over one step.
+
+    Args:
+        current: what current and speed do to the slope of the current.
+        speed: what they do to that of the speed.
+        i: part of the current that is left after a step.
+        w: what the speed has done to the current by then.
+    """
+    (a, b), (c, d) = current, speed
     s11, s12, s22 = i * i - 1, i * w, w * w
     rest = a + d - b * c / a
     m22 = (s12 - b * s11 / (2 * a) - s22 * rest / (2 * b)) / (c - d * rest / b)

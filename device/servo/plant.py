@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import exp, pi
 
-from tickrig.device.servo.discretisation import STEP_S, coast, discretise
+from tickrig.device.servo.discretisation import STEP_S, discretise
+from tickrig.device.servo.losses import Losses
 from tickrig.device.servo.parameters import ServoParameters
 
 BREAKAWAY = 1.02  # static friction by dry friction; it ends a creep, and makes no jump
@@ -16,69 +17,56 @@ class Plant:
     Dry friction is a torque within bounds that is as large as it must be to
     stop the shaft in this step, if the bounds allow (time stepping after
     Moreau). So there is no chatter, and a shaft at rest is at rest exactly.
-    The current follows its demand within a step, as long as the voltage
-    allows. Not modelled: PWM ripple, cogging, a breakaway torque above the
-    dry friction, play and elasticity, the loss of the gear on its inertia.
+    Not modelled: the ripple of current regulator and PWM, cogging, play and
+    elasticity, the loss of the gear on its inertia.
 
     Attributes:
         current_a: current in the winding.
         speed_rad_s: speed of the motor.
         position: angle of the motor, counts.
         blocked: the shaft is held.
-        load_nm: external torque at the motor shaft, before the gear's loss.
-        friction_nm: bounds of the friction, backward and forward.
-        square_a2s: integral of the squared current.
-        electrical_j: energy that came out of the power stage.
-        copper_j: heat of the winding.
-        friction_j: heat of friction and gear, and of a shaft that was held.
-        resistance_ohm: present resistance of the winding.
+        load_nm: external torque at the motor shaft, before the loss of the gear.
+        friction_nm: bounds of the friction: against forward, against backward motion.
         inertia_kg_m2: present inertia at the motor shaft.
+        resistance_ohm: present resistance of the winding.
+        losses: energies since the start.
     """
 
     __slots__ = (
-        "_coasting",
         "_coulomb_nm",
         "_counts_per_rad",
-        "_held",
+        "_left",
         "_motor",
         "_step",
         "blocked",
-        "copper_j",
         "current_a",
-        "electrical_j",
-        "friction_j",
         "friction_nm",
         "inertia_kg_m2",
         "load_nm",
+        "losses",
         "position",
         "resistance_ohm",
         "speed_rad_s",
-        "square_a2s",
     )
 
     def __init__(self, parameters: ServoParameters) -> None:
-        self._motor = parameters.motor
+        self._motor, self._coulomb_nm = parameters.motor, parameters.coulomb_nm
         self._counts_per_rad = parameters.encoders.counts_per_turn / (2 * pi)
-        self._coulomb_nm = parameters.coulomb_nm
         self.current_a = self.speed_rad_s = self.position = 0.0
-        self.square_a2s = self.electrical_j = self.copper_j = self.friction_j = 0.0
-        self.blocked = False
+        self.blocked, self.losses = False, Losses()
         self.bear(0.0, 1.0)
         self.shape(parameters.inertia_kg_m2, parameters.motor.resistance_ohm)
-
-    def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
-        """Take another inertia or resistance; the speed stays."""
-        motor = self._motor
-        el, b = motor.inductance_h, motor.viscous_nm_s
-        self.inertia_kg_m2, self.resistance_ohm = inertia_kg_m2, resistance_ohm
-        self._step = discretise(resistance_ohm, el, motor.torque_constant_nm_a, inertia_kg_m2, b)
-        self._coasting = coast(inertia_kg_m2, b)
-        self._held = exp(-resistance_ohm * STEP_S / el)
 
     @property
     def velocity_counts_s(self) -> float:
         """Speed of the motor, counts/s."""
         return self.speed_rad_s * self._counts_per_rad
+
+    def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
+        """Take another inertia or resistance; the speed stays."""
+        self.inertia_kg_m2, self.resistance_ohm = inertia_kg_m2, resistance_ohm
+        self._step = discretise(self._motor, resistance_ohm, inertia_kg_m2)
+        self._left = exp(-resistance_ohm * STEP_S / self._motor.inductance_h)
 
     def bear(self, load_nm: float, efficiency: float) -> None:
         """Take an external torque; the gear takes its part as friction.
@@ -94,48 +82,85 @@ class Plant:
     def hold(self, blocked: bool) -> None:
         """Hold the shaft, or let it go."""
         if blocked:
-            self.friction_j += self.inertia_kg_m2 * self.speed_rad_s**2 / 2
+            self.losses.friction_j += self.inertia_kg_m2 * self.speed_rad_s**2 / 2
             self.speed_rad_s = 0.0
         self.blocked = blocked
 
     def open(self) -> None:
         """Let one step pass with the winding open; what current there was dies in the diodes."""
-        self.copper_j += self._motor.inductance_h * self.current_a**2 / 2
+        self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
         self.current_a = 0.0
         if self.speed_rad_s == 0.0 and self._sticks(0.0):
             return
-        (s0, s1), (a0, a1) = self._coasting
+        (_, s1, _, s3), (_, a1, _, a3) = self._step.speed, self._step.angle
         w, m = self.speed_rad_s, self.load_nm
-        free = s0 * w + s1 * m
-        friction, speed = self._rub(free, s1)
-        self._turn(speed, a0 * w + a1 * (m + friction), friction)
+        friction, speed = self._rub(s1 * w + s3 * m, s3)
+        self._turn(speed, a1 * w + a3 * (m + friction), friction)
 
     def drive(self, current_a: float, limit_v: float) -> int:
         """Let one step pass toward a current; return how the voltage cut it: -1, 0, 1."""
         if self.speed_rad_s == 0.0 and (cut := self._stay(current_a, limit_v)) is not None:
             return cut
-        step, i, w, m = self._step, self.current_a, self.speed_rad_s, self.load_nm
+        step, motor, i, w = self._step, self._motor, self.current_a, self.speed_rad_s
         s0, s1, s2, s3 = step.speed
-        friction, speed = self._rub(s0 * i + s1 * w + s2 * current_a + s3 * m, s3)
+        free = s0 * i + s1 * w + s2 * current_a + s3 * self.load_nm
+        friction, speed = self._rub(free, s3)
+        k, r, rise = motor.torque_constant_nm_a, self.resistance_ohm, current_a - i
+        slope_v = motor.inductance_h * rise / STEP_S
+        if (
+            not -limit_v <= r * i + k * w + slope_v <= limit_v
+            or not -limit_v <= r * current_a + k * speed + slope_v <= limit_v
+        ):
+            return self._drive_constant(current_a, limit_v, friction)
+        a0, a1, a2, a3 = step.angle
+        way = a0 * i + a1 * w + a2 * current_a + a3 * (self.load_nm + friction)
+        self._lead(current_a, k * self._mean(current_a, speed, way))
+        self._turn(speed, way, friction)
+        return 0
+
+    def _drive_constant(self, current_a: float, limit_v: float, friction: float) -> int:
+        """Let a step pass at the constant voltage that leads to a current, or is nearest."""
+        step, i, w, m = self._step, self.current_a, self.speed_rad_s, self.load_nm
         v0, v1, v2, v3 = step.voltage
-        u = v0 * i + v1 * w + v2 * current_a + v3 * (m + friction)
-        if -limit_v <= u <= limit_v:
-            a0, a1, a2, a3 = step.angle
-            way = a0 * i + a1 * w + a2 * current_a + a3 * (m + friction)
-            self._carry(current_a, u, way, friction)
-            self._turn(speed, way, friction)
-            return 0
-        cut = 1 if u > 0 else -1
-        u = cut * limit_v
+        u, cut = _within(v0 * i + v1 * w + v2 * current_a + v3 * (m + friction), limit_v)
         s0, s1, s2, s3 = step.speed_u
         friction, speed = self._rub(s0 * i + s1 * w + s2 * u + s3 * m, s3)
         m += friction
         a0, a1, a2, a3 = step.angle_u
         way = a0 * i + a1 * w + a2 * u + a3 * m
         c0, c1, c2, c3 = step.current_u
-        self._carry(c0 * i + c1 * w + c2 * u + c3 * m, u, way, friction)
+        self._carry(c0 * i + c1 * w + c2 * u + c3 * m, u, way, m)
         self._turn(speed, way, friction)
         return cut
+
+    def _stay(self, current_a: float, limit_v: float) -> int | None:
+        """Let a step pass at standstill; None if the shaft would not stay."""
+        i, r, left = self.current_a, self.resistance_ohm, self._left
+        slope_v = self._motor.inductance_h * abs(current_a - i) / STEP_S
+        straight, cut, u = r * max(abs(i), abs(current_a)) + slope_v <= limit_v, 0, 0.0
+        if not straight:
+            u, cut = _within(r * (current_a - left * i) / (1 - left), limit_v)
+            current_a = left * i + (1 - left) * u / r
+        if not (self._sticks(i) and self._sticks(current_a)):
+            return None
+        if straight:
+            self._lead(current_a, 0.0)
+        else:
+            self._approach(current_a, u)
+        return cut
+
+    def _approach(self, current_a: float, u: float) -> None:
+        """Take over a current after a step of constant voltage at standstill."""
+        i, r, el, left = self.current_a, self.resistance_ohm, self._motor.inductance_h, self._left
+        charge, end = (u * STEP_S - el * (current_a - i)) / r, u / r
+        square = (1 - left * left) * el / (2 * r) * (i - end) ** 2
+        self._pay(current_a, u * charge, square + (2 * charge - end * STEP_S) * end)
+
+    def _sticks(self, current_a: float) -> bool:
+        """Return whether friction holds the shaft against this current and the load."""
+        low, high = self.friction_nm
+        friction = -self._motor.torque_constant_nm_a * current_a - self.load_nm
+        return low * BREAKAWAY <= friction <= high * BREAKAWAY or self.blocked
 
     def _rub(self, free: float, per_nm: float) -> tuple[float, float]:
         """Return the friction, and the speed after a step that would end at `free` without it."""
@@ -146,54 +171,50 @@ class Plant:
         friction = low if friction < low else high
         return friction, free + per_nm * friction
 
-    def _sticks(self, current_a: float) -> bool:
-        """Return whether friction holds the shaft against this current and the load."""
-        low, high = self.friction_nm
-        friction = -self._motor.torque_constant_nm_a * current_a - self.load_nm
-        return low * BREAKAWAY <= friction <= high * BREAKAWAY or self.blocked
+    def _lead(self, current_a: float, back_emf_j: float) -> None:
+        """Take over a current that went straight to its demand."""
+        i = self.current_a
+        square = (i * i + i * current_a + current_a * current_a) / 3 * STEP_S
+        magnetic = self._motor.inductance_h * (current_a * current_a - i * i) / 2
+        self._pay(current_a, self.resistance_ohm * square + magnetic + back_emf_j, square)
 
-    def _stay(self, current_a: float, limit_v: float) -> int | None:
-        """Let a step pass at standstill; None if the shaft would not stay."""
-        i, r, left = self.current_a, self.resistance_ohm, self._held
-        u = r * (current_a - left * i) / (1 - left)
-        cut = 0
-        if not -limit_v <= u <= limit_v:
-            cut = 1 if u > 0 else -1
-            u = cut * limit_v
-            current_a = left * i + (1 - left) * u / r
-        if not (self._sticks(i) and self._sticks(current_a)):
-            return None
-        el = self._motor.inductance_h
-        charge = (u * STEP_S - el * (current_a - i)) / r
-        end = u / r
-        square = (1 - left * left) * el / (2 * r) * (i - end) ** 2
-        square += (2 * charge - end * STEP_S) * end
-        self._heat(charge * u, square)
-        self.current_a = current_a
-        return cut
+    def _mean(self, current_a: float, speed: float, way: float) -> float:
+        """Return the integral of current times speed, by Simpson's rule."""
+        i, w = self.current_a, self.speed_rad_s
+        middle = (6 * way / STEP_S - w - speed) / 4
+        return (i * w + 2 * (i + current_a) * middle + current_a * speed) * STEP_S / 6
 
-    def _carry(self, current_a: float, u: float, way: float, friction: float) -> None:
-        """Take over the current after a step, and what it heated."""
-        motor, i, w, r = self._motor, self.current_a, self.speed_rad_s, self.resistance_ohm
-        k, b, m = motor.torque_constant_nm_a, motor.viscous_nm_s, self.load_nm + friction
+    def _carry(self, current_a: float, u: float, way: float, m: float) -> None:
+        """Take over the current after a step of constant voltage."""
+        motor, i, r = self._motor, self.current_a, self.resistance_ohm
+        k, b = motor.torque_constant_nm_a, motor.viscous_nm_s
         charge = (u * STEP_S - motor.inductance_h * (current_a - i) - k * way) / r
         scale = 1 / (r * b + k * k)
         end = (u * b - k * m) * scale
-        di, dw = i - end, w - (u * k + r * m) * scale
-        q0, q1, q2 = self._step.square
+        di, dw = i - end, self.speed_rad_s - (u * k + r * m) * scale
+        q0, q1, q2 = self._step.square_u
         square = q0 * di * di + q1 * di * dw + q2 * dw * dw + (2 * charge - end * STEP_S) * end
-        self._heat(charge * u, square)
-        self.current_a = current_a
+        self._pay(current_a, u * charge, square)
 
-    def _heat(self, electrical_j: float, square_a2s: float) -> None:
-        self.electrical_j += electrical_j
-        self.square_a2s += square_a2s
-        self.copper_j += self.resistance_ohm * square_a2s
+    def _pay(self, current_a: float, electrical_j: float, square_a2s: float) -> None:
+        """Take over a current, and what it cost."""
+        losses = self.losses
+        losses.electrical_j += electrical_j
+        losses.square_a2s += square_a2s
+        losses.copper_j += self.resistance_ohm * square_a2s
+        self.current_a = current_a
 
     def _turn(self, speed: float, way: float, friction: float) -> None:
         """Take over speed and angle after a step, and what rubbed."""
         w = self.speed_rad_s
-        mean_square = (w * w + w * speed + speed * speed) / 3
-        self.friction_j += self._motor.viscous_nm_s * mean_square * STEP_S - friction * way
+        viscous = self._motor.viscous_nm_s * (w * w + w * speed + speed * speed) / 3 * STEP_S
+        self.losses.friction_j += viscous - friction * way
         self.speed_rad_s = speed
         self.position += way * self._counts_per_rad
+
+
+def _within(voltage: float, limit_v: float) -> tuple[float, int]:
+    """Return the voltage within a limit, and in which direction it was cut."""
+    if -limit_v <= voltage <= limit_v:
+        return voltage, 0
+    return (limit_v, 1) if voltage > 0 else (-limit_v, -1)

@@ -25,7 +25,7 @@ RE_30: Final = MotorParameters(  # maxon catalogue, RE 30, 60 W, 24 V, order num
     winding_housing_k_w=1.7,
     housing_ambient_k_w=6.0,
     winding_s=16.2,
-    housing_s=714.0,
+    housing_s=593.0,
     winding_max_c=125.0,
 )
 
@@ -35,7 +35,7 @@ EPOS_24_5: Final = PowerStage(  # EPOS 24/5: 11..24 V, 5 A, 10 A for 1 s, 0.9 of
     peak_s=1.0,
     duty_max=0.9,
     supply_v=24.0,
-    supply_min_v=9.0,
+    supply_min_v=9.0,  # chosen, below the 11 V of its manual
 )
 
 EPOS_WHEEL: Final = ServoParameters(

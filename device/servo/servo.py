@@ -185,8 +185,8 @@ class Servo(Readings):
     def _look(self) -> None:
         """Take heat and overload of the latest steps into account."""
         plant, heat = self._plant, self._heat
-        heat.pass_time(self.now_us, plant.square_a2s)
-        plant.square_a2s = 0.0
+        heat.pass_time(self.now_us, plant.losses.square_a2s)
+        plant.losses.square_a2s = 0.0
         resistance = heat.resistance_ohm
         if abs(resistance - plant.resistance_ohm) > RESISTANCE_STEP * resistance:
             plant.shape(plant.inertia_kg_m2, resistance)
@@ -202,6 +202,6 @@ class Servo(Readings):
     def _wake(self) -> None:
         """Take the time of rest into account."""
         plant, rested_us = self._plant, self.now_us - self._heat.since_us
-        plant.square_a2s = plant.current_a**2 * rested_us / 1_000_000
+        plant.losses.square_a2s = plant.current_a**2 * rested_us / 1_000_000
         self.resting = False
         self._look()
