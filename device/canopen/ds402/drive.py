@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.ds402 import indices, terminals
+from tickrig.device.canopen.ds402.allowed import guard_values
 from tickrig.device.canopen.ds402.automaton import Automaton
 from tickrig.device.canopen.ds402.axis import Axis
 from tickrig.device.canopen.ds402.faults import COMMUNICATION_ERRORS, ErrorCode, register_of
@@ -30,8 +30,6 @@ from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
 from tickrig.device.canopen.ds402.switches import Switches
 from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer, Telling
 from tickrig.device.canopen.slave import TICK_US, CanopenSlave
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
@@ -43,6 +41,14 @@ TARGETS: Final = (
     indices.INTERPOLATION_DATA,
 )
 
+
+STATE_BITS: Final = {state: int(state | Statusword.REMOTE) for state in DriveState}
+"""What the statusword shows of a state, and that the bus is in control."""
+
+_VOLTAGE_ENABLED: Final = int(Statusword.VOLTAGE_ENABLED)
+_WARNING: Final = int(Statusword.WARNING)
+_INTERNAL_LIMIT: Final = int(Statusword.INTERNAL_LIMIT)
+_FOLLOWING_ERROR: Final = int(Statusword.MODE_13)
 
 COOLING_US: Final = 1_000_000
 """Period in which a drive at rest looks at its temperature."""
@@ -79,6 +85,7 @@ class Ds402(Application):
         encoder_error: what it calls a pulled encoder.
         limits_are_faults: the end of the way is a fault, not just a stop.
         more_targets: objects of a maker whose change is a new target.
+        settings: the present configuration.
         axis: motor, reference and zero.
         control: the loop that the motor works with in this tick.
         controlword: as it was written last.
@@ -109,7 +116,8 @@ class Ds402(Application):
         self._servo = servo
         motor: Motor = servo or IdealMotor()
         self.parameters = Parameters(node.dictionary)
-        self.axis = Axis(motor, read_settings(self.parameters, motor.counts_per_turn))
+        self.settings = read_settings(self.parameters, motor.counts_per_turn)
+        self.axis = Axis(motor, self.settings)
         self.motor, self.reference, self.switches = motor, self.axis.reference, Switches()
         self.automaton, self.stopping, self.limits = Automaton(self), Stopping(self), Limits(self)
         self.supervision, self.telling = (
@@ -133,9 +141,7 @@ class Ds402(Application):
         parameters.watch((indices.MODES_OF_OPERATION,), self._change_mode)
         parameters.watch((*TARGETS, *self.more_targets), self._refresh)
         parameters.watch(CONFIGURATION, self._outdate)
-        mode = self.node.dictionary.find(indices.MODES_OF_OPERATION)
-        if mode is not None:
-            mode.guard = self._known_mode
+        guard_values(self.node.dictionary, self.modes)
         self.node.on_sync.append(self._sync)
 
     @property
@@ -147,11 +153,6 @@ class Ds402(Application):
     def enabled(self) -> bool:
         """Whether it is in Operation enabled."""
         return self.automaton.state is DriveState.OPERATION_ENABLED
-
-    @property
-    def settings(self) -> Settings:
-        """The present configuration."""
-        return self.axis.settings
 
     @property
     def following_error(self) -> float:
@@ -186,25 +187,26 @@ class Ds402(Application):
     @property
     def statusword(self) -> int:
         """Present value of 6041h."""
-        supervision, mode = self.supervision, self.mode
-        status = self.state | Statusword.REMOTE
-        if self.motor.supply_mv >= self.bounds.supply_mv[0]:
-            status |= Statusword.VOLTAGE_ENABLED
+        supervision, state = self.supervision, self.automaton.state
+        status = STATE_BITS[state]
+        if supervision.has_supply:
+            status |= _VOLTAGE_ENABLED
         if supervision.warns:
-            status |= Statusword.WARNING
+            status |= _WARNING
         if self.limited:
-            status |= Statusword.INTERNAL_LIMIT
-        if self.enabled:
-            status |= mode.flags
-            if mode.tells_following_error and supervision.not_following:
-                status |= Statusword.MODE_13
+            status |= _INTERNAL_LIMIT
+        if state is DriveState.OPERATION_ENABLED:
+            status |= int(self.mode.flags)
+            if supervision.not_following and self.mode.tells_following_error:
+                status |= _FOLLOWING_ERROR
         return status
 
-    def wired_faults(self) -> Iterator[ErrorCode]:
-        """Give the faults that the electronics see; a short circuit needs power to be seen."""
-        for code in self._wired:
-            if code is not ErrorCode.OVER_CURRENT or self.automaton.powered:
-                yield code
+    def wired_faults(self) -> list[ErrorCode]:
+        """Return the faults that the electronics see; a short circuit needs power to be seen."""
+        if not self._wired:
+            return []
+        powered = self.automaton.powered
+        return [code for code in self._wired if powered or code is not ErrorCode.OVER_CURRENT]
 
     def begin_mode(self) -> None:
         """Begin the chosen mode anew."""
@@ -281,11 +283,13 @@ class Ds402(Application):
         """Follow configuration, physical inputs and the shaft."""
         if self._stale:
             self._stale = False
-            self.axis.configure(read_settings(self.parameters, self.motor.counts_per_turn))
+            self.settings = read_settings(self.parameters, self.motor.counts_per_turn)
+            self.axis.configure(self.settings)
         if self.inputs.changed:
             self.inputs.changed = False
             self._touched()
-        self.switches.look(self.motor.shaft_deg)
+        if self.switches.by_angle:
+            self.switches.look(self.motor.shaft_deg)
         self.axis.wrap()
 
     def _touched(self) -> None:
@@ -358,7 +362,3 @@ class Ds402(Application):
     def _outdate(self) -> None:
         self._stale = True
         self.request()
-
-    def _known_mode(self, value: Value) -> None:
-        if value not in self.modes:
-            raise SdoAbort(AbortCode.VALUE_RANGE)

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.device.canopen.ds402.cyclic import CyclicPosition, CyclicVelocity
+from tickrig.device.canopen.ds402.homing import Homing
+from tickrig.device.canopen.ds402.interpolated_position import InterpolatedPosition
 from tickrig.device.canopen.ds402.mode import Mode
+from tickrig.device.canopen.ds402.profile_position import ProfilePosition
 from tickrig.device.canopen.ds402.profile_velocity import ProfileVelocity
-from tickrig.device.canopen.ds402.provisional import Homing, ProfilePosition
+from tickrig.device.canopen.ds402.torque import CyclicTorque, ProfileTorque
 
 MODES: Final[dict[int, type[Mode]]] = {
     0: Mode,
     1: ProfilePosition,
     3: ProfileVelocity,
+    4: ProfileTorque,
     6: Homing,
+    7: InterpolatedPosition,
     8: CyclicPosition,
     9: CyclicVelocity,
+    10: CyclicTorque,
 }
 """Of any drive; a model may have more of its own, with negative numbers."""
 
 
-def supported(modes: dict[int, type[Mode]]) -> int:
+def supported(modes: Mapping[int, type[Mode]]) -> int:
     """Return 6502h: bit n - 1 for mode n.
 
     >>> hex(supported(MODES))
-    '0x1a5'
+    '0x3ed'
     """
     return sum(1 << number - 1 for number in modes if number > 0)

@@ -6,15 +6,10 @@ from enum import IntEnum
 from math import inf
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.reference import Control
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.datatypes import Value
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from tickrig.device.canopen.ds402.drive import Ds402
 
 
@@ -30,16 +25,6 @@ class Ramp(IntEnum):
 STAYING: Final = 4
 """Added to a quick stop option: the drive stays in Quick stop active."""
 
-ALLOWED: Final = {
-    indices.ABORT_CONNECTION: (0, 1, 2, 3),
-    indices.QUICK_STOP_OPTION: (0, 1, 2, 3, 5, 6, 7),
-    indices.SHUTDOWN_OPTION: (0, 1),
-    indices.DISABLE_OPERATION_OPTION: (0, 1),
-    indices.HALT_OPTION: (1, 2, 3),
-    indices.FAULT_REACTION_OPTION: (0, 1, 2, 3),
-}
-"""Values of the option codes; others are refused with 0609 0030h."""
-
 
 class Stopping:
     """Slows the reference down.
@@ -52,10 +37,6 @@ class Stopping:
 
     def __init__(self, drive: Ds402) -> None:
         self._drive = drive
-        for index, allowed in ALLOWED.items():
-            entry = drive.node.dictionary.find(index)
-            if entry is not None:
-                entry.guard = _guard(allowed)
 
     @property
     def stays(self) -> bool:
@@ -86,11 +67,3 @@ class Stopping:
             Ramp.QUICK_STOP: settings.quick_stop_deceleration,
         }.get(Ramp(ramp), inf)
         return drive.reference.ramp(0.0, deceleration, deceleration) and drive.axis.stands
-
-
-def _guard(allowed: tuple[int, ...]) -> Callable[[Value], None]:
-    def guard(value: Value) -> None:
-        if value not in allowed:
-            raise SdoAbort(AbortCode.VALUE_RANGE)
-
-    return guard

@@ -19,11 +19,13 @@ class TakenTarget(Mode):
 
     Attributes:
         index: object of the target.
+        sub: its sub-index.
         offset: object that is added to it, 0 for none.
     """
 
     halts = False
     index: ClassVar[int]
+    sub: ClassVar[int] = 0
     offset: ClassVar[int] = 0
 
     def __init__(self, drive: Ds402) -> None:
@@ -37,7 +39,7 @@ class TakenTarget(Mode):
     def run(self, now_us: int) -> bool:
         """Brake, or follow."""
         if self._own is not None:
-            if self.drive.parameters.number(self.index) == self._own:
+            if self.drive.parameters.number(self.index, self.sub) == self._own:
                 return self._brake()
             self._own = None
         return self.follow(now_us)
@@ -49,16 +51,16 @@ class TakenTarget(Mode):
     def target(self) -> float:
         """Return the target in counts, within the software limits."""
         number = self.drive.parameters.number
-        position = number(self.index) + (number(self.offset) if self.offset else 0)
+        position = number(self.index, self.sub) + (number(self.offset) if self.offset else 0)
         return self.drive.within(self.drive.axis.counts_near(position))
 
     def _take(self) -> None:
         parameters = self.drive.parameters
         present = self.drive.axis.position_of(self.reference.position)
         parameters.write(
-            self.index, present - (parameters.number(self.offset) if self.offset else 0)
+            self.index, present - (parameters.number(self.offset) if self.offset else 0), self.sub
         )
-        self._own = parameters.number(self.index)
+        self._own = parameters.number(self.index, self.sub)
 
     def _brake(self) -> bool:
         deceleration = self.drive.settings.deceleration
