@@ -32,29 +32,33 @@ class CyclicPosition(TakenTarget):
     def __init__(self, drive: Ds402) -> None:
         super().__init__(drive)
         self.flags, self._left = Statusword.MODE_12, 0
+        self._goal = self._ahead = 0.0
 
     def follow(self, now_us: int) -> bool:
         """Make a step along the line."""
-        drive, reference = self.drive, self.reference
-        if drive.fresh:
-            self._left = max(1, drive.settings.interpolation_us // STEP_US)
+        if self.drive.fresh:
+            self._begin()
         if not self._left:
-            reference.place(reference.position)
+            self.reference.place(self.reference.position)
             return True
-        self._step(self.target())
+        self._step()
         self._left -= 1
         return False
 
-    def _step(self, target: float) -> None:
+    def _begin(self) -> None:
+        drive = self.drive
+        self._left = max(1, drive.settings.interpolation_us // STEP_US)
+        offset = drive.parameters.number(indices.VELOCITY_OFFSET)
+        self._goal, self._ahead = self.target(), offset * drive.settings.units.per_velocity
+
+    def _step(self) -> None:
         drive, reference = self.drive, self.reference
-        velocity = (target - reference.position) / (self._left * STEP_S)
+        velocity = (self._goal - reference.position) / (self._left * STEP_S)
         most = drive.settings.max_velocity
         if abs(velocity) > most:
             velocity = most if velocity > 0 else -most
             drive.limited = True
-        offset = drive.parameters.number(indices.VELOCITY_OFFSET)
-        ahead = velocity + offset * drive.settings.units.per_velocity
-        reference.place(reference.position + velocity * STEP_S, ahead)
+        reference.place(reference.position + velocity * STEP_S, velocity + self._ahead)
 
 
 class CyclicVelocity(Mode):

@@ -103,6 +103,7 @@ class Ds402(Application):
     more_targets: ClassVar[tuple[int, ...]] = ()
     outputs = terminals.OUTPUTS
 
+    settings: Settings
     axis: Axis
     motor: Motor
     reference: Reference

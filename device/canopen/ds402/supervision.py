@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -41,6 +40,7 @@ class Supervision:
         bounds: what is sound.
 
     Attributes:
+        has_supply: the supply is not too low (bit 4 of the statusword).
         waiting: a time-out runs.
         not_following: the following error is larger than 6065h.
     """
@@ -48,6 +48,7 @@ class Supervision:
     def __init__(self, drive: Ds402, bounds: Bounds) -> None:
         self._drive, self.bounds = drive, bounds
         self.waiting = self.not_following = False
+        self.has_supply = True
         self._error_us = self._stall_us = 0
 
     @property
@@ -55,20 +56,23 @@ class Supervision:
         """Whether the winding is warm (bit 7 of the statusword)."""
         return self._drive.motor.winding_dc >= self.bounds.winding_warning_dc
 
-    def present(self) -> Iterator[ErrorCode]:
-        """Give the faults whose cause is there now."""
-        motor, low, high = self._drive.motor, *self.bounds.supply_mv
-        if motor.supply_mv < low:
-            yield ErrorCode.UNDER_VOLTAGE
-        if motor.supply_mv > high:
-            yield ErrorCode.OVER_VOLTAGE
-        if motor.winding_dc > self.bounds.winding_dc:
-            yield ErrorCode.DRIVE_TEMPERATURE
-        yield from self._drive.wired_faults()
+    def present(self) -> list[ErrorCode]:
+        """Return the faults whose cause is there now."""
+        motor, bounds = self._drive.motor, self.bounds
+        supply_mv, (low, high) = motor.supply_mv, bounds.supply_mv
+        found = self._drive.wired_faults()
+        self.has_supply = supply_mv >= low
+        if not self.has_supply:
+            found.append(ErrorCode.UNDER_VOLTAGE)
+        if supply_mv > high:
+            found.append(ErrorCode.OVER_VOLTAGE)
+        if motor.winding_dc > bounds.winding_dc:
+            found.append(ErrorCode.DRIVE_TEMPERATURE)
+        return found
 
     def find(self, now_us: int) -> list[ErrorCode]:
         """Return the faults that are there, and those that a motion with power shows."""
-        found, self.waiting = list(self.present()), False
+        found, self.waiting = self.present(), False
         if not self._drive.automaton.powered:
             self.not_following = False
             self._error_us = self._stall_us = now_us

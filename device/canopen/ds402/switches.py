@@ -38,13 +38,14 @@ class Switches:
 
     Attributes:
         word: bits 0 to 2 of 60FDh.
+        by_angle: the shaft presses some of them.
     """
 
     def __init__(self) -> None:
         self.word = 0
         self._hand = 0
         self._angles = (-inf, inf, inf, -inf)
-        self._by_angle = False
+        self.by_angle = False
 
     def set(self, inputs: QuantityBank) -> None:
         """Follow the physical inputs."""
@@ -52,19 +53,18 @@ class Switches:
         self._hand = sum(1 << bit for bit, item in enumerate(hand) if inputs[item.name])
         low, high, first, last = (inputs[item.name] for item in angles)
         self._angles = low, high, first, last
-        self._by_angle = any(inputs[item.name] != item.initial for item in angles)
+        self.by_angle = any(inputs[item.name] != item.initial for item in angles)
         self.word = self._hand
 
     def look(self, shaft_deg: float) -> None:
         """Follow the shaft."""
-        if self._by_angle:
-            low, high, first, last = self._angles
-            self.word = (
-                self._hand
-                | (NEGATIVE_LIMIT if shaft_deg <= low else 0)
-                | (POSITIVE_LIMIT if shaft_deg >= high else 0)
-                | (HOME if first <= shaft_deg <= last else 0)
-            )
+        low, high, first, last = self._angles
+        self.word = (
+            self._hand
+            | (NEGATIVE_LIMIT if shaft_deg <= low else 0)
+            | (POSITIVE_LIMIT if shaft_deg >= high else 0)
+            | (HOME if first <= shaft_deg <= last else 0)
+        )
 
     @property
     def negative_limit(self) -> bool:

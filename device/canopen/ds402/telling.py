@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.parameters import clamped
-from tickrig.device.canopen.entry import Entry
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -54,15 +53,20 @@ class Telling:
 
     def __init__(self, drive: Ds402, measures: Mapping[Multiplexer, Measure]) -> None:
         self._drive = drive
-        self._rows: list[tuple[Entry, Measure]] = []
-        for at, measure in measures.items():
-            entry = drive.node.dictionary.find(*at)
-            if entry is not None:
-                self._rows.append((entry, measure))
+        self._rows = [
+            (entry, measure, entry.size, entry.data_type.signed)
+            for at, measure in measures.items()
+            if (entry := drive.node.dictionary.find(*at)) is not None
+        ]
 
     def tell(self) -> None:
         """Write all of them; a value out of the range of its object is cut."""
-        for entry, measure in self._rows:
-            size, signed = entry.size, entry.data_type.signed
-            value = clamped(measure(self._drive), 8 * size, signed=signed)
-            entry.assign(value.to_bytes(size, "little", signed=signed))
+        drive = self._drive
+        for entry, measure, size, signed in self._rows:
+            value = measure(drive)
+            try:
+                data = value.to_bytes(size, "little", signed=signed)
+            except OverflowError:
+                value = clamped(value, 8 * size, signed=signed)
+                data = value.to_bytes(size, "little", signed=signed)
+            entry.assign(data)

@@ -1,0 +1,78 @@
+"""32 drives with physics in cyclic synchronous position mode, on a bus of 1 Mbit/s.
+
+SYNC every 10 ms; a target for each drive and an actual value from each one with it.
+Control and physics of each drive run every millisecond.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi
+from typing import Final
+
+from benchmarks.table import rates
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig, Station
+from tickrig.wire.can import CanFrame, Frames
+
+DRIVES: Final = 32
+CYCLE_US: Final = 10_000
+SIMULATED_S: Final = 2
+START: Final = CanFrame(0x000, bytes.fromhex("0100"))
+SYNC: Final = CanFrame(0x080, b"")
+CONTROLWORDS: Final = (0x06, 0x07, 0x0F)
+AMPLITUDE: Final = 4_000
+PERIOD_US: Final = 1_000_000
+
+
+class Master:
+    """Enables all drives, then has them swing like a cosine."""
+
+    def __init__(self) -> None:
+        self.tick_us, self.due_us = CYCLE_US, 0
+
+    def reset(self) -> None:
+        """Begin anew."""
+        self.due_us = 0
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Send targets and SYNC."""
+        cycle = now_us // CYCLE_US
+        self.due_us = (cycle + 1) * CYCLE_US
+        if cycle < 2:
+            return (START,)
+        controlword = CONTROLWORDS[min(cycle - 2, 2)]
+        target = round(AMPLITUDE * (1 - cos(2 * pi * now_us / PERIOD_US))) if cycle > 8 else 0
+        data = controlword.to_bytes(2, "little") + target.to_bytes(4, "little")
+        return (SYNC, *(CanFrame(0x300 + number, data) for number in range(1, DRIVES + 1)))
+
+
+def dictionary() -> Dictionary:
+    """Make an EPOS-like drive in mode 8 that talks with SYNC."""
+    made = epos.dictionary()
+    for at, value in (
+        ((0x6060, 0), 8),
+        ((0x1400, 1), 0x8000_0200),
+        ((0x1401, 2), 1),
+        ((0x1800, 2), 1),
+    ):
+        made[at].default = made[at].data_type.encode(value)
+    return made
+
+
+def run(seconds: float) -> None:
+    """Print how many seconds of the drives pass in a second."""
+    rigs = []
+
+    def turn() -> None:
+        wire = CanWire()
+        stations = [
+            Station(make_slave(dictionary(), number, application=epos.make), wire.end())
+            for number in range(1, DRIVES + 1)
+        ]
+        rigs.append(stations)
+        Rig(Station(Master(), wire.end()), *stations).run_for(SIMULATED_S * 1_000_000)
+
+    rates(f"{DRIVES} drives in csp, SYNC {CYCLE_US // 1000} ms", SIMULATED_S, "x real time", turn)
