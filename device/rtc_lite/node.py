@@ -11,7 +11,7 @@ from tickrig.device.physical import InputBank, Output
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import Framing, NodeConfig
 from tickrig.device.rtc_lite.life_cycle import LifeCycle
-from tickrig.device.rtc_lite.receiver import Receiver
+from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
 from tickrig.device.rtc_lite.server import Server
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
 from tickrig.device.rtc_lite.timer import Timer
@@ -127,8 +127,10 @@ class RtcLiteNode:
         if not self._on:
             self._boot()
         sent = self._finish(now_us) if self._free_us <= now_us else b""
-        self._receiver.push(now_us, rx)
-        self._work(now_us)
+        for at in range(0, len(rx) or 1, BUFFER_BYTES):
+            self._receiver.push(now_us, rx[at : at + BUFFER_BYTES])
+            self._serve(now_us)
+        self._run_timer(now_us)
         return sent if self._free_us else sent + self._take()
 
     def _finish(self, now_us: int) -> bytes:
@@ -149,8 +151,8 @@ class RtcLiteNode:
         if self.config.framing is Framing.RTNO:
             self._life.obey(Command.INITIALIZE)
 
-    def _work(self, now_us: int) -> None:
-        """Answer requests, then run the timer, while the processor is free."""
+    def _serve(self, now_us: int) -> None:
+        """Answer what is in the buffer while the processor is free."""
         while not self._free_us and (found := self._receiver.pull()) is not None:
             calls = self._life.calls
             if isinstance(found, LinkFault):
@@ -159,6 +161,9 @@ class RtcLiteNode:
                 answer = self._server.answer(found)
             self._send(now_us, answer, self._life.calls - calls)
             self._mind_timer(now_us)
+
+    def _run_timer(self, now_us: int) -> None:
+        """Execute if a period has ended and the processor is free."""
         if not self._free_us and self._timer.elapsed(now_us):
             calls = self._life.calls
             self._send(now_us, self._server.execute(), self._life.calls - calls)

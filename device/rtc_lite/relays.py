@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.device.rtc_lite.component import ERROR, Component, Result
+from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.ports import InPort, OutPort
 from tickrig.wire.rtc_lite.values import LONG
 
@@ -14,11 +14,10 @@ class Echo(Component):
     inlet = InPort("in", LONG)
     outlet = OutPort("out", LONG)
 
-    def on_execute(self) -> Result:
+    def on_execute(self) -> None:
         """Hand on what is new."""
-        if self.inlet.is_new and not self.outlet.write(self.inlet.read()):
-            return ERROR
-        return None
+        if self.inlet.is_new:
+            self.outlet.write(self.inlet.read())
 
 
 class LiteA(Echo):

@@ -69,6 +69,7 @@ def test_a_bad_packet_is_told(packet: str, fault: LinkFault) -> None:
     decoder = RtnoDecoder()
     assert decoder.push(raw(packet)) == [fault]
     assert decoder.lost == (fault is LinkFault.UNKNOWN)
+    assert decoder.push(raw("0A 0A 58 00 58")) == ([] if decoder.lost else [Frame(Command.STATE)])
 
 
 @given(st.binary(max_size=200))

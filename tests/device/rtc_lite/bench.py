@@ -8,18 +8,25 @@ from tests.wire.rtc_lite_vectors import raw
 from tickrig.device.rtc_lite.component import ERROR, Component, Result
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
-from tickrig.device.rtc_lite.relays import Echo
+from tickrig.device.rtc_lite.ports import InPort, OutPort
 from tickrig.wire.rtc_lite.codes import Command
+from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.layout import REPLIES
+from tickrig.wire.rtc_lite.values import LONG
 
 
-class Recorder(Echo):
-    """An echo.
+class Recorder(Component):
+    """An echo with all callbacks.
 
     Attributes:
         failing: names of the callbacks that return an error.
         called: names of those that ran.
     """
+
+    type_name = "Echo0"
+    inlet = InPort("in", LONG)
+    outlet = OutPort("out", LONG)
 
     def __init__(self) -> None:
         super().__init__()
@@ -49,7 +56,10 @@ class Recorder(Echo):
         return self._note("on_deactivated")
 
     def on_execute(self) -> Result:
-        return self._note("on_execute") or Echo.on_execute(self)
+        result = self._note("on_execute")
+        if result is None and self.inlet.is_new:
+            self.outlet.write(self.inlet.read())
+        return result
 
     def on_aborting(self) -> Result:
         return self._note("on_aborting")
@@ -100,8 +110,8 @@ class NodeBench:
         The answer is written in the same way, frames with a space between them.
         """
         data = request.encode("latin-1")
-        sent = self.push(Frame(Command(data[:2]), data[2:]).encode())
-        return " ".join(part[:-1].decode("latin-1") for part in sent.split(b"\n")[1:])
+        found = Decoder(REPLIES).push(self.push(Frame(Command(data[:2]), data[2:]).encode()))
+        return " ".join(frame.body.decode("latin-1") for frame in found if isinstance(frame, Frame))
 
     def run(self, duration_us: int) -> bytes:
         """Run ticks without input."""
