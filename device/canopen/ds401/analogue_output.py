@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from math import isfinite
+from math import isfinite, isnan
 
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel
@@ -82,7 +82,9 @@ class AnalogueOutput:
     def _real(self, *, error: bool) -> float:
         value = quantity(self._real_error) if error else quantity(self._latest)
         level, (low, high) = self.channel.real_scaled(value), self.channel.bounds
-        return level if self.channel.converter is None else max(low, min(high, level))
+        if self.channel.converter is None or isnan(level):
+            return level
+        return max(low, min(high, level))
 
     def _write(self, entry: Entry) -> None:
         self._latest, self.failed = entry, False

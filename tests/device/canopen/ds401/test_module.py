@@ -100,6 +100,12 @@ def test_analogue_changes_are_sent_only_if_6423h_says_so(running: Bench) -> None
     assert running.analogue(101) == []
 
 
+def test_an_analogue_event_waits_for_6423h(running: Bench) -> None:
+    assert running.analogue(100) == []
+    running.write(0x6423, 0, 1)
+    assert running.step() == ["285#6400000000000000"]
+
+
 @pytest.mark.parametrize(
     ("trigger", "objects", "quiet", "loud"),
     [
