@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar
+from typing import Final, Protocol, TypeVar
+
+NEVER: Final = 2**63 - 1
+"""A time that does not come."""
 
 W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 

@@ -6,11 +6,11 @@ import logging
 from typing import Final
 
 from tickrig.host.errors import LinkTimeout
-from tickrig.host.link import Link
+from tickrig.host.link import NEVER, Link
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.exchange import Exchange
 from tickrig.host.rrc.inbox import Answer, Inbox
-from tickrig.host.rrc.keep_alive import NEVER, KeepAlive
+from tickrig.host.rrc.keep_alive import KeepAlive
 from tickrig.host.rrc.ledger import Ledger
 from tickrig.host.rrc.mirror import WIPING
 from tickrig.host.rrc.refusals import OnRefusals, Refusals

@@ -1,0 +1,156 @@
+"""What data ports and service ports have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectorProfile:
+    """A connector as OpenRTM describes it.
+
+    Attributes:
+        name: for people.
+        connector_id: unique in a system.
+        ports: full names of both ports, the one that provides first.
+        properties: what holds for it, `dataport.*` of data ports.
+    """
+
+    name: str
+    connector_id: str
+    ports: tuple[str, str]
+    properties: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class InterfaceProfile:
+    """An interface of a service port.
+
+    Attributes:
+        instance_name: its name on the port.
+        type_name: name of the interface type; a consumer takes providers of its own.
+        polarity: `PROVIDED` or `REQUIRED`.
+    """
+
+    instance_name: str
+    type_name: str
+    polarity: str
+
+
+@dataclass(frozen=True, slots=True)
+class PortProfile:
+    """A port as OpenRTM describes it.
+
+    Attributes:
+        name: full name, such as `ConsoleIn0.out`.
+        interfaces: those of a service port.
+        connector_profiles: its connectors.
+        properties: `port.port_type`, `dataport.data_type`, ...
+    """
+
+    name: str
+    interfaces: tuple[InterfaceProfile, ...]
+    connector_profiles: tuple[ConnectorProfile, ...]
+    properties: Mapping[str, str]
+
+
+Listener = Callable[[ConnectorProfile], None]
+
+
+class ConnectorBase:
+    """A connector between two ports, which have it until it is ended.
+
+    Attributes:
+        profile: how it is described.
+        joined: between begin and end.
+    """
+
+    def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, AnyPort]) -> None:
+        self.profile, self._ports, self.joined = profile, ports, False
+
+    def begin(self) -> None:
+        """Give it to both ports, then tell their listeners."""
+        self.joined = True
+        for port in self._ports:
+            port.attach(self)
+        for port in self._ports:
+            port.tell(port.on_connect, self.profile)
+
+    def end(self) -> None:
+        """Take it from both ports, then tell their listeners; ending it twice is no error."""
+        joined, self.joined = self.joined, False
+        for port in self._ports if joined else ():
+            port.detach(self)
+        for port in self._ports if joined else ():
+            port.tell(port.on_disconnect, self.profile)
+
+
+C = TypeVar("C", bound=ConnectorBase)
+
+
+class Port(Generic[C]):
+    """A named end of connectors.
+
+    Args:
+        name: without that of its component.
+
+    Attributes:
+        owner: instance name of its component, empty without one.
+        connectors: in the order in which they were made.
+        on_connect: told after a connector was made.
+        on_disconnect: told after a connector ended.
+    """
+
+    port_type: ClassVar[str]
+
+    def __init__(self, name: str) -> None:
+        self.name, self.owner = name, ""
+        self.connectors: tuple[C, ...] = ()
+        self.on_connect: list[Listener] = []
+        self.on_disconnect: list[Listener] = []
+
+    @property
+    def full_name(self) -> str:
+        """Its name in profiles: `ConsoleIn0.out`."""
+        return f"{self.owner}.{self.name}" if self.owner else self.name
+
+    @property
+    def profile(self) -> PortProfile:
+        """The port as it is."""
+        connectors = tuple(connector.profile for connector in self.connectors)
+        properties = {"port.port_type": self.port_type, **self._properties()}
+        return PortProfile(self.full_name, self._interfaces(), connectors, properties)
+
+    def connector_to(self, other: AnyPort) -> C | None:
+        """Return the connector that joins it with another port, if there is one."""
+        return next((own for own in self.connectors if own in other.connectors), None)
+
+    def disconnect_all(self) -> None:
+        """End all its connectors."""
+        for connector in self.connectors:
+            connector.end()
+
+    def attach(self, connector: C) -> None:
+        """Have a connector."""
+        self.connectors += (connector,)
+
+    def detach(self, connector: C) -> None:
+        """Have a connector no more."""
+        self.connectors = tuple(c for c in self.connectors if c is not connector)
+
+    def tell(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
+        """Tell listeners of a connector."""
+        for listener in tuple(listeners):
+            listener(profile)
+
+    def _properties(self) -> Mapping[str, str]:
+        return {}
+
+    def _interfaces(self) -> tuple[InterfaceProfile, ...]:
+        return ()
+
+
+AnyPort = Port[Any]
+"""A port of whatever kind."""
