@@ -1,6 +1,6 @@
 # Everything on a fresh machine: Python 3.11 or newer and make are enough.
 #   make test   lint, types, import contracts, wheel, tests, coverage
-#   make demo   an emulated RRC on a pty, driven by the host client
+#   make demo   an RRC on a pty, driven by the host client; CANopen: a potentiometer turns a motor
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
 VENV   ?= .venv
 READY  := $(VENV)/.ready
@@ -12,6 +12,8 @@ test: $(READY)
 
 demo: $(READY)
 	$(VENV)/bin/tickrig demo rrc
+	@echo
+	$(VENV)/bin/tickrig demo fig120
 
 bench: $(READY)
 	$(VENV)/bin/python tools/bench
@@ -21,7 +23,7 @@ $(READY): pyproject.toml
 	    { echo "tickrig needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.12"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --upgrade pip
-	$(VENV)/bin/python -m pip install --quiet --editable '.[tui]' --group dev
+	$(VENV)/bin/python -m pip install --quiet --editable '.[tui,plot]' --group dev
 	@touch $(READY)
 
 clean:

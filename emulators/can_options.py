@@ -33,6 +33,8 @@ HINTS: Final = {
 UNNAMED: Final = '"None"'
 """In what python-can says where no interface is named."""
 
+_PLAIN: Final = ("interface", "channel", "bitrate")
+
 _KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
 
 
@@ -49,6 +51,13 @@ class BusOptions:
     def __bool__(self) -> bool:
         """Say whether a bus outside is asked for."""
         return bool(self.interface or self.channel or self.timing or self.bus_kwargs)
+
+    def words(self) -> list[str]:
+        """Return the words that say the same on another command line."""
+        words = [f"--{name}={value}" for name in _PLAIN if (value := getattr(self, name))]
+        for option, values in zip(GREEDY, (self.timing, self.bus_kwargs), strict=True):
+            words += [option, *values] if values else []
+        return words
 
 
 class BusCommand(click.Command):
@@ -123,6 +132,23 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     Raises:
         Refused: none is named, or it cannot be opened.
     """
+    bus, interface, channel = open_raw(options)
+    stack.callback(bus.shutdown)
+    name = interface if channel is None else f"{interface} {channel}"
+    port = CanBusPort(bus)
+    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
+    return OpenBus(WithoutEcho(port) if interface in ECHOING else port, name, label)
+
+
+def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
+    """Open such a bus for somebody who takes it as python-can gives it.
+
+    Returns:
+        The bus, its interface and its channel.
+
+    Raises:
+        Refused: none is named, or it cannot be opened.
+    """
     given = _given(options)
     try:
         config = load_config(config=dict(given))
@@ -132,22 +158,17 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     except (ValueError, TypeError) as error:
         raise Refused(f"CAN bus: {_one_line(error)}") from None
     interface, channel = str(config["interface"]), config["channel"]
-    name = interface if channel is None else f"{interface} {channel}"
     try:
         bus = can.Bus(**{"single_handle": True, **given})
     except Exception as error:  # its drivers raise whatever they come across, NameError even
+        name = interface if channel is None else f"{interface} {channel}"
         raise Refused(f"CAN bus {name}: {_reason(error)}") from None
-    stack.callback(bus.shutdown)
-    port = CanBusPort(bus)
-    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return OpenBus(WithoutEcho(port) if interface in ECHOING else port, name, label)
+    return bus, interface, channel
 
 
 def _given(options: BusOptions) -> Mapping[str, Any]:
     given: dict[str, Any] = {
-        key: value
-        for key in ("interface", "channel", "bitrate")
-        if (value := getattr(options, key)) is not None
+        key: value for key in _PLAIN if (value := getattr(options, key)) is not None
     }
     given.update(_pairs("--bus-kwargs", options.bus_kwargs, parse_setting))
     if options.timing:

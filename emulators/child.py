@@ -21,7 +21,7 @@ class Child:
 
     Attributes:
         process: the process.
-        link: the terminal that it serves.
+        link: the terminal that it serves, if it has one.
         control: its control socket.
         log: what it said so far.
     """
@@ -33,8 +33,13 @@ class Child:
 
 
 @contextmanager
-def running(module: str, *options: str) -> Iterator[Child]:
+def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
     """Run the emulator whose command is `main` of a module; end it on the way out.
+
+    Args:
+        module: where the command is.
+        options: of the command, beside `--control`.
+        linked: it has an option `--link` for a terminal.
 
     Raises:
         RuntimeError: it does not come up; the text is the last line that it said.
@@ -42,22 +47,22 @@ def running(module: str, *options: str) -> Iterator[Child]:
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))
         program = f"from {module} import main; main()"
-        paths = ["--link", str(link), "--control", str(control)]
+        paths = [*(["--link", str(link)] if linked else []), "--control", str(control)]
         command = [sys.executable, "-c", program, *paths, *options]
         with log.open("wb") as said:
             process = subprocess.Popen(command, stdout=said, stderr=said)
         try:
             child = Child(process, link, control, log)
-            _wait_until_up(child)
+            _wait_until_up(child, [link, control] if linked else [control])
             yield child
         finally:
             process.terminate()
             process.wait()
 
 
-def _wait_until_up(child: Child) -> None:
+def _wait_until_up(child: Child, paths: list[Path]) -> None:
     deadline = time.monotonic() + START_S
-    while not (child.link.exists() and child.control.exists()):
+    while not all(path.exists() for path in paths):
         if child.process.poll() is not None or time.monotonic() > deadline:
             said = child.log.read_text("utf-8", "replace").split("\n")
             last = next((line for line in reversed(said) if line), "it said nothing")

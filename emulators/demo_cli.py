@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import canopen
 import click
 
+from tickrig.emulators.can_options import BusCommand, BusOptions, bus_options
+from tickrig.emulators.fig120 import demo as fig120_demo
+from tickrig.emulators.fig120.plot import FORMATS, write_plot
+from tickrig.emulators.fig120.samples import Sample
+from tickrig.emulators.fig120.stage import VirtualStage, bus_stage
+from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.rrc.demo import run_demo
+from tickrig.emulators.run_options import PATH
 from tickrig.host.errors import DeviceRefused, LinkError
+
+PLOTTER = "matplotlib"
 
 
 @click.group()
@@ -20,3 +34,50 @@ def rrc() -> None:
         run_demo(click.echo)
     except (RuntimeError, OSError, LinkError, DeviceRefused) as error:
         raise click.ClickException(str(error)) from error
+
+
+@demo.command(cls=BusCommand)
+@click.option("--plot", type=PATH, help="Draw the curves into FILE.png, .svg or .html.")
+@bus_options
+def fig120(plot: Path | None, **options: Any) -> None:
+    """Let a potentiometer at one CANopen node turn the motor of another, without a PC in between.
+
+    A master links the analogue input of an f-palette with the reference of a
+    motor core unit (PDO linking), starts both and leaves the bus. It runs in
+    virtual time; with -i and -c in real time on a bus of python-can.
+
+    \b
+    tickrig demo fig120
+    tickrig demo fig120 --plot curves.png
+    tickrig demo fig120 -i socketcan -c vcan0
+    """  # noqa: D301 - click wants the backspace
+    if plot is not None:
+        _check_plot(plot)
+    bus = BusOptions(**options)
+    try:
+        samples = _play_fig120(bus)
+    except (RuntimeError, OSError, canopen.SdoCommunicationError) as error:
+        raise click.ClickException(str(error)) from error
+    if plot is not None:
+        try:
+            write_plot(samples, plot)
+        except OSError as error:
+            refuse_path("plot", error)
+        click.echo(f"\nThe curves are in {plot}.")
+
+
+def _play_fig120(bus: BusOptions) -> list[Sample]:
+    if not bus:
+        return fig120_demo.run_demo(VirtualStage(), click.echo)
+    with bus_stage(bus) as stage:
+        return fig120_demo.run_demo(stage, click.echo)
+
+
+def _check_plot(path: Path) -> None:
+    """Refuse before the demonstration what could not be written after it."""
+    if path.suffix.lower() not in FORMATS:
+        raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
+    if find_spec(PLOTTER) is None:
+        raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
+    if not path.parent.is_dir():
+        raise Refused(f"--plot {path}: no directory {path.parent}")

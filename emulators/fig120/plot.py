@@ -1,0 +1,60 @@
+"""The curves of the demonstration as a picture; needs matplotlib (the extra `plot`)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tickrig.emulators.fig120.samples import Sample
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS: Final = (".png", ".svg", ".html")
+TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32"
+
+
+def write_plot(samples: Sequence[Sample], path: Path) -> None:
+    """Draw voltage, reference and angle over time into a file, PNG, SVG or HTML.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    figure = _draw(samples)
+    if path.suffix.lower() == ".html":
+        path.write_text(_page(figure), "utf-8")
+    else:
+        figure.savefig(path, format=path.suffix.lower().removeprefix("."))
+
+
+def _draw(samples: Sequence[Sample]) -> Figure:
+    from matplotlib.figure import Figure  # noqa: PLC0415 - heavy, and an extra
+
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+    times = [sample.time_s for sample in samples]
+    figure.suptitle(TITLE)
+    above.plot(times, [sample.volts for sample in samples], color="tab:orange")
+    above.set_ylabel("analogue input 1, V")
+    above.set_ylim(-0.2, 5.2)
+    references = [sample.reference_deg for sample in samples]
+    below.plot(times, references, color="tab:gray", drawstyle="steps-post", label="reference")
+    below.plot(times, [sample.angle_deg for sample in samples], color="tab:blue", label="shaft")
+    below.set_ylabel("angle, degrees")
+    below.set_xlabel("time, s")
+    below.legend(loc="upper left")
+    for axes in (above, below):
+        axes.grid(visible=True, alpha=0.3)
+    return figure
+
+
+def _page(figure: Figure) -> str:
+    drawing = io.StringIO()
+    figure.savefig(drawing, format="svg")
+    picture = drawing.getvalue()
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{TITLE}</title>'
+        f"</head>\n<body>\n{picture[picture.index('<svg') :]}</body>\n</html>\n"
+    )
