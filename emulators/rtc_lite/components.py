@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import sys
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
@@ -55,13 +55,12 @@ def told(error: Exception, file: str) -> str:
 
 
 def _run(path: Path) -> ModuleType:
-    """Run a user's file as a module of its own."""
-    spec = importlib.util.spec_from_file_location(f"_rtc_lite_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path}: not a Python file")
-    module = importlib.util.module_from_spec(spec)
+    """Run a user's file as a module of its own, which finds its neighbours."""
+    module = ModuleType(f"_rtc_lite_{path.stem}")
+    sys.modules[module.__name__] = module  # dataclasses look for it there
+    sys.path.insert(0, str(path.parent))
     try:
-        spec.loader.exec_module(module)
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
     except Exception as error:  # a user's file may raise anything

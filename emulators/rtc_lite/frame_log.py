@@ -1,7 +1,7 @@
 r"""Cut what passes on the line into frames, as the log, transcripts and `expect` show them.
 
 A frame is shown without header and checksum, as `CX`, `CX@I` or
-`QV\x03\x04out*\x00\x00\x00`.
+`QV\x03\x04out*\x00\x00\x00`; a packet of RTno as `X`, `XI`.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.rtc_lite.config import Framing, NodeConfig
-from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
+from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, Receiver
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.wire_log import Splitter
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
+from tickrig.wire.rtc_lite.rtno import PacketDecoder
 
 SHOWN: Final = {
     LinkFault.CHECKSUM: b"(wrong checksum)",
@@ -26,16 +27,33 @@ SHOWN: Final = {
 
 
 def frame_splitter(config: NodeConfig) -> Callable[[Mark], Splitter]:
-    """Return what makes the splitter of each direction; packets of RTno are shown as they come."""
-    if config.framing is Framing.RTNO:
-        return lambda mark: lambda at_us, data: [data]
+    """Return what makes the splitter of each direction."""
 
     def make(mark: Mark) -> Splitter:
+        if config.framing is Framing.RTNO:
+            return _PacketSplitter().split
         layouts = REQUESTS if mark is Mark.TO_DEVICE else REPLIES
         receiver = Receiver(Decoder(layouts, config.checksum))
         return lambda at_us, data: _split(receiver, at_us, data)
 
     return make
+
+
+class _PacketSplitter:
+    """Shows packets of RTno without header, length and sum."""
+
+    def __init__(self) -> None:
+        self._decoder, self._heard_us = PacketDecoder(), 0
+
+    def split(self, at_us: int, data: bytes) -> list[bytes]:
+        out, decoder = list[bytes](), self._decoder
+        if at_us >= self._heard_us + (SILENCE_US if decoder.lost else GAP_US):
+            out += [SHOWN[LinkFault.TIMEOUT]] if decoder.begun else []
+            decoder.clear()
+        self._heard_us = at_us
+        for found in decoder.push(data):
+            out.append(SHOWN[found] if isinstance(found, LinkFault) else b"".join(found))
+        return out
 
 
 def _split(receiver: Receiver, at_us: int, data: bytes) -> list[bytes]:

@@ -26,7 +26,8 @@ def verbs(component: Component, config: NodeConfig) -> Mapping[str, Sender]:
     def send(rest: str) -> Send:
         body = unescape(rest)
         if len(body) < (2 if lite else 1):
-            raise ValueError(rf"send takes a command and its data, as {'CX' if lite else 'X'!r}")
+            example = "CX" if lite else "X"
+            raise ValueError(f"send takes a command and its data, as {example!r}, got {rest!r}")
         return _packed(body, config)
 
     def write(rest: str) -> Send:
@@ -45,8 +46,7 @@ def _packed(body: bytes, config: NodeConfig) -> Send:
     """Put a frame, or a packet of RTno, around a command and its data."""
     if config.framing is Framing.LITE:
         return Send(HEADER + body + bytes([config.checksum.of(body)]), body)
-    packet = rtno.pack(body[:1], body[1:])
-    return Send(packet, packet)
+    return Send(rtno.pack(body[:1], body[1:]), body)
 
 
 def _value(port_type: PortType[Any], words: list[str]) -> bytes:

@@ -49,6 +49,12 @@ def test_a_frame_of_the_device_is_written(frame: Frame, packet: str) -> None:
     assert encode_packet(frame) == raw(packet)
 
 
+def test_nothing_begins_behind_an_unknown_letter() -> None:
+    decoder = RtnoDecoder()
+    assert decoder.push(raw("0A 0A 7A 00 7A", "0A 0A 58")) == [LinkFault.UNKNOWN]
+    assert not decoder.begun
+
+
 def test_chunking_makes_no_difference() -> None:
     decoder = RtnoDecoder()
     found = [item for code in raw("41 0A 41", WRITE) for item in decoder.push(bytes([code]))]

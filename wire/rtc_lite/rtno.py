@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault
 from tickrig.wire.rtc_lite.frame import Frame
@@ -35,7 +35,7 @@ LETTERS: Final[Mapping[Command, bytes]] = MappingProxyType(
 )
 """RTno's letter of each command that it has."""
 
-_REQUESTS: Final = {LETTERS[command][0]: command for command in REQUESTS if command in LETTERS}
+_REQUESTS: Final = {LETTERS[command]: command for command in REQUESTS if command in LETTERS}
 _WITHOUT_STATUS: Final = (Command.STATE, Command.CONTEXT)
 _PROFILES: Final = (Command.IN_PROFILE, Command.OUT_PROFILE)
 
@@ -60,13 +60,19 @@ def _packet_data(frame: Frame) -> bytes:
     return frame.data if frame.command is Command.DATA else frame.data[:1]
 
 
+class Packet(NamedTuple):
+    """A packet of either direction."""
+
+    letter: bytes
+    data: bytes
+
+
 @dataclass(slots=True)
-class RtnoDecoder:
-    """Reads the packets of a proxy out of a byte stream; used as `Decoder` is.
+class PacketDecoder:
+    """Reads packets of either direction out of a byte stream.
 
     Attributes:
-        lost: an unknown letter or more data than fit came: all is thrown away
-            until `clear`.
+        lost: more data than fit were announced: all is thrown away until `clear`.
     """
 
     lost: bool = field(default=False, init=False)
@@ -82,8 +88,8 @@ class RtnoDecoder:
         self.lost = False
         self._packet.clear()
 
-    def push(self, data: bytes) -> list[Frame | LinkFault]:
-        """Take bytes in; give whole packets out as frames, and what was wrong with others."""
+    def push(self, data: bytes) -> list[Packet | LinkFault]:
+        """Take bytes in; give whole packets out, and what was wrong with others."""
         out = []
         for code in data:
             if self.lost:
@@ -97,19 +103,57 @@ class RtnoDecoder:
                 self.lost = found is LinkFault.UNKNOWN
         return out
 
-    def _look(self) -> Frame | LinkFault | None:
+    def _look(self) -> Packet | LinkFault | None:
         """Return what the latest byte completed."""
         packet = self._packet
         if len(packet) < EMPTY_PACKET_BYTES:
             return None
-        command, size = _REQUESTS.get(packet[2]), packet[3]
+        size = packet[3]
         if size > MAX_DATA_BYTES:
             return LinkFault.UNKNOWN
         if len(packet) < EMPTY_PACKET_BYTES + size:
             return None
         if packet[-1] != sum(packet[2:-1]) & 0xFF:
             return LinkFault.CHECKSUM
-        data = bytes(packet[4:-1])
-        if command is None or REQUESTS[command](data) != size:
-            return LinkFault.UNKNOWN
-        return Frame(command, data)
+        return Packet(bytes(packet[2:3]), bytes(packet[4:-1]))
+
+
+@dataclass(slots=True)
+class RtnoDecoder:
+    """Reads the packets of a proxy as frames; used as `Decoder` is.
+
+    Attributes:
+        lost: an unknown letter or more data than fit came: all is thrown away
+            until `clear`.
+    """
+
+    lost: bool = field(default=False, init=False)
+    _packets: PacketDecoder = field(default_factory=PacketDecoder, init=False)
+
+    @property
+    def begun(self) -> bool:
+        """Whether a packet has begun that is not whole."""
+        return self._packets.begun
+
+    def clear(self) -> None:
+        """Forget a packet that has only begun, and look for a header again."""
+        self.lost = False
+        self._packets.clear()
+
+    def push(self, data: bytes) -> list[Frame | LinkFault]:
+        """Take bytes in; give whole packets out as frames, and what was wrong with others."""
+        out = []
+        for found in () if self.lost else self._packets.push(data):
+            out.append(found if isinstance(found, LinkFault) else _frame_of(found))
+            if out[-1] is LinkFault.UNKNOWN:
+                self._packets.clear()
+                self.lost = True
+                break
+        return out
+
+
+def _frame_of(packet: Packet) -> Frame | LinkFault:
+    command = _REQUESTS.get(packet.letter)
+    if command is None or REQUESTS[command](packet.data) != len(packet.data):
+        return LinkFault.UNKNOWN
+    return Frame(command, packet.data)
