@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import pytest
 
+from tests.device.canopen.fig120 import POTENTIOMETER
 from tests.device.canopen.motor_core_unit.bench import (
     ANGLE,
     CURRENT,
@@ -25,22 +26,15 @@ from tickrig.device.core import NEVER
 ENCODER_DEG = 360 / 409_600
 """A count of the motor encoder, at the shaft."""
 
-POTENTIOMETER = [
-    (0, 0.0),
-    (8192, 45.0014),
-    (16384, 90.0027),
-    (24568, 134.9602),
-    (32760, 179.9615),
-]
-"""6411h:01 and angle (shared vectors rtc-canopen.json, fig120_pot)."""
-
 
 @pytest.fixture
 def bench() -> UnitBench:
     return UnitBench()
 
 
-@pytest.mark.parametrize(("reference", "angle_deg"), POTENTIOMETER)
+@pytest.mark.parametrize(
+    ("reference", "angle_deg"), [(row["ai16"], row["angle_deg"]) for row in POTENTIOMETER]
+)
 def test_an_angle_is_exact_to_the_digits_and_the_shaft_settles_on_it(
     bench: UnitBench, reference: int, angle_deg: float
 ) -> None:
