@@ -10,6 +10,7 @@ from tickrig.emulators.can_end import Accepted, CanEnd
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.clock import Clock
+from tickrig.emulators.coupling import Coupling
 from tickrig.emulators.emulated import Touchable
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.trace import Mark
@@ -31,6 +32,7 @@ class CanEmulator(Workbench):
         physical: the physical side of all devices.
         stations: the devices, each on its end of the bus.
         wire: the bus.
+        couplings: what joins the devices beside the bus.
         outside: the bus where the host is, if it is outside.
         clock: a `VirtualClock` unless given.
         trace: the record, to be closed in the end.
@@ -44,6 +46,7 @@ class CanEmulator(Workbench):
         stations: Sequence[Station[Frames]],
         wire: CanWire,
         *,
+        couplings: Sequence[Coupling] = (),
         outside: CountingPort | None = None,
         clock: Clock | None = None,
         trace: CandumpFile | None = None,
@@ -55,7 +58,7 @@ class CanEmulator(Workbench):
         self._host = self._open_end()
         beyond = self._open_end(None if outside else frozenset())
         bridges = [CanBridge(beyond, outside)] if outside else []
-        self.rig = Rig(*stations, bridges=bridges, clock=clock)
+        self.rig = Rig(*stations, bridges=bridges, couplings=couplings, clock=clock)
 
     def _open_end(self, accepts: Accepted = None) -> CanEnd:
         """Connect an end that comes back from bus-off at once."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from tickrig.emulators.can_emulator import CanEmulator
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump_file import CandumpFile
+from tickrig.emulators.canopen.body_spec import BodySpec
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.nodes import Nodes
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.clock import Clock
@@ -22,17 +24,27 @@ _logger = logging.getLogger(__name__)
 
 def make_bench(  # noqa: PLR0913 - options, by keyword
     wire: CanWire,
-    nodes: Nodes,
+    nodes: Sequence[Node],
+    body: BodySpec | None = None,
     *,
     outside: CountingPort | None = None,
     link: str = "",
     trace: CandumpFile | None = None,
     clock: Clock | None = None,
 ) -> CanEmulator:
-    """Put nodes together with the bus outside, if there is one, and a clock."""
-    stations = [Station(node, node.port) for node in nodes.nodes]
+    """Put nodes together with a body, the bus outside, if there are such, and a clock."""
+    bodies = [body.put_on(nodes)] if body else []
+    stations = [Station(node, node.port) for node in nodes]
     return CanEmulator(
-        NAME, nodes, stations, wire, outside=outside, clock=clock, trace=trace, link=link
+        NAME,
+        Nodes(nodes, bodies),
+        stations,
+        wire,
+        couplings=bodies,
+        outside=outside,
+        clock=clock,
+        trace=trace,
+        link=link,
     )
 
 

@@ -1,9 +1,10 @@
-"""Make nodes of their files and put them on a bus."""
+"""Make nodes of their files and models and put them on a bus."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
@@ -11,20 +12,22 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds_cache import EdsCache
 from tickrig.emulators.canopen.eds_file import EdsError
+from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.profiles import AUTO, application_of
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.refused import Refused, refuse_path
 
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A node whose file was read.
+    """A node of which all is known.
 
     Attributes:
         name: what its things are called after, and its memory in a store file.
         node_id: 1..127, or `UNCONFIGURED`.
-        description: what its file says.
+        description: what its file or model says.
     """
 
     name: str
@@ -32,21 +35,26 @@ class Described:
     description: DeviceDescription
 
 
-def describe_nodes(specs: Iterable[NodeSpec]) -> list[Described]:
-    """Read the files; Refused if one cannot be used, or a node-ID is missing or there twice."""
+def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
+    """Read the files; Refused if one cannot be used, or a node-ID is missing or there twice.
+
+    Args:
+        specs: the nodes.
+        profile: of `profiles.CHOICES`, for nodes of files that name none.
+    """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
-        description = _read(cache, spec)
+        description = _describe(cache, spec.device, spec.profile or profile)
         node_id = spec.node_id if spec.node_id is not None else description.node_id
         if node_id is None:
             raise Refused(
-                f"{spec.file} gives no node-ID: add --node-id 1..127, or --node-id {LSS} for a"
+                f"{spec.device} gives no node-ID: add --node-id 1..127, or --node-id {LSS} for a"
                 " node that waits for LSS"
             )
         name = _name(node_id, found)
         if name in found:
             raise Refused(
-                f"node {name} is there twice: {found[name].description.file}, {spec.file}"
+                f"node {name} is there twice: {found[name].description.file}, {spec.device}"
             )
         found[name] = Described(name, node_id, description)
     return list(found.values())
@@ -58,15 +66,27 @@ def make_nodes(
     """Make the nodes, with what they stored in an earlier life."""
     nodes = []
     for item in described:
-        dictionary = item.description.make_dictionary()
+        description = item.description
+        dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
-        nodes.append(Node(item.name, make_slave(dictionary, item.node_id, memory), wire))
+        try:
+            slave = make_slave(dictionary, item.node_id, memory, description.application)
+        except ValueError as error:
+            raise Refused(f"{description.file}: {error}") from None
+        nodes.append(Node(item.name, slave, wire))
     return nodes
 
 
-def _read(cache: EdsCache, spec: NodeSpec) -> DeviceDescription:
+def _describe(cache: EdsCache, device: Path | str, profile: str) -> DeviceDescription:
+    if isinstance(device, str):
+        return MODELS[device].describe()
+    description = _read(cache, device)
+    return replace(description, application=application_of(description.template, profile))
+
+
+def _read(cache: EdsCache, file: Path) -> DeviceDescription:
     try:
-        return cache.read(spec.file)
+        return cache.read(file)
     except EdsError as error:
         raise Refused(str(error)) from None
     except OSError as error:

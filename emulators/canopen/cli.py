@@ -2,32 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
+from click.shell_completion import CompletionItem
 
 from tickrig.emulators.can_options import BusCommand, BusOptions, bus_options
-from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node, read_rig
+from tickrig.emulators.canopen.eds_writer import write_eds as format_eds
+from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
+from tickrig.emulators.canopen.profiles import AUTO, CHOICES
+from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
-from tickrig.emulators.refused import Refused
+from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.run_options import PATH, run_options
 
-BUS_FIELDS = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
+BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
+STANDARD_OUTPUT: Final = Path("-")
+
+
+def complete_node(
+    context: click.Context, option: click.Parameter, word: str
+) -> list[CompletionItem]:
+    """Complete `5=ep` to `5=epos`, and let the shell add its files."""
+    ids, equals, start = word.rpartition("=")
+    models = [f"{ids}{equals}{name}" for name in MODELS if name.startswith(start)]
+    return [*map(CompletionItem, models), CompletionItem(word, type="file")]
 
 
 @click.command(cls=BusCommand)
 @click.option("--eds", type=PATH, help="EDS that the node is made of.")
 @click.option("--dcf", type=PATH, help="DCF that it is made of; it may give the node-ID.")
+@click.option(
+    "--model",
+    type=click.Choice(list(MODELS)),
+    metavar="NAME",
+    help=f"Device that needs no file: {', '.join(MODELS)}.",
+)
 @click.option("--node-id", metavar="N", help="1..127, or lss for a node that waits for LSS.")
 @click.option(
     "--node",
     "nodes",
     multiple=True,
-    metavar="N=FILE",
-    help="One more node, as 5=a.eds; 1-20=a.eds makes twenty; may be repeated.",
+    metavar="N=FILE|MODEL",
+    shell_complete=complete_node,
+    help="One more node, as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
 )
-@click.option("--rig", type=PATH, help="TOML file with a table [[node]] for each node.")
+@click.option("--rig", type=PATH, help="TOML file with tables [[node]], and [body] if it has one.")
+@click.option(
+    "--profile",
+    type=click.Choice(CHOICES),
+    default=AUTO,
+    help="CiA profile of nodes of an EDS or DCF; auto takes that of its device type.  [auto]",
+)
+@click.option(
+    "--write-eds",
+    type=PATH,
+    help="Write the EDS of --model to a file (- is standard output), and end.",
+)
 @bus_options
 @click.option("--store", type=PATH, help="File for what is stored by 1010h and LSS.")
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
@@ -38,12 +72,14 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     /,
     eds: Path | None,
     dcf: Path | None,
+    model: str | None,
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
+    write_eds: Path | None,
     **options: Any,
 ) -> None:
-    """Emulate CANopen slaves, made of their EDS or DCF, on a CAN bus.
+    """Emulate CANopen slaves, made of their EDS or DCF or out of the box, on a CAN bus.
 
     The bus is one of python-can's, named by -i and -c, by its environment
     variables or its configuration files. It runs in real time until Ctrl-C. A
@@ -52,40 +88,60 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     Together with -i, -c or --control it is played in real time.
 
     \b
+    canopen-slave-emu --model epos --node-id 5 -i socketcan -c vcan0
     canopen-slave-emu --eds motor.eds --node-id 5 -i socketcan -c vcan0
     canopen-slave-emu --node 5=a.eds --node 6=b.eds -i udp_multicast -c ff11::1
     canopen-slave-emu --eds motor.eds --node-id lss --store memory.json -c can0 -i socketcan
     canopen-slave-emu --eds motor.eds --node-id 5 --scenario start.txt > run.log
+    canopen-slave-emu --rig examples/rigs/beego.toml -i socketcan -c vcan0
+    canopen-slave-emu --model epos --write-eds epos.eds
 
     \b
     Completion of options in the shell:
     eval "$(_CANOPEN_SLAVE_EMU_COMPLETE=bash_source canopen-slave-emu)"
     """  # noqa: D301 - click wants the backspace
+    if write_eds:
+        _write_eds(model, write_eds)
+        return
     bus = BusOptions(**{name: options.pop(name) for name in BUS_FIELDS})
-    specs = _specs(eds, dcf, node_id, nodes, rig)
-    context.exit(CanopenRun(CanopenOptions(specs=specs, bus=bus, **options)).run())
+    file = RigFile(()) if rig is None else read_rig(rig)
+    specs = (*_specs(eds, dcf, model, node_id), *_more(nodes), *file.nodes)
+    run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, **options))
+    context.exit(run.run())
 
 
 def _specs(
-    eds: Path | None,
-    dcf: Path | None,
-    node_id: str | None,
-    nodes: tuple[str, ...],
-    rig: Path | None,
-) -> tuple[NodeSpec, ...]:
-    """Return all nodes that the options ask for."""
-    if eds and dcf:
-        raise Refused("--eds and --dcf name the same thing: give one of them")
-    file = eds or dcf
-    if node_id and not file:
-        raise Refused("--node-id belongs to --eds or --dcf; with --node write N=FILE")
-    specs: list[NodeSpec] = []
-    if file and node_id:
-        specs += [NodeSpec(file, number) for number in parse_ids("--node-id", node_id)]
-    elif file:
-        specs.append(NodeSpec(file, None))
+    eds: Path | None, dcf: Path | None, model: str | None, node_id: str | None
+) -> Iterator[NodeSpec]:
+    """Give the nodes of --eds, --dcf or --model."""
+    given = {"--eds": eds, "--dcf": dcf, "--model": model}
+    named = [option for option, value in given.items() if value]
+    if len(named) > 1:
+        raise Refused(f"{' and '.join(named)} name the same thing: give one of them")
+    device = eds or dcf or model
+    if device and node_id:
+        yield from (NodeSpec(device, number) for number in parse_ids("--node-id", node_id))
+    elif device:
+        yield NodeSpec(device, None)
+    elif node_id:
+        raise Refused("--node-id belongs to --eds, --dcf or --model; with --node write N=FILE")
+
+
+def _more(nodes: tuple[str, ...]) -> Iterator[NodeSpec]:
     for text in nodes:
-        specs += parse_node(text)
-    if rig:
-        specs += read_rig(rig)
-    return tuple(specs)
+        yield from parse_node(text)
+
+
+def _write_eds(model: str | None, path: Path) -> None:
+    """Write the EDS of a model."""
+    if model is None:
+        raise Refused("--write-eds belongs to --model")
+    description = MODELS[model].describe()
+    text = format_eds(description.template, description.info)
+    if path == STANDARD_OUTPUT:
+        click.echo(text, nl=False)
+        return
+    try:
+        path.write_text(text, "utf-8", newline="\n")
+    except OSError as error:
+        refuse_path("EDS", error)

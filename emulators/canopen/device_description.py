@@ -1,10 +1,12 @@
-"""What an EDS or DCF says about a device."""
+"""What an EDS, a DCF or a model says about a device."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import ServiceMaker
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +31,12 @@ class DeviceDescription:
     """A device that slaves can be made of.
 
     Attributes:
-        file: the EDS or DCF.
+        file: the EDS or DCF, or the name of the model.
         info: vendor, product, bit rates.
         template: the objects with default values; never given to a slave.
-        node_id: of a DCF, None if it gives none.
+        node_id: of a DCF or model, None if it gives none.
         bit_rate: of a DCF in bit/s, None if it gives none.
+        application: what the device does with its objects.
     """
 
     file: str
@@ -41,6 +44,7 @@ class DeviceDescription:
     template: Dictionary
     node_id: int | None = None
     bit_rate: int | None = None
+    application: ServiceMaker = Application
 
     def make_dictionary(self) -> Dictionary:
         """Make the dictionary of one more slave."""

@@ -1,9 +1,10 @@
-"""The physical side of several nodes: all their things under one roof."""
+"""The physical side of several nodes, and of what they are part of: all under one roof."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.physical import Input, Kind, Output
@@ -13,26 +14,53 @@ from tickrig.emulators.names import known
 from tickrig.emulators.setting import Setting
 
 
+class Part(Protocol):
+    """A node, or a body on nodes: something with a name and a physical side.
+
+    Attributes:
+        name: of the part.
+        physical: what the world does to it, by name.
+        groups: names of several of these that are set together.
+        outputs: what the world sees of it, by name.
+    """
+
+    name: str
+    physical: Mapping[str, Touch]
+    groups: Mapping[str, tuple[str, ...]]
+    outputs: Mapping[str, Output]
+
+    def touch(self, name: str) -> Touch | None:
+        """Return the thing of this name, None if there is none."""
+
+    def touchable(self) -> list[str]:
+        """Return all names."""
+        ...
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        ...
+
+
 class Nodes:
     """All nodes of a bus, to be touched and looked at.
 
     The things of one node are called as they are, `0x6000:1`, `state`; those of
-    several have the node before them, `5/0x6000:1`, `5/state`.
+    several have the node before them, `5/0x6000:1`, `5/state`, those of a body always
+    have it, `body/x_m`.
 
     Args:
         nodes: at least one.
+        bodies: what is joined to them.
     """
 
-    def __init__(self, nodes: Sequence[Node]) -> None:
-        self.nodes = tuple(nodes)
-        self._by_name = {node.name: node for node in nodes}
+    def __init__(self, nodes: Sequence[Node], bodies: Sequence[Part] = ()) -> None:
+        self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
+        self._by_name: Mapping[str, Part] = {part.name: part for part in self.parts}
         self.inputs = NodeInputs(self)
         self.outputs: Mapping[str, Output] = {
-            self.full_name(node, item.name): Output(
-                self.full_name(node, item.name), item.text, item.unit
-            )
-            for node in nodes
-            for item in node.outputs.values()
+            self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
+            for part in self.parts
+            for item in part.outputs.values()
         }
 
     @property
@@ -42,17 +70,18 @@ class Nodes:
 
     def read(self, name: str, /) -> Setting:
         """Return the present value of an output; KeyError if there is none."""
-        node, rest = self.find(name)
-        if node is None:
+        part, rest = self.find(name)
+        if part is None:
             raise KeyError(name)
-        return node.read(rest)
+        return part.read(rest)
 
-    def full_name(self, node: Node, name: str) -> str:
-        """Return what a thing of a node is called."""
-        return name if len(self.nodes) == 1 else f"{node.name}/{name}"
+    def full_name(self, part: Part, name: str) -> str:
+        """Return what a thing of a part is called."""
+        alone = len(self.nodes) == 1 and part is self.nodes[0]
+        return name if alone else f"{part.name}/{name}"
 
-    def find(self, name: str) -> tuple[Node | None, str]:
-        """Return the node that a name belongs to, and the rest of the name."""
+    def find(self, name: str) -> tuple[Part | None, str]:
+        """Return the part that a name belongs to, and the rest of the name."""
         prefix, slash, rest = name.partition("/")
         if slash:
             return self._by_name.get(prefix), rest
@@ -76,9 +105,9 @@ class NodeInputs:
         self.changed = False
         self.table: Mapping[str, Input] = _Table(nodes)
         self.groups: Mapping[str, tuple[str, ...]] = {
-            nodes.full_name(node, name): tuple(nodes.full_name(node, item) for item in members)
-            for node in nodes.nodes
-            for name, members in node.groups.items()
+            nodes.full_name(part, name): tuple(nodes.full_name(part, item) for item in members)
+            for part in nodes.parts
+            for name, members in part.groups.items()
         }
         self._nodes = nodes
 
@@ -107,16 +136,16 @@ class NodeInputs:
         """Return the names of all inputs of a kind; objects are levels and texts."""
         if kind in (Kind.BUTTON, Kind.FAULT):
             return tuple(
-                self._nodes.full_name(node, name)
-                for node in self._nodes.nodes
-                for name, touch in node.physical.items()
+                self._nodes.full_name(part, name)
+                for part in self._nodes.parts
+                for name, touch in part.physical.items()
                 if touch.item.kind is kind
             )
         return tuple(name for name in self.table if self.table[name].kind is kind)
 
     def _touch(self, name: str) -> Touch:
-        node, rest = self._nodes.find(name)
-        touch = node.touch(rest) if node else None
+        part, rest = self._nodes.find(name)
+        touch = part.touch(rest) if part else None
         if touch is None:
             raise ValueError(f"no input {name!r}; known: {known(self.table)}")
         return touch
@@ -129,19 +158,19 @@ class _Table(Mapping[str, Input]):
         self._nodes = nodes
 
     def __getitem__(self, name: str) -> Input:
-        node, rest = self._nodes.find(name)
-        touch = node.touch(rest) if node else None
-        if node is None or touch is None:
+        part, rest = self._nodes.find(name)
+        touch = part.touch(rest) if part else None
+        if part is None or touch is None:
             raise KeyError(name)
-        return replace(touch.item, name=self._nodes.full_name(node, touch.item.name))
+        return replace(touch.item, name=self._nodes.full_name(part, touch.item.name))
 
     def __contains__(self, name: object) -> bool:
-        node, rest = self._nodes.find(name) if isinstance(name, str) else (None, "")
-        return node is not None and node.touch(rest) is not None
+        part, rest = self._nodes.find(name) if isinstance(name, str) else (None, "")
+        return part is not None and part.touch(rest) is not None
 
     def __iter__(self) -> Iterator[str]:
         nodes = self._nodes
-        return (nodes.full_name(node, name) for node in nodes.nodes for name in node.touchable())
+        return (nodes.full_name(part, name) for part in nodes.parts for name in part.touchable())
 
     def __len__(self) -> int:
-        return sum(len(node.touchable()) for node in self._nodes.nodes)
+        return sum(len(part.touchable()) for part in self._nodes.parts)

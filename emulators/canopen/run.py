@@ -15,9 +15,10 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump import LogLine
 from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.canopen.bench import make_bench, store_keeper
+from tickrig.emulators.canopen.body_spec import BodySpec
 from tickrig.emulators.canopen.build import Described, describe_nodes, make_nodes
 from tickrig.emulators.canopen.node_spec import NodeSpec
-from tickrig.emulators.canopen.nodes import Nodes
+from tickrig.emulators.canopen.profiles import AUTO
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.frame_transcript import FrameTranscript
 from tickrig.emulators.player import Player
@@ -30,6 +31,7 @@ from tickrig.wire.can import CanFrame
 VIRTUAL_CHANNEL: Final = "can0"
 BIT_RATE: Final = 1_000_000
 SHOWN_NODES: Final = 8
+NO_NODE: Final = "no node: give --eds FILE --node-id N, --model NAME, --node N=FILE or --rig FILE"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,11 +40,15 @@ class CanopenOptions(RunOptions):
 
     Attributes:
         specs: the nodes.
+        body: what they move, None if nothing.
+        profile: of nodes of files; see `profiles.CHOICES`.
         bus: the bus outside.
         store: file in which nodes keep what 1010h and LSS store.
     """
 
     specs: tuple[NodeSpec, ...] = ()
+    body: BodySpec | None = None
+    profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
     store: Path | None = None
 
@@ -62,11 +68,11 @@ class CanopenRun(EmulatorRun):
         self._channel = VIRTUAL_CHANNEL
 
     def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
-        self._described = describe_nodes(self._options.specs)
+        self._described = describe_nodes(self._options.specs, self._options.profile)
         if not self._described:
-            raise Refused("no node: give --eds FILE --node-id N, --node N=FILE or --rig FILE")
+            raise Refused(NO_NODE)
         wire = self._make_wire()
-        bench = make_bench(wire, Nodes(make_nodes(self._described, wire)))
+        bench = make_bench(wire, make_nodes(self._described, wire), self._options.body)
         senders = {"send": parse_send}
         return bench, ScenarioParser(bench.device, bench.operator, senders=senders)
 
@@ -84,11 +90,12 @@ class CanopenRun(EmulatorRun):
             outside, link, self._channel = open_bus(self._options.bus, stack)
         wire = self._make_wire()
         store = self._open_store()
-        nodes = Nodes(make_nodes(self._described, wire, store))
+        nodes = make_nodes(self._described, wire, store)
         trace = self._open_trace(wire)
         bench = make_bench(
             wire,
             nodes,
+            self._options.body,
             outside=outside,
             link=link,
             trace=trace,

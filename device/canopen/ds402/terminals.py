@@ -37,10 +37,10 @@ OUTPUTS: Final = {
     for item in (
         Output("shaft_deg", "angle of the output shaft", "deg"),
         Output("shaft_deg_s", "speed of the output shaft", "deg/s"),
-        Output("position", "position actual value, in units of the user"),
+        Output("position", "position actual value", "user units"),
         Output("current_a", "current of the motor", "A"),
         Output("winding_c", "temperature of the winding", "degC"),
-        Output("state", "state of the drive"),
+        Output("drive_state", "state of the drive"),
         Output("mode", "mode of operation, as in 6061h"),
     )
 }
@@ -51,7 +51,7 @@ READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
     "position": lambda drive: drive.axis.position,
     "current_a": lambda drive: drive.motor.current_ma / 1_000,
     "winding_c": lambda drive: drive.motor.winding_dc / 10,
-    "state": lambda drive: drive.state.name.capitalize().replace("_", " "),
+    "drive_state": lambda drive: drive.state.name.capitalize().replace("_", " "),
     "mode": lambda drive: drive.mode_number,
 }
 

@@ -90,26 +90,56 @@ def test_a_dcf_gives_the_node_id() -> None:
     assert frames(play("10ms end\n", "--dcf", DCF, "--node-id", "7")) == ["707#00"]
 
 
+def test_an_input_of_a_model_is_set_by_its_name() -> None:
+    scenario = "10ms send 000#0110\n20ms set ai1_v 2.5\n+0s set di 1 0 0 0 0 0 0 1\n"
+    result = play(
+        f"{scenario}30ms watch do1 ai1_v\n40ms send 210#01\n50ms end\n", "--node", "f-palette"
+    )
+    assert frames(result)[0] == "710#00"
+    assert "190#81" in frames(result)
+    assert "* do1 1\n" in result.stderr
+    assert "* ai1_v 2.5\n" in result.stderr
+
+
+def test_the_eds_of_a_model_makes_the_same_device(tmp_path: Path) -> None:
+    eds = tmp_path / "palette.eds"
+    assert run("--model", "f-palette", "--write-eds", eds).output == ""
+    assert run("--model", "f-palette", "--write-eds", "-").stdout == eds.read_text("utf-8")
+    scenario = "10ms send 000#0110\n20ms set di1 1\n30ms send 610#4001140100000000\n50ms end\n"
+    assert frames(play(scenario, "--model", "f-palette")) == frames(
+        play(scenario, "--eds", eds, "--node-id", "16")
+    )
+
+
 def test_a_rig_file_names_the_nodes(tmp_path: Path) -> None:
     eds = ROOT / EDS
     rig = tmp_path / "rig.toml"
     rig.write_text(
         f'[[node]]\nid = 5\neds = "{eds}"\n[[node]]\nid = "7-8"\neds = "{eds}"\n'
         f'[[node]]\nid = "lss"\neds = "{eds}"\n[[node]]\neds = "{ROOT / DCF}"\n'
+        '[[node]]\nmodel = "f-palette"\nid = 17\n'
+        f'[[node]]\nid = 9\neds = "{eds}"\nprofile = "none"\n'
     )
-    result = play("10ms end\n", "--rig", rig)
-    assert {"705#00", "707#00", "708#00"} < set(frames(result))
-    assert len(frames(result)) == 4
+    result = play("1ms set 5/di1 1\n10ms end\n", "--rig", rig)
+    assert {"705#00", "707#00", "708#00", "709#00", "711#00"} < set(frames(result))
+    assert len(frames(result)) == 6
+    assert "no input '9/di1'" in play("1ms set 9/di1 1\n", "--rig", rig).stderr
 
 
 @pytest.mark.parametrize(
     ("text", "error"),
     [
         ("node = 5", "it consists of tables [[node]]"),
+        ("node = [5]", "node 1: it is a table with the keys id, eds, model, profile"),
         ("", "it consists of tables [[node]]"),
-        ("[nodes]", "it consists of tables [[node]], not [nodes]"),
-        ("[[node]]\nid = 1\nedds = 'x'", "node 1: its keys are id and eds"),
-        ("[[node]]\nid = 1", "node 1: eds is the name of an EDS or DCF file"),
+        ("[nodes]", "it consists of tables [[node]] and perhaps one table [body], not [nodes]"),
+        ("[[node]]\nid = 1\nedds = 'x'", "node 1: no key edds; known: id, eds, model, profile"),
+        ("[[node]]\nid = 1", "node 1: give eds, the name of an EDS or DCF file, or model"),
+        ("[[node]]\neds = 5", "node 1: eds 5 is not the name of an EDS or DCF file"),
+        ("[[node]]\neds = 'x'\nmodel = 'y'", "node 1: give eds, the name of an EDS"),
+        ("[[node]]\nmodel = 'toaster'", "node 1: model 'toaster' is not one of f-palette"),
+        ("[[node]]\nmodel = 'f-palette'\nprofile = '401'", "node 1: profile belongs to eds"),
+        ("[[node]]\neds = 'x'\nprofile = 401", "node 1: profile 401 is not one of auto, none"),
         ("[[node]]\nid = 0\neds = 'x'", "node 1: id 0: a node-ID is 1..127"),
         ("[[node", "rig.toml: "),
     ],
@@ -158,14 +188,18 @@ def test_lss_finds_a_node_without_node_id() -> None:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        ("", "no node: give --eds FILE --node-id N, --node N=FILE or --rig FILE"),
-        ("--node-id 5", "--node-id belongs to --eds or --dcf; with --node write N=FILE"),
+        ("", "no node: give --eds FILE --node-id N, --model NAME, --node N=FILE or --rig FILE"),
+        ("--node-id 5", "--node-id belongs to --eds, --dcf or --model; with --node write N=FILE"),
         (f"--eds {EDS} --dcf {DCF}", "--eds and --dcf name the same thing: give one of them"),
+        (f"--dcf {DCF} --model f-palette", "--dcf and --model name the same thing"),
+        (f"--eds {EDS} --write-eds x.eds", "--write-eds belongs to --model"),
+        ("--model f-palette --write-eds /nowhere/x", "EDS /nowhere/x: No such file"),
+        (f"--node 5={EDS} --profile 402 --node 5=f-palette", "node 5 is there twice"),
         (f"--eds {EDS}", f"{EDS} gives no node-ID: add --node-id 1..127, or --node-id lss"),
         (f"--eds {EDS} --node-id 128", "--node-id: a node-ID is 1..127, a range as 1-20, or lss"),
         (f"--eds {EDS} --node-id five", "--node-id: a node-ID is 1..127"),
         (f"--node 9-5={EDS}", f"--node 9-5={EDS}: a node-ID is 1..127"),
-        ("--node 5=", "--node 5=: give ID=FILE, as 5=a.eds"),
+        ("--node 5=", "--node 5=: give ID=FILE or ID=MODEL, as 5=a.eds"),
         (f"--node 5={EDS} --node 4-6={EDS}", f"node 5 is there twice: {EDS}, {EDS}"),
         ("--eds nowhere.eds --node-id 5", "file nowhere.eds: No such file or directory"),
         ("--rig nowhere.toml", "rig nowhere.toml: No such file or directory"),
@@ -189,7 +223,7 @@ def test_a_users_mistake_is_one_line_and_status_2(words: str, error: str) -> Non
     [
         ("send 705", "-:1: '705' is not a frame like 705#7F"),
         ("raw 00", "-:1: no action 'raw'; known: send, set, press"),
-        ("set 0x5000 1", "-:1: no input '0x5000'; known: power_off"),
+        ("set 0x5000 1", "-:1: no input '0x5000'; known: di, di9_16, power_off"),
         ("set 0x6000:1 256", "-:1: 0x6000:1 256 is not in 0..255"),
         ("press 0x6000:1", "-:1: no button '0x6000:1'; known: none"),
         ("watch smell", "-:1: no output 'smell'; known: state, node_id, can_state"),
@@ -225,17 +259,26 @@ def test_many_values_follow_one_option() -> None:
     assert result.stderr == "Error: --bus-kwargs 'b' is not KEY=VALUE\n"
 
 
-def test_the_shell_completes_its_options() -> None:
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("--st", "plain,--store\n"),
+        ("--model f-p", "plain,f-palette\n"),
+        ("--node 5=f-p", "plain,5=f-palette\nfile,5=f-p\n"),
+        ("--profile n", "plain,none\n"),
+    ],
+)
+def test_the_shell_completes_options_and_models(words: str, completed: str) -> None:
     result = subprocess.run(
         [sys.executable, "-c", PROGRAM],
         env={
             "PYTHONPATH": str(ROOT / "src"),
             "_CANOPEN_SLAVE_EMU_COMPLETE": "bash_complete",
-            "COMP_WORDS": "canopen-slave-emu --st",
-            "COMP_CWORD": "1",
+            "COMP_WORDS": f"canopen-slave-emu {words}",
+            "COMP_CWORD": str(len(words.split())),
         },
         capture_output=True,
         text=True,
         check=True,
     )
-    assert result.stdout == "plain,--store\n"
+    assert result.stdout == completed

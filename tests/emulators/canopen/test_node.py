@@ -11,7 +11,6 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.nodes import Nodes
 from tickrig.emulators.fault_spec import parse_fault_spec
 
 EDS = Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds"
@@ -24,8 +23,8 @@ class Bench:
     def __init__(self, *ids: int) -> None:
         wire = CanWire()
         self.nodes = [Node(str(n), make_slave(DESCRIPTION.make_dictionary(), n), wire) for n in ids]
-        self.physical = Nodes(self.nodes)
-        self.emulator: CanEmulator = make_bench(wire, self.physical)
+        self.emulator: CanEmulator = make_bench(wire, self.nodes)
+        self.physical = self.emulator.device
 
     def run(self, to_ms: int, *frames: str) -> list[str]:
         for frame in frames:

@@ -16,7 +16,6 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.nodes import Nodes
 from tickrig.emulators.control import Control
 from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.scenario import ScenarioParser
@@ -27,9 +26,7 @@ DESCRIPTION = read_eds(Path(__file__).parents[2] / "golden" / "canopen" / "r1.ed
 def dimmers(*ids: int) -> CanEmulator:
     wire = CanWire()
     slaves = [make_slave(DESCRIPTION.make_dictionary(), n, application=Dimmer) for n in ids]
-    return make_bench(
-        wire, Nodes([Node(str(n), s, wire) for n, s in zip(ids, slaves, strict=True)])
-    )
+    return make_bench(wire, [Node(str(n), s, wire) for n, s in zip(ids, slaves, strict=True)])
 
 
 def ask(bench: CanEmulator, **request: object) -> dict[str, Any]:

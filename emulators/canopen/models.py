@@ -1,0 +1,75 @@
+"""The devices that are emulated out of the box."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
+from tickrig.device.canopen.slave import ServiceMaker
+from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
+from tickrig.emulators.canopen.eds import BIT_RATES_KBIT
+
+VENDOR: Final = "tickrig"
+PRODUCT: Final = 0x1008
+BIT_RATES: Final = frozenset(1_000 * kbit for kbit in BIT_RATES_KBIT)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A device that needs no file.
+
+    Attributes:
+        name: what command lines and rig files call it.
+        text: what it is, for people.
+        node_id: its node-ID unless told otherwise.
+        dictionary: makes the objects with default values.
+        application: what it does with them.
+    """
+
+    name: str
+    text: str
+    node_id: int
+    dictionary: Callable[[], Dictionary]
+    application: ServiceMaker
+
+    def describe(self) -> DeviceDescription:
+        """Return what an EDS would say, and what none can."""
+        template = self.dictionary()
+        return DeviceDescription(
+            self.name,
+            DeviceInfo(VENDOR, template[PRODUCT, 0].default.decode("ascii"), bit_rates=BIT_RATES),
+            template,
+            self.node_id,
+            application=self.application,
+        )
+
+
+_MODELS: Final = (
+    Model(
+        "f-palette",
+        "I/O module: 8 digital inputs, 8 digital outputs, 8 analogue inputs",
+        f_palette.NODE_ID,
+        f_palette.dictionary,
+        f_palette.make,
+    ),
+    Model(
+        "motor-core-unit",
+        "motor core unit with FTMD driver: current, velocity and angle mode",
+        motor_core_unit.NODE_ID,
+        motor_core_unit.dictionary,
+        motor_core_unit.make,
+    ),
+    Model(
+        "epos",
+        "CiA 402 drive as Maxon's EPOS 24/5, at a wheel of the robot beego",
+        epos.NODE_ID,
+        epos.dictionary,
+        epos.make,
+    ),
+)
+
+MODELS: Final = {model.name: model for model in _MODELS}
+"""By name."""

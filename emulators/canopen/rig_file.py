@@ -1,0 +1,86 @@
+"""Rig files: which nodes there shall be, and the body that they move."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.emulators.canopen.body_spec import BodySpec, read_body
+from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
+from tickrig.emulators.canopen.profiles import CHOICES
+from tickrig.emulators.refused import Refused, refuse_path
+
+NODE_KEYS: Final = ("id", "eds", "model", "profile")
+TABLES: Final = "it consists of tables [[node]] and perhaps one table [body]"
+
+
+@dataclass(frozen=True, slots=True)
+class RigFile:
+    """What a rig file says.
+
+    Attributes:
+        nodes: the nodes.
+        body: what they move, None if nothing.
+    """
+
+    nodes: tuple[NodeSpec, ...]
+    body: BodySpec | None = None
+
+
+def read_rig(path: Path) -> RigFile:
+    """Read a rig file.
+
+    Raises:
+        Refused: the file cannot be used; the line says where and why.
+    """
+    try:
+        content = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        refuse_path("rig", error)
+    except ValueError as error:
+        raise Refused(f"rig {path}: {error}") from None
+    tables, body = content.pop("node", None), content.pop("body", None)
+    if content or not isinstance(tables, list):
+        extra = f", not [{next(iter(content))}]" if content else ""
+        raise Refused(f"rig {path}: {TABLES}{extra}")
+    nodes = [
+        spec
+        for number, table in enumerate(tables, 1)
+        for spec in _read_node(path, f"rig {path}: node {number}", table)
+    ]
+    return RigFile(tuple(nodes), None if body is None else read_body(f"rig {path}: body", body))
+
+
+def _read_node(path: Path, place: str, table: object) -> Iterator[NodeSpec]:
+    if not isinstance(table, dict):
+        raise Refused(f"{place}: it is a table with the keys {', '.join(NODE_KEYS)}")
+    if unknown := [key for key in table if key not in NODE_KEYS]:
+        raise Refused(f"{place}: no key {unknown[0]}; known: {', '.join(NODE_KEYS)}")
+    device, profile = _device(path, place, table), table.get("profile")
+    if profile is not None and profile not in CHOICES:
+        raise Refused(f"{place}: profile {profile!r} is not one of {', '.join(CHOICES)}")
+    node_id = table.get("id")
+    if node_id is None:
+        yield NodeSpec(device, None, profile)
+        return
+    for number in parse_ids(f"{place}: id {node_id!r}", str(node_id)):
+        yield NodeSpec(device, number, profile)
+
+
+def _device(path: Path, place: str, table: dict[str, Any]) -> Path | str:
+    file, model = table.get("eds"), table.get("model")
+    if (file is None) == (model is None):
+        raise Refused(f"{place}: give eds, the name of an EDS or DCF file, or model")
+    if model is not None:
+        if not isinstance(model, str) or model not in MODELS:
+            raise Refused(f"{place}: model {model!r} is not one of {', '.join(MODELS)}")
+        if "profile" in table:
+            raise Refused(f"{place}: profile belongs to eds; a model has its own")
+        return model
+    if not isinstance(file, str) or not file:
+        raise Refused(f"{place}: eds {file!r} is not the name of an EDS or DCF file")
+    return path.parent / file
