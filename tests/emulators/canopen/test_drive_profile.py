@@ -1,0 +1,126 @@
+"""The canopen library's own profile for drives, unchanged, at an EPOS-like drive in virtual time."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from canopen.profiles.p402 import BaseNode402
+
+from tickrig.device.canopen.ds402.state import DriveState
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.canopen.eds_writer import write_eds
+from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.sim_network import SimNetwork
+
+RIGHT_WHEEL = 2
+
+
+class Bench:
+    """A drive as the library sees it, with K21's PDOs and an event timer."""
+
+    def __init__(self) -> None:
+        wire = CanWire()
+        self.slave = make_slave(epos.dictionary(), RIGHT_WHEEL, application=epos.make)
+        self.emulated = epos.Epos.of(self.slave)
+        self.rig = Rig(Station(self.slave, wire.end()))
+        self.network = SimNetwork(self.rig, wire.end())
+        kind: Any = BaseNode402
+        self.node: Any = self.network.add_node(kind(RIGHT_WHEEL, _eds()))
+        self.run_ms(10)
+        self.node.tpdo[1].read()
+        self.node.tpdo[1].event_timer = 20
+        self.node.tpdo[1].save()
+        self.node.setup_402_state_machine()
+        self.node.nmt.state = "OPERATIONAL"
+        self.run_ms(50)
+
+    def run_ms(self, milliseconds: int) -> None:
+        self.network.run_for(1_000 * milliseconds)
+
+    def turn(self, velocity: int) -> None:
+        target = self.node.rpdo_pointers[0x60FF]
+        target.raw = velocity
+        target.pdo_parent.transmit()
+
+
+def _eds() -> io.StringIO:
+    file = io.StringIO(write_eds(epos.dictionary()))
+    file.name = "epos.eds"
+    return file
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_the_library_finds_controlword_and_statusword_in_pdos(bench: Bench) -> None:
+    assert 0x6040 in bench.node.rpdo_pointers
+    assert 0x6041 in bench.node.tpdo_values
+    assert bench.node.state == "SWITCH ON DISABLED"
+
+
+def test_the_library_leads_the_drive_through_its_states(bench: Bench) -> None:
+    for name, state in (
+        ("READY TO SWITCH ON", DriveState.READY_TO_SWITCH_ON),
+        ("SWITCHED ON", DriveState.SWITCHED_ON),
+        ("OPERATION ENABLED", DriveState.OPERATION_ENABLED),
+        ("SWITCHED ON", DriveState.SWITCHED_ON),
+        ("OPERATION ENABLED", DriveState.OPERATION_ENABLED),
+        ("SWITCH ON DISABLED", DriveState.SWITCH_ON_DISABLED),
+    ):
+        bench.node.state = name
+        assert bench.node.state == name
+        assert bench.emulated.state is state
+
+
+def test_the_library_turns_a_wheel_by_profile_velocity(bench: Bench) -> None:
+    bench.node.op_mode = "PROFILED VELOCITY"
+    assert bench.node.op_mode == "PROFILED VELOCITY"
+    bench.node.state = "OPERATION ENABLED"
+    bench.turn(600)
+    bench.run_ms(500)
+    assert bench.node.sdo[0x606C].raw == pytest.approx(600, abs=2)
+    before = bench.node.tpdo_values[0x6064]
+    bench.run_ms(1_000)
+    assert bench.node.tpdo_values[0x6064] - before == pytest.approx(20_000, abs=800)
+    assert bench.node.statusword & 0x0400
+    assert bench.emulated.read("shaft_deg_s") == pytest.approx(3_600 / 51, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "mode",
+    [
+        *("PROFILED POSITION", "PROFILED VELOCITY", "PROFILED TORQUE", "HOMING"),
+        *("INTERPOLATED POSITION", "CYCLIC SYNCHRONOUS POSITION"),
+        *("CYCLIC SYNCHRONOUS VELOCITY", "CYCLIC SYNCHRONOUS TORQUE"),
+    ],
+)
+def test_the_library_chooses_each_mode(bench: Bench, mode: str) -> None:
+    bench.node.state = "OPERATION ENABLED"
+    bench.node.op_mode = mode
+    assert bench.node.op_mode == mode
+
+
+def test_the_library_homes(bench: Bench) -> None:
+    bench.node.sdo[0x6098].raw = 35
+    bench.node.sdo[0x607C].raw = 1_234
+    assert bench.node.homing()
+    bench.run_ms(50)
+    assert bench.node.tpdo_values[0x6064] == 1_234
+    assert bench.node.is_homed()
+
+
+def test_the_library_resets_a_fault(bench: Bench) -> None:
+    bench.node.op_mode = "PROFILED VELOCITY"
+    bench.node.state = "OPERATION ENABLED"
+    bench.emulated.inputs.set("short_circuit", 1)
+    bench.run_ms(50)
+    assert bench.node.is_faulted()
+    bench.emulated.inputs.set("short_circuit", 0)
+    bench.node.reset_from_fault()
+    assert bench.node.state == "OPERATION ENABLED"
