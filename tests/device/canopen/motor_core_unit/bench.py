@@ -18,7 +18,7 @@ class UnitBench(Bus):
     """Steps the unit; time without traffic passes as a rig lets it pass.
 
     Attributes:
-        heard: what the unit has sent.
+        log: what the unit has sent, each frame with its tick.
     """
 
     def __init__(self) -> None:
@@ -26,8 +26,12 @@ class UnitBench(Bus):
         node_id = motor_core_unit.NODE_ID
         super().__init__(make_slave(motor_core_unit.dictionary(), node_id, application=application))
         self.unit = MotorCoreUnit.of(self.slave)
-        self.heard: list[str] = []
+        self.log: list[tuple[int, str]] = []
         self.send()
+
+    @property
+    def heard(self) -> list[str]:
+        return [text for _, text in self.log]
 
     @property
     def status(self) -> int:
@@ -40,7 +44,7 @@ class UnitBench(Bus):
 
     def send(self, *texts: str) -> None:
         """Run one tick with these frames."""
-        self.heard += self.step(*texts)
+        self.log += ((self.now_us, text) for text in self.step(*texts))
 
     def pass_ms(self, ms: int) -> None:
         """Let time pass; ticks without work are left out."""
