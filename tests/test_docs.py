@@ -20,10 +20,10 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/canopen.md"])
-def test_the_program_of_a_page_runs(page: str) -> None:
-    (program,) = blocks(page, "python")
-    exec(compile(program, page, "exec"), {})
+@pytest.mark.parametrize("page", ["README.md", "docs/canopen.md", "docs/canopen-io-module.md"])
+def test_the_program_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    exec(compile("".join(blocks(page, "python")), page, "exec"), {})
 
 
 @pytest.mark.realtime

@@ -46,6 +46,9 @@ class AnalogueInput:
         whole = EventRule(dictionary, number, INTEGER_LIMITS, ([*real, *self.channel.integers])[-1])
         fraction = EventRule(dictionary, number, REAL_LIMITS, self.entries[-1])
         self._rules = [rule for rule in (whole, fraction) if rule.settings] or [whole]
+        self._judged: tuple[float, bool] | None = None
+        for entry in self.objects():
+            entry.watchers.append(self._judge_anew)
 
     @property
     def name(self) -> str:
@@ -76,6 +79,7 @@ class AnalogueInput:
 
     def begin(self, physical: float) -> None:
         """Take the present value as sent."""
+        self._judged = None
         self._convert(physical)
         for rule in self._rules:
             rule.begin()
@@ -87,6 +91,9 @@ class AnalogueInput:
 
     def update(self, physical: float, *, enabled: bool) -> bool:
         """Read the channel; say whether that is an event, as far as events are enabled."""
+        if self._judged == (physical, enabled):
+            return False
+        self._judged = physical, enabled
         self._convert(physical)
         trigger = int(quantity(self._trigger, DEFAULT_TRIGGER))
         events = [rule.judge(trigger) for rule in self._rules]
@@ -94,6 +101,9 @@ class AnalogueInput:
         if event:
             self.sent()
         return event
+
+    def _judge_anew(self) -> None:
+        self._judged = None
 
     def _convert(self, physical: float) -> None:
         channel, converter, value = self.channel, self.channel.converter, physical
