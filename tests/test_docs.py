@@ -20,7 +20,9 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/canopen.md", "docs/canopen-io-module.md"])
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/canopen.md", "docs/canopen-io-module.md", "docs/servo.md"]
+)
 def test_the_program_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     exec(compile("".join(blocks(page, "python")), page, "exec"), {})

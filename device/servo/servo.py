@@ -83,32 +83,34 @@ class Servo(Readings):
 
     def release(self) -> None:
         """Switch the power stage off; the shaft coasts."""
-        if self._want(Demand.NOTHING, 0.0, 0.0, 0.0):
-            self._loops.integral_a = 0.0
+        self._want(Demand.NOTHING, (0.0, 0.0, 0.0))
 
     def drive_current(self, current_a: float) -> None:
         """Impose a current."""
-        if self._want(Demand.CURRENT, current_a, 0.0, 0.0):
-            self._loops.integral_a = 0.0
+        self._want(Demand.CURRENT, (current_a, 0.0, 0.0))
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
         """Keep a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
-        self._want(Demand.VELOCITY, 0.0, velocity, acceleration)
+        self._want(Demand.VELOCITY, (0.0, velocity, acceleration))
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Keep a position, counts; velocity and acceleration are fed forward."""
-        self._want(Demand.POSITION, position, velocity, acceleration)
+        """Keep a position; velocity and acceleration are fed forward.
 
-    def _want(self, demand: Demand, value: float, velocity: float, acceleration: float) -> bool:
-        """Take a demand; return whether it is of another kind."""
-        other = demand is not self._demand
-        if other or (value, velocity, acceleration) != self._values:
+        Args:
+            position: where the shaft shall be now, counts; fractions are taken.
+            velocity: the velocity that it shall have now, counts/s.
+            acceleration: its acceleration in the next millisecond, counts/s^2.
+        """
+        self._want(Demand.POSITION, (position, velocity, acceleration))
+
+    def _want(self, demand: Demand, values: tuple[float, float, float]) -> None:
+        """Take a demand, if it is another one."""
+        if demand is not self._demand or values != self._values:
             if self.resting:
                 self._wake()
-            self._demand, self._values = demand, (value, velocity, acceleration)
-        return other
+            self._demand, self._values = demand, values
 
     # time
 
@@ -138,12 +140,8 @@ class Servo(Readings):
     def _step(self) -> None:
         """Let one control step pass."""
         plant, loops = self._plant, self._loops
-        position, current, integral, cut = (
-            plant.position,
-            plant.current_a,
-            loops.integral_a,
-            loops.cut,
-        )
+        position, current = plant.position, plant.current_a
+        integral, cut = loops.integral_a, loops.cut
         loops.cut = self._push(plant, loops)
         self.current_limited = loops.cut != 0
         if self.encoder_unplugged:
@@ -166,6 +164,7 @@ class Servo(Readings):
         """Act on the demand; return the direction in which it was cut."""
         demand, (value, velocity, acceleration) = self._demand, self._values
         if demand is Demand.NOTHING or self._off:
+            loops.integral_a = 0.0
             plant.open()
             return 0
         speed = 0.0 if self.encoder_unplugged else plant.speed_rad_s
@@ -174,7 +173,7 @@ class Servo(Readings):
         elif demand is Demand.VELOCITY:
             current = loops.turn(velocity, acceleration, speed)
         else:
-            current = value
+            current, loops.integral_a = value, 0.0
         limit = self._limit_a
         if current > limit:
             return plant.drive(limit, self._limit_v) or 1
