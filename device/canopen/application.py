@@ -8,6 +8,7 @@ from types import MappingProxyType
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.service import Service
 from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.core import NEVER
 from tickrig.device.physical import Input, Output, QuantityBank
 
 
@@ -44,6 +45,16 @@ class Application(Service):
 
     def on_execute(self, now_us: int) -> None:
         """Read inputs, work, write outputs."""
+
+    def without_power(self, now_us: int) -> int:
+        """Let time pass while the supply is cut: what moves coasts.
+
+        Called in the first tick without power, and when a physical input was set.
+
+        Returns:
+            When it wants to be called again, `NEVER` if nothing will change by itself.
+        """
+        return NEVER
 
     def request(self) -> None:
         """Ask for `on_execute` in this tick; between two ticks, in the next one."""

@@ -65,13 +65,14 @@ class Node:
         self.port = wire.end()
         self.port.on_error_state = self._error_state_changed
         self._wire, self._on, self._ticked = wire, True, False
+        self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
         bank = self.application.inputs
         self.physical: Mapping[str, Touch] = {
             "power_off": Switch("power_off", "its supply is cut", self._switch),
             "unplugged": Switch("unplugged", "its CAN plug is pulled", self._plug),
             "emergency": Emergency(slave, self._pending.append),
-            **{name: Quantity(bank, item) for name, item in bank.table.items()},
+            **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
         }
         self.groups = bank.groups
         self.outputs: Mapping[str, Output] = {
@@ -89,7 +90,7 @@ class Node:
         """When the slave is due."""
         if self._pending:
             return 0
-        return self.slave.due_us if self._on else NEVER
+        return self.slave.due_us if self._on else self._coasts_us
 
     @property
     def accepts(self) -> frozenset[int]:
@@ -104,6 +105,8 @@ class Node:
         """Tick the slave, if it has power."""
         if not self._on:
             self._pending.clear()
+            if now_us >= self._coasts_us:
+                self._coasts_us = self.application.without_power(now_us)
             return ()
         if self._ticked:
             self._catch_up(now_us)
@@ -147,7 +150,12 @@ class Node:
         elif not self._on:
             self.slave.reset()
         self._on, self._ticked = not off, self._ticked and not off
+        self._coast()
         self._plug(self.physical["unplugged"].read())
+
+    def _coast(self) -> None:
+        """Let the application go on, if it is without power."""
+        self._coasts_us = 0
 
     def _plug(self, pulled: Setting) -> None:
         if pulled:

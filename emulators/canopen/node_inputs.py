@@ -83,10 +83,11 @@ class Quantity:
     Args:
         bank: the inputs of the node's application.
         item: which of them.
+        touched: called after each change.
     """
 
-    def __init__(self, bank: QuantityBank, item: Input) -> None:
-        self._bank, self.item = bank, item
+    def __init__(self, bank: QuantityBank, item: Input, touched: Callable[[], None]) -> None:
+        self._bank, self.item, self._touched = bank, item, touched
 
     def read(self) -> float:
         """Return the present value."""
@@ -99,6 +100,7 @@ class Quantity:
     def write(self, value: Setting) -> None:
         """Set it; the device's next tick sees it."""
         self._bank.set(self.item.name, value)
+        self._touched()
 
 
 def _register_bit(code: int) -> int:

@@ -30,6 +30,7 @@ from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
 from tickrig.device.canopen.ds402.switches import Switches
 from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer, Telling
 from tickrig.device.canopen.slave import TICK_US, CanopenSlave
+from tickrig.device.core import NEVER
 from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
@@ -225,6 +226,15 @@ class Ds402(Application):
         """Count from 0 on."""
         self.motor.release()
         self.axis.zero, self.axis.homed = float(self.motor.counts), False
+
+    def without_power(self, now_us: int) -> int:
+        """Let the shaft coast."""
+        self.motor.release()
+        self.motor.step_to(now_us)
+        if self.inputs.changed:
+            self.inputs.changed = False
+            self._touched()
+        return NEVER if self.motor.resting else now_us + TICK_US
 
     def start(self) -> None:
         """Switch off."""

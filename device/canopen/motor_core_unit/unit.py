@@ -75,6 +75,13 @@ class MotorCoreUnit(Application):
         """Find a motor that has been without power since the last tick."""
         self.servo.release()
 
+    def without_power(self, now_us: int) -> int:
+        """Let the shaft coast."""
+        self.servo.release()
+        self.servo.step_to(now_us)
+        feel(self.servo, self.inputs)
+        return NEVER if self.servo.resting else now_us + TICK_US
+
     def start(self) -> None:
         """Know of no fault; where the shaft is says the gear encoder."""
         self._supervision.start()
