@@ -21,7 +21,14 @@ def blocks(page: str, language: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "docs/canopen.md", "docs/canopen-io-module.md", "docs/servo.md"]
+    "page",
+    [
+        "README.md",
+        "docs/canopen.md",
+        "docs/rtc-lite.md",
+        "docs/canopen-io-module.md",
+        "docs/servo.md",
+    ],
 )
 def test_the_program_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)

@@ -9,7 +9,9 @@ from click.testing import CliRunner, Result
 from tickrig.emulators.cli import main as tickrig
 from tickrig.emulators.rtc_lite.cli import main as rtc_lite_emu
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "rtc_lite"
+ROOT = Path(__file__).parents[3]
+GOLDEN = ROOT / "tests" / "golden" / "rtc_lite"
+EXAMPLES = ROOT / "examples"
 
 NODE = """
 from tickrig.device.rtc_lite.component import ERROR, Component, Result
@@ -207,3 +209,29 @@ def test_a_damaged_trace_is_one_line(folder: Path, old: str, new: str, error: st
     assert result.exit_code == 2
     assert error in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_the_thermometer_of_the_examples_measures_and_breaks(folder: Path) -> None:
+    scenario = """
+    0     set temperature_dc 215
+    0     send CI
+    10ms  write limit 20.5
+    20ms  send AA
+    60ms  watch state out.celsius out.hot
+    100ms set sensor_broken 1
+    130ms send AR
+    150ms set sensor_broken 0
+    160ms send AR
+    180ms end
+    """
+    node = f"{EXAMPLES / 'rtc_lite_thermometer.py'}:Thermometer"
+    result = emu("--node", node, "--timer", "50", "--scenario", "-", text=scenario)
+    seen = re.findall(r"\* (state \w+|out\S+ \S+)", result.stdout)
+    assert seen[-5:] == [
+        "state Active",
+        "out.celsius 21.5",
+        "out.hot 1",
+        "state Error",
+        "state Inactive",
+    ]
+    assert re.findall(r"< (AR\S+)", result.stdout) == ["ARxE", "AR@I"]

@@ -1,0 +1,37 @@
+"""A component for a small device; `rtc-lite-emu --node rtc_lite_thermometer.py:Thermometer` runs it.
+
+It says the temperature each period, and ends in Error while the sensor is broken.
+"""
+
+from __future__ import annotations
+
+from tickrig.device.physical import Input, Kind
+from tickrig.device.rtc_lite.component import ERROR, Component, Result
+from tickrig.device.rtc_lite.ports import InPort, OutPort
+from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT
+
+
+class Thermometer(Component):
+    """One sensor; an in-port sets the limit above which it is hot."""
+
+    type_name = "Thermometer"
+    physical = (
+        Input("temperature_dc", "at the sensor", low=-400, high=1_250, unit="0.1 degC"),
+        Input("sensor_broken", "the cable of the sensor is cut", Kind.FAULT),
+    )
+    limit = InPort("limit", FLOAT)
+    celsius = OutPort("celsius", FLOAT)
+    hot = OutPort("hot", BOOLEAN)
+
+    def on_execute(self) -> Result:
+        """Measure."""
+        if self.inputs["sensor_broken"]:
+            return ERROR
+        celsius = self.inputs["temperature_dc"] / 10
+        self.celsius.write(celsius)
+        self.hot.write(celsius > self.limit.value)
+        return None
+
+    def on_reset(self) -> Result:
+        """Stay in Error until the sensor is repaired."""
+        return ERROR if self.inputs["sensor_broken"] else None
