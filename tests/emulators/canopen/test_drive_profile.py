@@ -1,4 +1,4 @@
-"""The canopen library's own profile for drives, unchanged, at an EPOS-like drive in virtual time."""
+"""The canopen library's own profile for drives, unchanged, at an EPOS-like drive on a rig."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class Bench:
         self.rig = Rig(Station(self.slave, wire.end()))
         self.network = SimNetwork(self.rig, wire.end())
         kind: Any = BaseNode402
-        self.node: Any = self.network.add_node(kind(RIGHT_WHEEL, _eds()))
+        self.node: Any = kind(RIGHT_WHEEL, _eds())
+        self.network.add_node(self.node)
         self.run_ms(10)
         self.node.tpdo[1].read()
         self.node.tpdo[1].event_timer = 20
