@@ -32,7 +32,7 @@ def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
     writer = CdrWriter(endian)
     try:
         _struct(type(value))[0](writer, value)
-    except (struct.error, OverflowError, TypeError, UnicodeError, AttributeError) as error:
+    except (struct.error, OverflowError, TypeError, ValueError, AttributeError) as error:
         raise FieldError(f"{value!r} is no {type(value).idl_id()}: {error}") from error
     return bytes(writer.data)
 

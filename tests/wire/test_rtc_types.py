@@ -1,0 +1,257 @@
+"""CDR of the RTC data types against omniORB's bytes, round trips and noise."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.wire.errors import FieldError
+from tickrig.wire.rtc_types import actuators, basic, extended_2d, extended_3d, iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.cdr import Endian, decode, encode
+from tickrig.wire.rtc_types.idl import LongLong, Octet, Primitive, Struct, ULongLong
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "cdr.txt"
+TM = Time(1, 2)
+VALUES: list[Struct] = [
+    basic.TimedLong(TM, -3),
+    basic.TimedShort(TM, -3),
+    basic.TimedOctet(TM, 7),
+    basic.TimedBoolean(TM, True),
+    basic.TimedDouble(TM, 1.5),
+    basic.TimedFloat(TM, 1.5),
+    basic.TimedString(TM, "ab"),
+    basic.TimedLongSeq(TM, (1, 2)),
+    basic.TimedDoubleSeq(TM, (1.5,)),
+    basic.TimedDoubleSeq(TM, ()),
+    basic.TimedOctetSeq(TM, b"\1\2"),
+    extended_2d.TimedVelocity2D(TM, extended_2d.Velocity2D(1, 2, 3)),
+    extended_2d.TimedPose2D(TM, extended_2d.Pose2D(extended_2d.Point2D(1, 2), 3)),
+    basic.TimedStringSeq(TM, ("a", "bc")),
+    basic.TimedULong(TM, 5),
+]
+PADDING = {8: range(12, 16), 13: range(18, 20)}
+"""Rows and offsets at which omniORB left what was in its buffer."""
+
+MODULES = ("basic", "extended_2d", "extended_3d", "actuators", "sensors", "navigation", "iis")
+TYPES = [
+    kind
+    for module in MODULES
+    for kind in vars(importlib.import_module(f"tickrig.wire.rtc_types.{module}")).values()
+    if isinstance(kind, type)
+    and issubclass(kind, Struct)
+    and kind.__module__.endswith(f".{module}")
+    and hasattr(kind, "__match_args__")
+]
+
+
+def rows() -> list[tuple[str, Endian, bytes, Struct]]:
+    """Return type, byte order, bytes with clean padding, and value of each vector."""
+    found = []
+    for n, line in enumerate(GOLDEN.read_text("ascii").splitlines()):
+        name, _, little, _, big = line.split()
+        for endian, text in ((Endian.LITTLE, little), (Endian.BIG, big)):
+            found.append((name, endian, bytes.fromhex(text), VALUES[n]))
+    return found
+
+
+ROWS = rows()
+
+
+@pytest.mark.parametrize(("name", "endian", "data", "value"), ROWS)
+def test_bytes_of_omniorb_are_read(name: str, endian: Endian, data: bytes, value: Struct) -> None:
+    assert type(value).idl_id() == name
+    assert decode(type(value), data, endian) == value
+
+
+@pytest.mark.parametrize("row", range(len(ROWS)))
+def test_the_same_bytes_are_written_with_zeros_as_padding(row: int) -> None:
+    _, endian, data, value = ROWS[row]
+    expected = bytearray(data)
+    for offset in PADDING.get(row // 2, ()):
+        expected[offset] = 0
+    assert encode(value, endian) == expected
+
+
+NUMBERS = {
+    Primitive.OCTET: (0, 0xFF),
+    Primitive.SHORT: (-(2**15), 2**15 - 1),
+    Primitive.USHORT: (0, 2**16 - 1),
+    Primitive.LONG: (-(2**31), 2**31 - 1),
+    Primitive.ULONG: (0, 2**32 - 1),
+    Primitive.LONGLONG: (-(2**63), 2**63 - 1),
+    Primitive.ULONGLONG: (0, 2**64 - 1),
+}
+TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=5)
+WIDE = st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"]), max_size=3)
+NO_MARK = WIDE.filter(lambda text: not text.startswith(("\ufeff", "\ufffe")))
+PRIMITIVES: dict[Primitive, st.SearchStrategy[Any]] = {
+    **{kind: st.integers(low, high) for kind, (low, high) in NUMBERS.items()},
+    Primitive.BOOLEAN: st.booleans(),
+    Primitive.CHAR: st.characters(max_codepoint=0xFF),
+    Primitive.WCHAR: NO_MARK.filter(lambda text: len(text) == 1),
+    Primitive.FLOAT: st.floats(width=32, allow_nan=False),
+    Primitive.DOUBLE: st.floats(allow_nan=False),
+    Primitive.STRING: TEXT,
+    Primitive.WSTRING: NO_MARK,
+    Primitive.OCTET_SEQ: st.binary(max_size=5),
+}
+
+
+def values_of(hint: Any) -> st.SearchStrategy[Any]:
+    if get_origin(hint) is Annotated:
+        return PRIMITIVES[get_args(hint)[1]]
+    if get_origin(hint) is tuple:
+        return st.lists(values_of(get_args(hint)[0]), max_size=3).map(tuple)
+    if issubclass(hint, IntEnum):
+        return st.sampled_from(hint)
+    hints = get_type_hints(hint, include_extras=True)
+    return st.builds(hint, **{name: values_of(hints[name]) for name in hint.__match_args__})
+
+
+def test_there_are_types_of_all_idl_files() -> None:
+    assert len(TYPES) == 130
+    assert len({kind.idl_id() for kind in TYPES}) == len(TYPES)
+
+
+@pytest.mark.parametrize("kind", TYPES, ids=lambda kind: str(kind.idl_id()))
+def test_every_type_is_made_without_arguments_and_encoded(kind: type[Struct]) -> None:
+    for endian in Endian:
+        assert decode(kind, encode(kind(), endian), endian) == kind()
+
+
+@dataclass(frozen=True, slots=True)
+class Long64(Struct):
+    idl_module = "Test"
+    mark: Octet = 0
+    signed: LongLong = 0
+    unsigned: ULongLong = 0
+
+
+@given(st.data(), st.sampled_from([*TYPES, Long64]), st.sampled_from(Endian))
+def test_what_is_encoded_is_decoded_again(
+    data: st.DataObject, kind: type[Struct], endian: Endian
+) -> None:
+    value = data.draw(values_of(kind))
+    assert decode(kind, encode(value, endian), endian) == value
+
+
+@given(st.sampled_from(TYPES), st.binary(max_size=200), st.sampled_from(Endian))
+def test_noise_is_a_value_or_a_field_error(
+    kind: type[Struct], noise: bytes, endian: Endian
+) -> None:
+    with contextlib.suppress(FieldError):
+        assert isinstance(decode(kind, noise, endian), kind)
+
+
+@given(st.data(), st.sampled_from(TYPES))
+def test_a_truncated_value_is_a_field_error(data: st.DataObject, kind: type[Struct]) -> None:
+    whole = encode(data.draw(values_of(kind)))
+    with pytest.raises(FieldError):
+        decode(kind, whole[: data.draw(st.integers(0, len(whole) - 1))])
+
+
+def test_a_struct_of_64_bit_numbers_is_aligned_to_eight() -> None:
+    assert encode(Long64(1, -1, 2)).hex() == "0100000000000000" + "ff" * 8 + "0200000000000000"
+    assert Long64.idl_id() == "IDL:Test/Long64:1.0"
+
+
+def test_iis_types_stand_in_their_own_module() -> None:
+    assert iis.TimedPose2D.idl_id() == "IDL:IIS/TimedPose2D:1.0"
+    assert extended_2d.TimedPose2D.idl_id() == "IDL:RTC/TimedPose2D:1.0"
+
+
+def test_the_fields_of_an_iis_path_are_in_the_order_of_its_idl() -> None:
+    path = iis.TimedPath2DSeq(
+        TM, (7,), (extended_2d.Pose2D(),), (extended_2d.Velocity2D(1, 0, 0),), (0.5,)
+    )
+    assert iis.TimedPath2DSeq.__match_args__ == ("tm", "id", "pose", "velocity", "error")
+    assert encode(path).hex() == (
+        "0100000002000000"  # tm
+        "0100000007000000"  # id
+        "0100000000000000"  # one pose, padding
+        + "00" * 24
+        + "0100000000000000"  # one velocity, padding
+        + "000000000000f03f"
+        + "00" * 16
+        + "0100000000000000"  # one error, padding
+        + "000000000000e03f"
+    )
+
+
+WRONG: list[Struct] = [
+    basic.TimedLong(TM, 2**31),
+    basic.TimedULong(TM, -1),
+    basic.TimedShort(Time(-1, 0), 0),
+    basic.TimedOctet(TM, 256),
+    basic.TimedFloat(TM, 1e39),
+    basic.TimedChar(TM, "ab"),
+    basic.TimedChar(TM, "あ"),
+    basic.TimedWChar(TM, "\U0001f600"),
+    basic.TimedString(TM, "a\0b"),
+    basic.TimedString(TM, "\ud800"),
+    replace(basic.TimedLong(), data="1"),  # type: ignore[arg-type]  # from untyped code
+    replace(basic.TimedDoubleSeq(), data=1.0),  # type: ignore[arg-type]  # from untyped code
+    replace(actuators.GripperState(), status=9),  # type: ignore[arg-type]  # from untyped code
+    replace(extended_3d.TimedPose3D(), data=None),  # type: ignore[arg-type]  # from untyped code
+]
+
+
+@pytest.mark.parametrize("value", WRONG, ids=repr)
+def test_a_value_that_does_not_fit_its_type_is_a_field_error(value: Struct) -> None:
+    with pytest.raises(FieldError, match=r"is no IDL:RTC/"):
+        encode(value)
+
+
+UNREADABLE: list[tuple[type[Struct], str, str]] = [
+    (basic.TimedLong, "00000000 00000000 00000000 00", "1 too many"),
+    (basic.TimedLong, "00000000 00000000 0000", "12 are needed"),
+    (basic.TimedString, "00000000 00000000 00000000", "NUL"),
+    (basic.TimedString, "00000000 00000000 01000000 61", "NUL"),
+    (basic.TimedString, "00000000 00000000 03000000 610000", "NUL"),
+    (basic.TimedString, "00000000 00000000 02000000 ff00", "text of"),
+    (basic.TimedStringSeq, "00000000 00000000 ffffffff", "announced"),
+    (basic.TimedWChar, "00000000 00000000 00", "UTF-16"),
+    (basic.TimedWChar, "00000000 00000000 04 d83dde00", "UTF-16"),
+    (basic.TimedWString, "00000000 00000000 01000000 61", "text of"),
+    (actuators.GripperState, "00000000 00000000 09000000", "GripperStatus"),
+]
+
+
+@pytest.mark.parametrize(("kind", "text", "said"), UNREADABLE)
+def test_bytes_that_are_no_value_say_why(kind: type[Struct], text: str, said: str) -> None:
+    with pytest.raises(FieldError, match=said):
+        decode(kind, bytes.fromhex(text))
+
+
+@pytest.mark.parametrize("text", ["0061", "feff0061", "fffe6100"])
+def test_a_wide_string_is_big_endian_unless_it_says_otherwise(text: str) -> None:
+    data = bytes.fromhex(text)
+    count = len(data).to_bytes(4, "little")
+    assert decode(basic.TimedWString, bytes(8) + count + data).data == "a"
+
+
+def test_a_field_that_is_no_idl_type_is_told() -> None:
+    @dataclass(frozen=True, slots=True)
+    class Wrong(Struct):
+        data: int = 0
+
+    with pytest.raises(TypeError, match="no IDL type"):
+        decode(Wrong, b"")
+
+
+@pytest.mark.parametrize("now_us", [0, 999_999, 1_000_000, 86_400_000_001])
+def test_a_time_stamp_keeps_microseconds(now_us: int) -> None:
+    assert Time.from_us(now_us).us == now_us
+
+
+def test_a_time_stamp_is_seconds_and_nanoseconds() -> None:
+    assert Time.from_us(1_500_000) == Time(1, 500_000_000)
