@@ -292,16 +292,20 @@ class Ds402(Application):
 
     def _look(self) -> None:
         """Follow configuration, physical inputs and the shaft."""
-        if self._stale:
-            self._stale = False
-            self.settings = read_settings(self.parameters, self.motor.counts_per_turn)
-            self.axis.configure(self.settings)
+        self._configure()
         if self.inputs.changed:
             self.inputs.changed = False
             self._touched()
         if self.switches.by_angle:
             self.switches.look(self.motor.shaft_deg)
         self.axis.wrap()
+
+    def _configure(self) -> None:
+        if self._stale:
+            self._stale = False
+            self.motor.step_to(self.node.now_us)
+            self.settings = read_settings(self.parameters, self.motor.counts_per_turn)
+            self.axis.configure(self.settings)
 
     def _touched(self) -> None:
         inputs = self.inputs
@@ -323,7 +327,8 @@ class Ds402(Application):
             self.schedule(now_us + COOLING_US)
 
     def _controlled(self) -> None:
-        """Obey a new controlword."""
+        """Obey a new controlword, with what was configured before it."""
+        self._configure()
         before, self.controlword = self.controlword, self.parameters.number(indices.CONTROLWORD)
         rising, falling = self.controlword & ~before, before & ~self.controlword
         command = command_of(self.controlword)
