@@ -1,6 +1,7 @@
-"""A component for a small device; `rtc-lite-emu --node rtc_lite_thermometer.py:Thermometer` runs it.
+"""A component for a small device, with a sensor and a switch of its own.
 
-It says the temperature each period, and ends in Error while the sensor is broken.
+`rtc-lite-emu --node examples/rtc_lite_thermometer.py:Thermometer` runs it. It says the
+temperature each period, and ends in Error while the sensor is broken.
 """
 
 from __future__ import annotations

@@ -29,12 +29,15 @@ def new_inputs(component: Component) -> InputBank:
     """Return the inputs of a node at rest.
 
     Raises:
-        ValueError: the component has an input of a name that the node has itself.
+        ValueError: two inputs have the same name, or one takes fractions.
     """
     names = {item.name for item in INPUTS}
+    kind = type(component).__name__
     for item in component.physical:
         if item.name in names:
-            raise ValueError(f"{type(component).__name__}: two inputs are called {item.name!r}")
+            raise ValueError(f"{kind}: two inputs are called {item.name!r}")
+        if item.real:
+            raise ValueError(f"{kind}: input {item.name!r} takes fractions; give it a finer unit")
         names.add(item.name)
     return InputBank((*INPUTS, *component.physical))
 

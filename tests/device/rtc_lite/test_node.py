@@ -348,6 +348,10 @@ def component(**attributes: Any) -> type[Component]:
             "Mine: two inputs are called 'power_cut'",
         ),
         (
+            {"physical": (Input("volt", "", real=True),)},
+            "Mine: input 'volt' takes fractions; give it a finer unit",
+        ),
+        (
             {"physical": (Input("light", ""), Input("light", ""))},
             "Mine: two inputs are called 'light'",
         ),
