@@ -145,6 +145,7 @@ def test_a_callback_that_raises_is_one_line(folder: Path) -> None:
         (["--framing", "rtno", "--checksum", "xor8"], "checksum is xor8, packets of RTno have"),
         (["--fault", "ping"], "ping wants a rate above 0 and up to 1, as ping=0.01; got no rate"),
         (["--fault", "x"], "no fault 'x'; known: flip, drop, dup, cut, noise, ping, power_cut"),
+        (["--node", "mine.py:Divider", "--fault", "x"], "no fault 'x'; known: flip, drop"),
         (["--scenario", "bad.txt"], "bad.txt:1: no action 'jump'; known: send, write, raw"),
         (["--link", "no/tty"], "link no/tty: No such file or directory"),
     ],
