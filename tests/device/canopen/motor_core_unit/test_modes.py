@@ -246,6 +246,21 @@ def test_a_shaft_coasts_while_the_power_is_cut(bench: UnitBench) -> None:
     assert bench.see("velocity_deg_s") == 0
 
 
+def test_a_shaft_without_power_is_moved_by_the_world_alone(bench: UnitBench) -> None:
+    bench.begin(VELOCITY, 8_192)
+    bench.pass_ms(500)
+    at_us = bench.now_us
+    while (due_us := bench.unit.without_power(at_us)) != NEVER:
+        assert due_us == at_us + 1_000
+        at_us = due_us
+    assert bench.see("velocity_deg_s") == 0
+    rested_deg = bench.see("angle_deg")
+    bench.set("shaft_load_nm", -5)
+    assert bench.unit.without_power(at_us + 1_000) == at_us + 2_000
+    bench.unit.without_power(at_us + 100_000)
+    assert bench.see("angle_deg") < rested_deg
+
+
 def test_a_unit_at_rest_waits_for_nothing_but_its_temperature(bench: UnitBench) -> None:
     bench.begin(ANGLE, 8192)
     bench.pass_ms(2_000)
