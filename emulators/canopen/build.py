@@ -69,10 +69,7 @@ def make_nodes(
         description = item.description
         dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
-        try:
-            slave = make_slave(dictionary, item.node_id, memory, description.application)
-        except ValueError as error:
-            raise Refused(f"{description.file}: {error}") from None
+        slave = make_slave(dictionary, item.node_id, memory, description.application)
         nodes.append(Node(item.name, slave, wire))
     return nodes
 

@@ -42,7 +42,8 @@ def default_of(entry: Entry) -> object:
 def test_the_shipped_eds_is_what_the_model_writes(model: Model) -> None:
     description = model.describe()
     text = (SHIPPED / f"{model.name}.eds").read_text("utf-8")
-    assert text == write_eds(description.template, description.info)
+    again = f"canopen-slave-emu --model {model.name} --write-eds examples/eds/{model.name}.eds"
+    assert text == write_eds(description.template, description.info), f"write it again: {again}"
 
 
 def test_each_shipped_eds_has_its_model() -> None:
