@@ -112,8 +112,7 @@ class RtComponent(ComponentAction):
         """
         if self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
-        self.configuration.update()
-        code = guarded(self.instance_name, self.on_initialize)
+        code = guarded(self.instance_name, self._begin)
         if code is ReturnCode.RTC_OK:
             self.alive = True
             for context in self.own_contexts:
@@ -151,3 +150,7 @@ class RtComponent(ComponentAction):
             context.release_component(self)
         self.own_contexts.clear()
         return self.finalize()
+
+    def _begin(self) -> ReturnCode:
+        self.configuration.update()
+        return self.on_initialize()

@@ -25,7 +25,7 @@ from typing import Final
 
 Check = Callable[[object], bool]
 
-_NUMBER: Final = r"([-+]?[\d.]+(?:e[-+]?\d+)?)"
+_NUMBER: Final = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)"
 _SIGN: Final = r"(<=|>=|<|>|==?)"
 _RANGE: Final = re.compile(rf"(?:{_NUMBER}{_SIGN})?x(?:{_SIGN}{_NUMBER})?", re.IGNORECASE)
 _WORDS: Final = re.compile(r"\(([^()]*)\)")
