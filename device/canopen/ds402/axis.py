@@ -36,8 +36,7 @@ class Axis:
     @property
     def stands(self) -> bool:
         """Whether the motor stands, as far as its encoder tells."""
-        motor = self.motor
-        return abs(motor.velocity_counts_s) <= STANDSTILL_TURNS_S * motor.counts_per_turn
+        return not self.is_fast(self.motor.velocity_counts_s)
 
     @property
     def forward(self) -> int:
@@ -49,6 +48,10 @@ class Axis:
         """Software limits in counts, the lower one first; infinite if there are none."""
         low, high = self.settings.software_limits
         return low + self.zero, high + self.zero
+
+    def is_fast(self, velocity: float) -> bool:
+        """Say whether a velocity in counts per second is more than standstill."""
+        return abs(velocity) > STANDSTILL_TURNS_S * self.motor.counts_per_turn
 
     def position_of(self, counts: float) -> int:
         """Return the position of the user at these counts."""

@@ -18,10 +18,6 @@ class Parameters:
     def __init__(self, dictionary: Dictionary) -> None:
         self._dictionary = dictionary
 
-    def has(self, index: int, sub: int = 0) -> bool:
-        """Say whether the device has an object."""
-        return (index, sub) in self._dictionary
-
     def number(self, index: int, sub: int = 0) -> int:
         """Return a value; the default of `DEFAULTS` if the device has no such object."""
         entry = self._dictionary.find(index, sub)

@@ -95,9 +95,10 @@ class Supervision:
         return now_us - self._error_us >= drive.settings.following_error_us
 
     def _stalls(self, now_us: int) -> bool:
+        """Say whether the motor has stood for too long although it shall turn."""
         drive = self._drive
-        pushes = drive.motor.current_limited and drive.control is not Control.CURRENT
-        if not (pushes and drive.axis.stands):
+        shall_turn = drive.motor.current_limited or drive.axis.is_fast(drive.reference.velocity)
+        if drive.control is Control.CURRENT or not (shall_turn and drive.axis.stands):
             self._stall_us = now_us
             return False
         self.waiting = True

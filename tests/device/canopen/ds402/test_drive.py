@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.bus import Bus
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
-from tests.device.canopen.reference import RW, U32
+from tests.device.canopen.reference import I16, RW, U32
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402
@@ -294,3 +294,52 @@ def test_without_objects_the_drive_stays_off() -> None:
     bus = Bus(make_slave(make_dictionary([]), 5, application=Ds402))
     assert bus.step() == ["705#00"]
     assert Ds402.of(bus.slave).state is SOD
+
+
+def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
+    bench = Bench(Entry(0x6077, 0, "Torque actual value", I16, RW))
+    bench.write(0x60FF, 2**31 - 1)
+    bench.enable(9)
+    bench.write(0x6060, 10)
+    bench.drive.reference.current_a = 1e6
+    bench.drive.motor.drive_current(1e6)
+    bench.drive.telling.tell()
+    assert bench.read(0x6077) == 2**15 - 1
+
+
+def test_the_supported_modes_are_shown() -> None:
+    bench = Bench(Entry(0x6502, 0, "Supported drive modes", U32, RW))
+    assert bench.read(0x6502) == 0x3ED
+
+
+def test_a_limit_switch_stops_a_plain_drive_without_a_fault(bench: Bench) -> None:
+    bench.write(0x60FF, 1_000)
+    bench.enable(3)
+    bench.run(200)
+    bench.drive.inputs.set("positive_limit_switch", 1)
+    bench.run(20)
+    assert (bench.drive.state, bench.read(0x606C)) == (ENABLED, 0)
+    assert bench.read(0x6041) & 0x0800
+    bench.write(0x60FF, -1_000)
+    bench.run(200)
+    assert bench.read(0x606C) == -1_000
+
+
+def test_the_connection_may_be_lost_without_an_error(bench: Bench) -> None:
+    bench.drive.emergency(0x8130, 0x11, b"")
+    bench.drive.emergency_clear(0x8130, None)
+    bench.enable(3)
+    bench.slave.communication_error()
+    bench.settle()
+    bench.control(0x80)
+    assert bench.drive.state is SOD
+
+
+def test_without_power_a_drive_lets_go_and_sees_its_inputs(bench: Bench) -> None:
+    bench.write(0x60FF, 1_000)
+    bench.enable(3)
+    bench.run(200)
+    bench.drive.inputs.set("home_switch", 1)
+    assert bench.drive.without_power(bench.now_us + 1_000) == NEVER
+    assert bench.drive.without_power(bench.now_us + 2_000) == NEVER
+    assert bench.drive.switches.home
