@@ -86,7 +86,8 @@ def test_a_refusal_carries_its_abort_code(master: Any) -> None:
 def test_an_input_that_changes_sends_its_tpdo(master: Any, slave: Slave) -> None:
     master.tpdo.read()
     operate(master)
-    slave.set("0x6000:1", 0x5A)
+    for line in (2, 4, 5, 7):
+        slave.set(f"di{line}", 1)
     deadline = time.monotonic() + PATIENCE_S
     while master.tpdo[1][0].raw != 0x5A:
         assert time.monotonic() < deadline
