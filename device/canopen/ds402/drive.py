@@ -370,6 +370,8 @@ class Ds402(Application):
 
     def _sync(self, counter: int) -> None:
         self.fresh = True
+        if self.enabled:
+            self.request()
 
     def _refresh(self) -> None:
         self.fresh = True
