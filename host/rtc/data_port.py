@@ -78,7 +78,10 @@ class InPort(DataPort[T]):
     @property
     def is_new(self) -> bool:
         """Whether there is a value that was not read."""
-        return any(connector.buffer.readable for connector in self.connectors)
+        for connector in self.connectors:  # noqa: SIM110 - any() takes twice as long
+            if connector.buffer.readable:
+                return True
+        return False
 
     def read(self) -> T | None:
         """Read a value.

@@ -10,12 +10,12 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Annotated, Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types.cdr_stream import CdrReader, CdrWriter, Endian
+from tickrig.wire.rtc_types.cdr_stream import ULONG, CdrReader, CdrWriter, Endian, Number
 from tickrig.wire.rtc_types.idl import Primitive, Struct
 
 __all__ = ["Endian", "decode", "encode"]
@@ -49,6 +49,20 @@ def decode(kind: type[S], data: bytes, endian: Endian = Endian.LITTLE) -> S:
     return value
 
 
+_CHAR: Final = Number("c")
+_OCTET: Final = Number("B")
+_NUMBERS: Final[Mapping[Primitive | None, Number]] = {
+    Primitive.BOOLEAN: Number("?"),
+    Primitive.OCTET: _OCTET,
+    Primitive.SHORT: Number("h"),
+    Primitive.USHORT: Number("H"),
+    Primitive.LONG: Number("i"),
+    Primitive.ULONG: ULONG,
+    Primitive.LONGLONG: Number("q"),
+    Primitive.ULONGLONG: Number("Q"),
+    Primitive.FLOAT: Number("f"),
+    Primitive.DOUBLE: Number("d"),
+}
 _CODECS: Final[dict[type[Struct], _Codec]] = {}
 """Made when a type is first met."""
 
@@ -88,12 +102,15 @@ def _codec(hint: object) -> _Codec:
 
 def _sequence(hint: object) -> _Codec:
     primitive = get_args(hint)[1] if get_origin(hint) is Annotated else None
-    if primitive in _NUMBERS:
-        return _numbers(*_NUMBERS[primitive])
+    if (number := _NUMBERS.get(primitive)) is not None:
+        return (
+            lambda writer, values: writer.write_all(number, values),
+            lambda reader: reader.read_all(number),
+        )
     write_one, read_one = _codec(hint)
 
     def write(writer: CdrWriter, values: tuple[object, ...]) -> None:
-        writer.write("I", 4, len(values))
+        writer.write(ULONG, len(values))
         for value in values:
             write_one(writer, value)
 
@@ -103,34 +120,27 @@ def _sequence(hint: object) -> _Codec:
     return write, read
 
 
-def _numbers(layout: str, size: int) -> _Codec:
-    def write(writer: CdrWriter, values: tuple[object, ...]) -> None:
-        writer.write("I", 4, len(values))
-        writer.write(layout, size, *values)
-
-    return write, lambda reader: reader.read(layout, size, reader.read_count())
-
-
-def _number(layout: str, size: int) -> _Codec:
+def _number(number: Number) -> _Codec:
     return (
-        lambda writer, value: writer.write(layout, size, value),
-        lambda reader: reader.read(layout, size, 1)[0],
+        lambda writer, value: writer.write(number, value),
+        lambda reader: reader.read(number),
     )
 
 
 def _enum(kind: type[IntEnum]) -> _Codec:
     def read(reader: CdrReader) -> IntEnum:
-        value = reader.read("I", 4, 1)[0]
         try:
-            return kind(value)
+            return kind(reader.read(ULONG))
+        except FieldError:
+            raise
         except ValueError as error:
             raise FieldError(str(error)) from error
 
-    return lambda writer, value: writer.write("I", 4, kind(value)), read
+    return lambda writer, value: writer.write(ULONG, kind(value)), read
 
 
 def _write_char(writer: CdrWriter, value: str) -> None:
-    writer.write("c", 1, value.encode("latin-1"))
+    writer.write(_CHAR, value.encode("latin-1"))
 
 
 def _read_char(reader: CdrReader) -> str:
@@ -154,12 +164,12 @@ def _write_wchar(writer: CdrWriter, value: str) -> None:
     data = value.encode("utf-16-be")
     if len(data) != 2:
         raise TypeError(f"{value!r} is not one character of UTF-16")
-    writer.write("B", 1, len(data))
+    writer.write(_OCTET, len(data))
     writer.data += data
 
 
 def _read_wchar(reader: CdrReader) -> str:
-    text = _utf16(reader.take(reader.read("B", 1, 1)[0]))
+    text = _utf16(reader.take(reader.read(_OCTET)))
     if len(text) != 1 or ord(text) > 0xFFFF:
         raise FieldError(f"{text!r} is not one character of UTF-16")
     return text
@@ -174,20 +184,8 @@ def _utf16(data: bytes) -> str:
     return data.decode("utf-16" if data[:2] in (b"\xfe\xff", b"\xff\xfe") else "utf-16-be")
 
 
-_NUMBERS: Final = {
-    Primitive.BOOLEAN: ("?", 1),
-    Primitive.OCTET: ("B", 1),
-    Primitive.SHORT: ("h", 2),
-    Primitive.USHORT: ("H", 2),
-    Primitive.LONG: ("i", 4),
-    Primitive.ULONG: ("I", 4),
-    Primitive.LONGLONG: ("q", 8),
-    Primitive.ULONGLONG: ("Q", 8),
-    Primitive.FLOAT: ("f", 4),
-    Primitive.DOUBLE: ("d", 8),
-}
 _PRIMITIVES: Final[dict[Primitive, _Codec]] = {
-    **{primitive: _number(*layout) for primitive, layout in _NUMBERS.items()},
+    **{primitive: _number(number) for primitive, number in _NUMBERS.items() if primitive},
     Primitive.CHAR: (_write_char, _read_char),
     Primitive.WCHAR: (_write_wchar, _read_wchar),
     Primitive.STRING: (_write_string, _read_string),

@@ -7,6 +7,7 @@ bytes before it are padding: written as 0, not looked at.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, Final
 
@@ -21,60 +22,84 @@ class Endian(StrEnum):
 
 
 _MARKS: Final = {Endian.LITTLE: "<", Endian.BIG: ">"}
+_ZEROS: Final = tuple(bytes(count) for count in range(8))
+
+
+class Number:
+    """A kind of number: its letter in the struct module, its size, its layout by byte order."""
+
+    __slots__ = ("layouts", "letter", "size")
+
+    def __init__(self, letter: str) -> None:
+        self.letter, self.size = letter, struct.calcsize(f"<{letter}")
+        self.layouts = {endian: struct.Struct(mark + letter) for endian, mark in _MARKS.items()}
+
+
+ULONG: Final = Number("I")
+"""What counts are written as."""
 
 
 class CdrWriter:
-    """Appends values to a stream.
+    """Appends values to a stream; struct.error where one does not fit.
 
     Attributes:
         data: what was written.
     """
 
-    __slots__ = ("_mark", "data")
+    __slots__ = ("_endian", "data")
 
     def __init__(self, endian: Endian) -> None:
-        self._mark, self.data = _MARKS[endian], bytearray()
+        self._endian, self.data = endian, bytearray()
 
-    def write(self, layout: str, size: int, *values: object) -> None:
-        """Write numbers of one kind; struct.error if one does not fit.
-
-        Args:
-            layout: their letter in the struct module.
-            size: size of one.
-            values: the numbers.
-        """
+    def write(self, number: Number, value: object) -> None:
+        """Write one number."""
         data = self.data
-        data += bytes(-len(data) % size) if values else b""
-        data += struct.pack(f"{self._mark}{len(values)}{layout}", *values)
+        data += _ZEROS[-len(data) % number.size]
+        data += number.layouts[self._endian].pack(value)
+
+    def write_all(self, number: Number, values: Sequence[object]) -> None:
+        """Write a sequence of numbers, behind their count."""
+        self.write(ULONG, len(values))
+        if values:
+            self.data += _ZEROS[-len(self.data) % number.size]
+            layout = f"{_MARKS[self._endian]}{len(values)}{number.letter}"
+            self.data += struct.pack(layout, *values)
 
     def write_bytes(self, data: bytes) -> None:
-        """Write bytes behind their number."""
-        self.write("I", 4, len(data))
+        """Write bytes behind their count."""
+        self.write(ULONG, len(data))
         self.data += data
 
 
 class CdrReader:
     """Takes values from a stream; FieldError where it ends too early."""
 
-    __slots__ = ("_at", "_data", "_mark")
+    __slots__ = ("_at", "_data", "_endian")
 
     def __init__(self, data: bytes, endian: Endian) -> None:
-        self._data, self._at, self._mark = data, 0, _MARKS[endian]
+        self._data, self._at, self._endian = data, 0, endian
 
     @property
     def left(self) -> int:
         """Number of bytes that were not read."""
         return len(self._data) - self._at
 
-    def read(self, layout: str, size: int, count: int) -> tuple[Any, ...]:
-        """Read `count` numbers of one kind; see `CdrWriter.write`."""
-        if count:
-            self._at += -self._at % size
-        return struct.unpack(f"{self._mark}{count}{layout}", self.take(count * size))
+    def read(self, number: Number) -> Any:
+        """Read one number."""
+        self._at += -self._at % number.size
+        return number.layouts[self._endian].unpack(self.take(number.size))[0]
+
+    def read_all(self, number: Number) -> tuple[Any, ...]:
+        """Read a sequence of numbers."""
+        if not (count := self.read_count()):
+            return ()
+        self._at += -self._at % number.size
+        data = self.take(count * number.size)
+        return struct.unpack(f"{_MARKS[self._endian]}{count}{number.letter}", data)
 
     def read_count(self) -> int:
         """Read the number of elements of a sequence, none of which is empty."""
-        count: int = self.read("I", 4, 1)[0]
+        count: int = self.read(ULONG)
         if count > self.left:
             raise FieldError(f"{count} elements announced, {self.left} bytes left")
         return count

@@ -223,6 +223,12 @@ def test_a_system_is_restored_from_its_rts_profile_but_inactive() -> None:
     )
 
 
+def test_what_the_library_of_rtshell_made_of_our_file_is_the_same_system() -> None:
+    theirs = GOLDEN.with_name("rtc_chain_rtsprofile.xml")
+    ours = parse_rts_profile(GOLDEN.read_text("utf-8"))
+    assert parse_rts_profile(theirs.read_text("utf-8")) == ours
+
+
 SAMPLE = """<?xml version="1.0" encoding="UTF-8"?>
 <r:RtsProfile xmlns:r="http://www.openrtp.org/namespaces/rts"
  xmlns:e="http://www.openrtp.org/namespaces/rts_ext">
