@@ -45,10 +45,10 @@ class Homing(Mode):
     in the end 6064h is 607Ch. An index pulse comes whenever the encoder has
     turned by its counts; it is found to the count, an edge to what the axis moves
     in a tick. Halt and the falling edge of bit 4 end a homing in progress; a
-    rising edge begins anew.
+    rising edge begins anew. What a homing found holds until the next one begins.
 
     Bits 13, 12, 10: 000 in progress, 001 not begun or interrupted, 010 home is
-    attained, 011 and the axis is there, 100 an error, 101 and the axis stands.
+    attained, 011 and the axis stands, 100 an error, 101 and the axis stands.
 
     Not emulated: methods 15, 16, 31, 32, 36 and those of manufacturers; a time-out.
     """
@@ -57,7 +57,8 @@ class Homing(Mode):
 
     def __init__(self, drive: Ds402) -> None:
         super().__init__(drive)
-        self._course, self._stage = Course(self.reference), Stage.IDLE
+        self._course = Course(self.reference)
+        self._stage = Stage.ATTAINED if drive.axis.homed else Stage.IDLE
         self._method, self._search = NO_METHOD, HomingSearch(NO_METHOD, Switch(0))
         self._counts, self._velocity = drive.motor.counts, 0.0
         self._home: float | None = None
@@ -66,6 +67,7 @@ class Homing(Mode):
         """Begin a homing."""
         method = METHODS.get(self.drive.parameters.number(indices.HOMING_METHOD))
         self._counts, self._home = self.drive.motor.counts, None
+        self.drive.axis.homed = False
         self._end(Stage.FAILED if method is None else Stage.SEARCHING)
         self._method = method or NO_METHOD
         self._search = HomingSearch(self._method, self._switches)

@@ -116,6 +116,26 @@ def test_the_library_homes(bench: Bench) -> None:
     assert bench.node.is_homed()
 
 
+def test_the_library_homes_by_a_switch_and_an_index_pulse(bench: Bench) -> None:
+    bench.emulated.inputs.set("home_from", 10.0)
+    bench.emulated.inputs.set("home_to", 11.0)
+    bench.node.sdo[0x6098].raw = 7
+    bench.node.sdo[0x6099][1].raw = 600
+    assert bench.node.homing()
+    bench.run_ms(500)
+    assert abs(bench.node.tpdo_values[0x6064]) <= 4
+    assert bench.emulated.read("shaft_deg") == pytest.approx(360 / 51, abs=0.02)
+    bench.node.op_mode = "PROFILED POSITION"
+    assert bench.node.is_homed(restore_op_mode=True)
+
+
+def test_the_library_does_not_home_against_a_limit_switch(bench: Bench) -> None:
+    bench.node.sdo[0x6098].raw = 19
+    bench.emulated.inputs.set("positive_limit_at", 3.0)
+    assert not bench.node.homing()
+    assert not bench.node.is_homed()
+
+
 def test_the_library_resets_a_fault(bench: Bench) -> None:
     bench.node.op_mode = "PROFILED VELOCITY"
     bench.node.state = "OPERATION ENABLED"

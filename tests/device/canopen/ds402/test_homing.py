@@ -188,6 +188,19 @@ def test_the_home_position_stays_when_bit_4_falls_and_in_other_modes() -> None:
     assert wheel.read(0x6063) == pytest.approx(-TURN - OFFSET, abs=AT_HOME)
 
 
+def test_what_a_homing_found_holds_until_the_next_one_begins() -> None:
+    wheel = make_wheel(33)
+    home(wheel)
+    wheel.write(0x6060, 1)
+    wheel.control(READY)
+    wheel.write(0x6060, 6)
+    wheel.run(2)
+    assert wheel.bits == BIT_12 | REACHED
+    wheel.write(0x6098, 1)
+    assert wheel.control(START) & (BIT_12 | REACHED) == 0
+    assert not wheel.drive.axis.homed
+
+
 @pytest.mark.parametrize("controlword", [READY, HALT])
 def test_a_homing_is_interrupted_by_bit_4_and_by_halt(controlword: int) -> None:
     wheel = make_wheel(17)

@@ -76,6 +76,15 @@ def test_to_enable_it_moves_nothing(wheel: Wheel) -> None:
     assert (wheel.read(0x60C1, 1), wheel.read(0x6062)) == (5_000, 5_000)
 
 
+def test_a_sync_wakes_only_an_enabled_drive() -> None:
+    wheel = Wheel()
+    wheel.run(100)
+    due_us = wheel.slave.due_us
+    assert due_us > wheel.now_us + 1_000
+    assert wheel.step("080#") == []
+    assert wheel.slave.due_us == due_us
+
+
 def test_without_a_sync_the_line_ends_at_its_record(wheel: Wheel) -> None:
     wheel.control(ENABLE)
     cycle(wheel, 1_000)

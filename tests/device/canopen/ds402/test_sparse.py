@@ -21,6 +21,10 @@ def _writes(*pairs: tuple[int, int]) -> Callable[[Wheel], None]:
     return act
 
 
+def _sync(wheel: Wheel) -> None:
+    wheel.step("080#")
+
+
 ACTIONS: dict[str, Callable[[Wheel], None]] = {
     "shutdown": _writes((0x6040, 0x06)),
     "switch on": _writes((0x6040, 0x07)),
@@ -36,6 +40,15 @@ ACTIONS: dict[str, Callable[[Wheel], None]] = {
     "cyclic velocity": _writes((0x6060, 9), (0x60FF, -200)),
     "torque": _writes((0x6060, 4), (0x6071, 200)),
     "maxon current": _writes((0x6060, -3), (0x2030, 300)),
+    "search": _writes((0x6060, 6), (0x6098, 33), (0x6040, 0x1F)),
+    "search in vain": _writes((0x6060, 6), (0x6098, 19), (0x6040, 0x1F)),
+    "switch": lambda wheel: wheel.set(home_switch=1),
+    "limit": lambda wheel: wheel.set(negative_limit_switch=1),
+    "interpolation": lambda wheel: wheel.write(0x6060, 7),
+    "record": lambda wheel: wheel.write(0x60C1, 300, 1),
+    "sync": _sync,
+    "next set-point": _writes((0x607A, -1_000), (0x6040, 0x0F), (0x6040, 0x1F)),
+    "passed set-point": _writes((0x607A, 9_000), (0x6040, 0x20F), (0x6040, 0x21F)),
     "block": lambda wheel: wheel.set(shaft_blocked=1),
     "let go": lambda wheel: wheel.set(shaft_blocked=0),
     "push": lambda wheel: wheel.set(load_nm=2.5),
@@ -64,6 +77,15 @@ def play(steps: list[tuple[str, int]], *, sparse: bool) -> list[tuple[int, str]]
 def test_a_whole_life_is_the_same_without_idle_ticks(mode: str) -> None:
     steps = [(mode, 5), ("shutdown", 5), ("switch on", 5), ("enable", 5), ("start", 700)]
     steps += [("halt", 700), ("dip", 300), ("supply", 50), ("fault reset", 400), ("push", 500)]
+    assert play(steps, sparse=True) == play(steps, sparse=False)
+
+
+@pytest.mark.parametrize("pause_ms", [3, 400])
+def test_set_points_homing_and_records_are_the_same_without_idle_ticks(pause_ms: int) -> None:
+    names = ["position", "start", "next set-point", "passed set-point", "halt", "enable"]
+    names += ["search", "enable", "search in vain", "switch", "enable", "limit", "search"]
+    names += ["interpolation", "enable", "record", "start", "sync", "enable", "sync"]
+    steps = [("shutdown", 2), ("enable", 2), *((name, pause_ms) for name in names)]
     assert play(steps, sparse=True) == play(steps, sparse=False)
 
 
