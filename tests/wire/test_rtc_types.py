@@ -159,6 +159,13 @@ def test_a_truncated_value_is_a_field_error(data: st.DataObject, kind: type[Stru
         decode(kind, whole[: data.draw(st.integers(0, len(whole) - 1))])
 
 
+def test_a_number_that_an_enumeration_does_not_have_is_a_field_error() -> None:
+    whole = bytearray(encode(actuators.GripperState()))
+    whole[8:12] = b"\xff\xff\xff\xff"  # behind the time
+    with pytest.raises(FieldError):
+        decode(actuators.GripperState, bytes(whole))
+
+
 def test_a_struct_of_64_bit_numbers_is_aligned_to_eight() -> None:
     assert encode(Long64(1, -1, 2)).hex() == "0100000000000000" + "ff" * 8 + "0200000000000000"
     assert Long64.idl_id() == "IDL:Test/Long64:1.0"

@@ -129,10 +129,9 @@ def _number(number: Number) -> _Codec:
 
 def _enum(kind: type[IntEnum]) -> _Codec:
     def read(reader: CdrReader) -> IntEnum:
+        number = reader.read(ULONG)
         try:
-            return kind(reader.read(ULONG))
-        except FieldError:
-            raise
+            return kind(number)
         except ValueError as error:
             raise FieldError(str(error)) from error
 
