@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import os
+import select
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,13 +31,29 @@ def opened(link: Path | None = None, buffer_bytes: int = 4_096) -> Iterator[tupl
         port.close()
 
 
+def arrived(port: PtyPort, size: int) -> bytes:
+    """Poll until `size` bytes came: the kernel passes them on when it gets to it."""
+    received, deadline = b"", time.monotonic() + 5.0
+    while len(received) < size and time.monotonic() < deadline:
+        received += port.poll(0)
+    return received
+
+
+def at_host(host: int, size: int) -> bytes:
+    """Read `size` bytes on the host's side."""
+    received = b""
+    while len(received) < size and select.select([host], [], [], 5.0)[0]:
+        received += os.read(host, size - len(received))
+    return received
+
+
 def test_bytes_pass_as_they_are_both_ways() -> None:
     every = bytes(range(256))
     with opened() as (port, host):
         port.send(0, every)
-        assert os.read(host, 1_000) == every
+        assert at_host(host, 256) == every
         os.write(host, every)
-        assert port.poll(0) == every
+        assert arrived(port, 256) == every
         assert port.poll(0) == b""
         assert port.due_us == NEVER
 
@@ -61,7 +79,7 @@ def test_a_host_may_go_and_another_come() -> None:
         os.write(host, b"a")
         os.write(again, b"b")
         os.close(again)
-        assert port.poll(0) == b"ab"
+        assert arrived(port, 2) == b"ab"
 
 
 def test_the_link_is_there_while_the_port_is(tmp_path: Path) -> None:
