@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from tickrig.emulators.candump import LogLine
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.candump import LogLine
 
 _logger = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from tickrig.device.core import NEVER
-from tickrig.emulators.candump import LogLine
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.candump import LogLine
 
 
 class CandumpPort:

@@ -11,8 +11,8 @@ from tickrig.emulators.emulated import look_at
 from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.names import known
 from tickrig.emulators.operator import PRESS_US
-from tickrig.emulators.setting import Setting
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.setting import Setting
 
 VERSION: Final = 1
 

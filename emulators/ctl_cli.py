@@ -11,9 +11,9 @@ import click
 
 from tickrig.emulators.control import Object
 from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.duration import format_time, parse_time_us
-from tickrig.emulators.refused import Refused
-from tickrig.emulators.setting import parse_setting
+from tickrig.host.cli.duration import format_time, parse_time_us
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.setting import parse_setting
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 

@@ -9,14 +9,14 @@ from typing import Any
 import canopen
 import click
 
-from tickrig.emulators.can_options import BusCommand, BusOptions, bus_options
 from tickrig.emulators.fig120 import demo as fig120_demo
 from tickrig.emulators.fig120.plot import FORMATS, write_plot
 from tickrig.emulators.fig120.samples import Sample
 from tickrig.emulators.fig120.stage import VirtualStage, bus_stage
-from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.rrc.demo import run_demo
-from tickrig.emulators.run_options import PATH
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.errors import DeviceRefused, LinkError
 
 PLOTTER = "matplotlib"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.device.core import NEVER
-from tickrig.emulators.duration import parse_time_us
+from tickrig.host.cli.duration import parse_time_us
 
 _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
 

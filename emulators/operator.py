@@ -11,7 +11,7 @@ from tickrig.emulators.agenda import Agenda
 from tickrig.emulators.emulated import Inputs
 from tickrig.emulators.fault_spec import FaultSpec
 from tickrig.emulators.names import known
-from tickrig.emulators.setting import Setting
+from tickrig.host.cli.setting import Setting
 
 PRESS_US: Final = 100_000
 """How long a button is pressed unless told otherwise."""

@@ -9,7 +9,6 @@ from functools import partial
 from typing import assert_never
 
 from tickrig.emulators.byte_text import escape
-from tickrig.emulators.duration import format_time
 from tickrig.emulators.fault_spec import FaultSpec
 from tickrig.emulators.scenario import (
     Clear,
@@ -26,6 +25,7 @@ from tickrig.emulators.trace import Mark
 from tickrig.emulators.transcript import Transcript
 from tickrig.emulators.wire_log import WireLine
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.duration import format_time
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from tickrig.device.physical import Output
 from tickrig.emulators.emulated import Emulated, Inputs
-from tickrig.emulators.setting import Setting
 from tickrig.emulators.trace import RESET, Header, Mark, Record
+from tickrig.host.cli.setting import Setting
 
 _logger = logging.getLogger(__name__)
 

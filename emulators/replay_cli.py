@@ -8,11 +8,11 @@ import click
 
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.catalog import DEVICES
-from tickrig.emulators.duration import format_time
 from tickrig.emulators.emulated import Emulated
-from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.replay import Difference, read_recording, replay
 from tickrig.emulators.trace import Header
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.refused import Refused, refuse_path
 
 
 @click.command("replay")

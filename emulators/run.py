@@ -17,10 +17,10 @@ from tickrig.emulators.control import Control
 from tickrig.emulators.control_server import ControlServer
 from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.player import Player
-from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.scenario import Line, ScenarioParser
 from tickrig.emulators.serving_clock import ServingClock
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.refused import Refused, refuse_path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

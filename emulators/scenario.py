@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.emulators.byte_text import unescape
-from tickrig.emulators.duration import parse_time_us
 from tickrig.emulators.emulated import Touchable
 from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.names import known
 from tickrig.emulators.operator import PRESS_US, Operator
-from tickrig.emulators.setting import Setting, parse_setting
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.cli.setting import Setting, parse_setting
 
 Encoder = Callable[[bytes], bytes]
 """Makes a line for the wire of the text that a scenario gives."""

@@ -6,7 +6,8 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.run_options import PATH, Decorator, add_options, run_options
+from tickrig.emulators.run_options import run_options
+from tickrig.host.cli.options import PATH, Decorator, add_options
 
 
 def line_options(wire_faults: str) -> Decorator:

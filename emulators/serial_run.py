@@ -15,13 +15,13 @@ from tickrig.emulators.emulator import Emulator, LineKind
 from tickrig.emulators.player import Player
 from tickrig.emulators.pty_port import PtyPort
 from tickrig.emulators.recorder import TraceFile
-from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.run import EmulatorRun, RunOptions, say
 from tickrig.emulators.scenario import Encoder, Line, ScenarioParser, Sender
 from tickrig.emulators.trace import Config, Header
 from tickrig.emulators.transcript import Transcript
 from tickrig.emulators.wire_log import WireLine
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.refused import Refused, refuse_path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,7 @@ from enum import StrEnum
 from typing import Final
 
 from tickrig.emulators.byte_text import escape, unescape
-from tickrig.emulators.duration import format_time
+from tickrig.host.cli.duration import format_time
 
 VERSION: Final = 1
 RESET: Final = "reset"

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.emulators.byte_text import escape
-from tickrig.emulators.duration import format_time
 from tickrig.emulators.emulated import look_at
-from tickrig.emulators.setting import Setting
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.wire_log import WireLine
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.setting import Setting
 
 STATE: Final = "state"
 """The output that is watched unasked, where a device has one."""

@@ -14,7 +14,7 @@ from tickrig.device.physical import Output, QuantityBank
 from tickrig.emulators.canopen.body_inputs import FrictionTouch, PoseTouch
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.touch import Touch
-from tickrig.emulators.setting import Setting
+from tickrig.host.cli.setting import Setting
 
 NAME: Final = "body"
 

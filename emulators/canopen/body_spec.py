@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.body.wheeled_body import SIDES, BodyParameters, WheeledBody
 from tickrig.emulators.canopen.body_on_drives import BodyOnDrives, Wheel
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.refused import Refused
+from tickrig.host.cli.refused import Refused
 
 NUMBERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
 NEEDED: Final = ("wheel_radius_m", "tread_m")

@@ -17,7 +17,7 @@ from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.profiles import AUTO, application_of
 from tickrig.emulators.canopen.store_file import StoreFile
-from tickrig.emulators.refused import Refused, refuse_path
+from tickrig.host.cli.refused import Refused, refuse_path
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,16 @@ from typing import Any, Final
 import click
 from click.shell_completion import CompletionItem
 
-from tickrig.emulators.can_options import BusCommand, BusOptions, bus_options
 from tickrig.emulators.canopen.eds_writer import write_eds as format_eds
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.profiles import AUTO, CHOICES
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
-from tickrig.emulators.refused import Refused, refuse_path
-from tickrig.emulators.run_options import PATH, run_options
+from tickrig.emulators.run_options import run_options
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
 
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
 STANDARD_OUTPUT: Final = Path("-")

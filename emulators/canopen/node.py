@@ -12,7 +12,7 @@ from tickrig.device.physical import Output
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.node_inputs import Emergency, Quantity, Switch
 from tickrig.emulators.canopen.touch import ObjectTouch, Touch, find_object, object_name
-from tickrig.emulators.setting import Setting
+from tickrig.host.cli.setting import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState

@@ -10,7 +10,7 @@ from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.refused import Refused
+from tickrig.host.cli.refused import Refused
 
 LSS: Final = "lss"
 """Instead of a node-ID: the node waits for LSS to give it one."""

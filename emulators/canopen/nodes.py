@@ -11,7 +11,7 @@ from tickrig.device.physical import Input, Kind, Output
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.touch import Touch
 from tickrig.emulators.names import known
-from tickrig.emulators.setting import Setting
+from tickrig.host.cli.setting import Setting
 
 
 class Part(Protocol):

@@ -12,7 +12,7 @@ from tickrig.emulators.canopen.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
 from tickrig.emulators.canopen.profiles import CHOICES
-from tickrig.emulators.refused import Refused, refuse_path
+from tickrig.host.cli.refused import Refused, refuse_path
 
 NODE_KEYS: Final = ("id", "eds", "model", "profile")
 TABLES: Final = "it consists of tables [[node]] and perhaps one table [body]"

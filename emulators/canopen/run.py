@@ -10,9 +10,7 @@ from typing import Final
 import click
 
 from tickrig.emulators.can_emulator import CanEmulator
-from tickrig.emulators.can_options import BusOptions, open_bus
 from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.candump import LogLine
 from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.canopen.bench import make_bench, store_keeper
 from tickrig.emulators.canopen.body_spec import BodySpec
@@ -21,12 +19,15 @@ from tickrig.emulators.canopen.node_spec import NodeSpec
 from tickrig.emulators.canopen.profiles import AUTO
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.frame_transcript import FrameTranscript
+from tickrig.emulators.outside_bus import open_bus
 from tickrig.emulators.player import Player
-from tickrig.emulators.refused import Refused, refuse_path
 from tickrig.emulators.run import EmulatorRun, RunOptions, say
 from tickrig.emulators.scenario import Line, ScenarioParser, Send
 from tickrig.emulators.workbench import Workbench
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.wire.can import CanFrame
+from tickrig.wire.candump import LogLine
 
 VIRTUAL_CHANNEL: Final = "can0"
 BIT_RATE: Final = 1_000_000

@@ -10,7 +10,6 @@ from typing import Final, Protocol
 import canopen
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_options import BusOptions, open_raw
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node import Node
@@ -19,10 +18,11 @@ from tickrig.emulators.child import running
 from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.emulated import look_at
 from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
-from tickrig.emulators.refused import Refused
 from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.setting import Setting
 from tickrig.emulators.sim_network import SimNetwork
+from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.setting import Setting
 
 BIT_RATE: Final = 1_000_000
 CAST: Final = {PALETTE: "f-palette", MOTOR: "motor-core-unit"}

@@ -13,10 +13,10 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, Static
 
 from tickrig.emulators.control import VERSION, Object
-from tickrig.emulators.duration import format_time
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
 from tickrig.emulators.trace import Mark
+from tickrig.host.cli.duration import format_time
 
 Ask = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Makes requests of an emulator, those of the control socket, and brings the answers."""

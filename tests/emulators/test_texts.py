@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from tickrig.device.core import NEVER
 from tickrig.emulators.byte_text import escape, unescape
-from tickrig.emulators.duration import format_time, parse_time_us
 from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.host.cli.duration import format_time, parse_time_us
 
 
 @given(st.binary())

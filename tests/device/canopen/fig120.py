@@ -12,9 +12,9 @@ from tickrig.device.canopen.models import f_palette, motor_core_unit
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.candump import LogLine
 from tickrig.emulators.rig import Rig, Station
 from tickrig.wire.can import CanFrame
+from tickrig.wire.candump import LogLine
 
 GOLDEN: Final = Path(__file__).parents[2] / "golden"
 ROWS: Final = json.loads((GOLDEN / "canopen" / "fig120.json").read_text())["fig120_setup"]

@@ -8,9 +8,9 @@ import pytest
 
 from tests.device.canopen.fig120 import MEASURED, POTENTIOMETER, SETUP, Demo, look, make_motor
 from tickrig.device.canopen.application import Application
-from tickrig.emulators.candump import parse_log
 from tickrig.emulators.candump_port import CandumpPort
 from tickrig.emulators.rig import Rig, Station
+from tickrig.wire.candump import parse_log
 
 ENCODER_DEG = 360 / 409_600
 ADC_STEP_V = 5 / 4095

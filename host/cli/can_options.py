@@ -1,29 +1,28 @@
-"""The options of a CAN bus outside, as the tools of python-can take them, and the bus itself."""
+"""The options of a CAN bus, as the tools of python-can take them, and the bus itself.
+
+python-can is imported when a bus is opened: it takes a fifth of a second.
+"""
 
 from __future__ import annotations
 
 import errno
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
-import can
 import click
-from can.util import load_config
+from click.shell_completion import CompletionItem
 
-from tickrig.emulators.can_bus_port import CanBusPort
-from tickrig.emulators.refused import Refused
-from tickrig.emulators.run_options import Decorator, add_options
-from tickrig.emulators.setting import parse_setting
-from tickrig.emulators.without_echo import CountingPort, WithoutEcho
+from tickrig.host.cli.options import Decorator, add_options
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.setting import parse_setting
+
+if TYPE_CHECKING:
+    import can
 
 GREEDY: Final = ("--timing", "--bus-kwargs")
 """Options that take one or more values in python-can's tools."""
-
-ECHOING: Final = ("udp_multicast",)
-"""Interfaces that give back what they sent, whatever is asked of them."""
 
 HINTS: Final = {
     errno.EAFNOSUPPORT: "this kernel has no SocketCAN",
@@ -86,12 +85,24 @@ def spread(args: Sequence[str]) -> list[str]:
     return out
 
 
+def _complete_interface(
+    context: click.Context, parameter: click.Parameter, begun: str
+) -> list[CompletionItem]:
+    return [CompletionItem(name) for name in _interfaces() if name.startswith(begun)]
+
+
+def _interfaces() -> list[str]:
+    import can  # noqa: PLC0415 - slow
+
+    return sorted(can.VALID_INTERFACES)
+
+
 bus_options: Final[Decorator] = add_options(
     click.option(
         "-i",
         "--interface",
-        type=click.Choice(sorted(can.VALID_INTERFACES)),
         metavar="INTERFACE",
+        shell_complete=_complete_interface,
         help="Driver of python-can, as socketcan, udp_multicast, slcan.",
     ),
     click.option("-c", "--channel", metavar="CHANNEL", help="Channel of it, as can0."),
@@ -112,34 +123,6 @@ bus_options: Final[Decorator] = add_options(
 """Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
 
 
-class OpenBus(NamedTuple):
-    """A bus outside.
-
-    Attributes:
-        port: the bus.
-        name: what people call it.
-        channel: what logs call it.
-    """
-
-    port: CountingPort
-    name: str
-    channel: str
-
-
-def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
-    """Open the bus that options, environment or configuration files of python-can name.
-
-    Raises:
-        Refused: none is named, or it cannot be opened.
-    """
-    bus, interface, channel = open_raw(options)
-    stack.callback(bus.shutdown)
-    name = interface if channel is None else f"{interface} {channel}"
-    port = CanBusPort(bus)
-    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return OpenBus(WithoutEcho(port) if interface in ECHOING else port, name, label)
-
-
 def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
     """Open such a bus for somebody who takes it as python-can gives it.
 
@@ -149,6 +132,10 @@ def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
     Raises:
         Refused: none is named, or it cannot be opened.
     """
+    import can  # noqa: PLC0415 - slow
+    from can.util import load_config  # noqa: PLC0415
+
+    _check_interface(options.interface)
     given = _given(options)
     try:
         config = load_config(config=dict(given))
@@ -164,6 +151,11 @@ def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
         name = interface if channel is None else f"{interface} {channel}"
         raise Refused(f"CAN bus {name}: {_reason(error)}") from None
     return bus, interface, channel
+
+
+def _check_interface(interface: str | None) -> None:
+    if interface is not None and interface not in (names := _interfaces()):
+        raise Refused(f"-i {interface!r} is none of python-can: {', '.join(names)}")
 
 
 def _given(options: BusOptions) -> Mapping[str, Any]:
@@ -190,6 +182,8 @@ def _pairs(option: str, words: Sequence[str], parse: Callable[[str], Any]) -> di
 
 
 def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
+    import can  # noqa: PLC0415 - slow
+
     try:
         return can.BitTiming(**pairs)
     except (TypeError, ValueError) as error:
@@ -197,7 +191,7 @@ def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
 
 
 def _nothing_named() -> str:
-    names = ", ".join(sorted(can.VALID_INTERFACES))
+    names = ", ".join(_interfaces())
     return (
         "no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE and CAN_CHANNEL, or"
         " write them into ~/.canrc; or give --scenario FILE, which runs in virtual time."

@@ -10,11 +10,11 @@ from tests.emulators.can_bench import frames, some_frames
 from tests.emulators.test_can_rig import Node
 from tickrig.device.core import NEVER
 from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.candump import CandumpError, LogLine, parse_line, parse_log
 from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.candump_port import CandumpPort
 from tickrig.emulators.rig import Rig, Station
 from tickrig.wire.can_error import BIT_ERROR, ErrorFrame
+from tickrig.wire.candump import CandumpError, LogLine, parse_line, parse_log
 
 errors = st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8))
 

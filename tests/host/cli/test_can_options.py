@@ -7,8 +7,9 @@ from typing import Any
 import can
 import pytest
 
-from tickrig.emulators.can_options import BusOptions, open_bus
-from tickrig.emulators.refused import Refused
+from tickrig.emulators.outside_bus import open_bus
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,1 @@
+"""What the command lines of host tools and emulators share."""
