@@ -1,0 +1,1 @@
+"""canmon: the CAN monitor in the terminal."""

@@ -1,0 +1,36 @@
+"""The command `canmon`; a verb is imported when it is asked for, so that each starts fast."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Final
+
+import click
+
+from tickrig import __version__
+
+VERBS: Final[dict[str, str]] = {}
+"""Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands live in modules of their own."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which people meet them."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a verb."""
+        if cmd_name not in VERBS:
+            return None
+        module = import_module(f"tickrig.host.canmon.{VERBS[cmd_name]}")
+        command = module.command
+        assert isinstance(command, click.Command)
+        return command
+
+
+@click.group(cls=LazyGroup)
+@click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
+def main() -> None:
+    """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input."""
