@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig.device.canopen.application import Application
@@ -11,7 +10,9 @@ from tickrig.device.canopen.ds402 import indices, terminals
 from tickrig.device.canopen.ds402.allowed import guard_values
 from tickrig.device.canopen.ds402.automaton import Automaton
 from tickrig.device.canopen.ds402.axis import Axis
-from tickrig.device.canopen.ds402.faults import COMMUNICATION_ERRORS, ErrorCode, register_of
+from tickrig.device.canopen.ds402.connection import Connection
+from tickrig.device.canopen.ds402.fault_memory import FaultMemory
+from tickrig.device.canopen.ds402.faults import ErrorCode
 from tickrig.device.canopen.ds402.limits import Limits
 from tickrig.device.canopen.ds402.mode import Mode
 from tickrig.device.canopen.ds402.modes import MODES, supported
@@ -19,12 +20,7 @@ from tickrig.device.canopen.ds402.motor import IdealMotor, Motor
 from tickrig.device.canopen.ds402.parameters import Parameters
 from tickrig.device.canopen.ds402.reference import Control, Reference
 from tickrig.device.canopen.ds402.settings import CONFIGURATION, Settings, read_settings
-from tickrig.device.canopen.ds402.state import (
-    Controlword,
-    DriveState,
-    Statusword,
-    command_of,
-)
+from tickrig.device.canopen.ds402.state import Controlword, DriveState, command_of
 from tickrig.device.canopen.ds402.stopping import Stopping
 from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
 from tickrig.device.canopen.ds402.switches import Switches
@@ -43,25 +39,8 @@ TARGETS: Final = (
 )
 
 
-STATE_BITS: Final = {state: int(state | Statusword.REMOTE) for state in DriveState}
-"""What the statusword shows of a state, and that the bus is in control."""
-
-_VOLTAGE_ENABLED: Final = int(Statusword.VOLTAGE_ENABLED)
-_WARNING: Final = int(Statusword.WARNING)
-_INTERNAL_LIMIT: Final = int(Statusword.INTERNAL_LIMIT)
-_FOLLOWING_ERROR: Final = int(Statusword.MODE_13)
-
 COOLING_US: Final = 1_000_000
 """Period in which a drive at rest looks at its temperature."""
-
-
-class AbortConnection(IntEnum):
-    """What a lost connection does (6007h)."""
-
-    NO_ACTION = 0
-    FAULT = 1
-    DISABLE_VOLTAGE = 2
-    QUICK_STOP = 3
 
 
 class Ds402(Application):
@@ -88,6 +67,8 @@ class Ds402(Application):
         more_targets: objects of a maker whose change is a new target.
         settings: the present configuration.
         axis: motor, reference and zero.
+        faults: those since the last reset.
+        connection: the way to the master.
         control: the loop that the motor works with in this tick.
         controlword: as it was written last.
         mode: the mode of operation at work.
@@ -126,11 +107,11 @@ class Ds402(Application):
             Supervision(self, self.bounds),
             Telling(self, self.measures),
         )
+        self.faults, self.connection = FaultMemory(self), Connection(self)
         self.control, self.controlword = Control.POSITION, 0
         self.mode, self.mode_number = Mode(self), 0
         self.fresh = self.limited = False
-        self._stale, self._codes = True, list[int]()
-        self._lost: set[int] = set()
+        self._stale = True
         self._wired: tuple[ErrorCode, ...] = ()
         self._winding_dc = 0
         plant = () if servo is None else terminals.PLANT_INPUTS
@@ -182,26 +163,7 @@ class Ds402(Application):
 
     def fault(self, code: int) -> None:
         """Have a fault with an emergency error code."""
-        if code not in self._codes:
-            self._note(code)
-            self.node.emergency(code, register_of(code))
-
-    @property
-    def statusword(self) -> int:
-        """Present value of 6041h."""
-        supervision, state = self.supervision, self.automaton.state
-        status = STATE_BITS[state]
-        if supervision.has_supply:
-            status |= _VOLTAGE_ENABLED
-        if supervision.warns:
-            status |= _WARNING
-        if self.limited:
-            status |= _INTERNAL_LIMIT
-        if state is DriveState.OPERATION_ENABLED:
-            status |= int(self.mode.flags)
-            if supervision.not_following and self.mode.tells_following_error:
-                status |= _FOLLOWING_ERROR
-        return status
+        self.faults.take(code)
 
     def wired_faults(self) -> list[ErrorCode]:
         """Return the faults that the electronics see; a short circuit needs power to be seen."""
@@ -238,7 +200,8 @@ class Ds402(Application):
 
     def start(self) -> None:
         """Switch off."""
-        self._codes, self._lost = [], set()
+        self.faults.forget()
+        self.connection.lost.clear()
         self.automaton.restart()
         self.controlword = self.parameters.number(indices.CONTROLWORD)
         self.parameters.write(indices.SUPPORTED_MODES, supported(self.modes))
@@ -247,12 +210,11 @@ class Ds402(Application):
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
         """Remember that the connection is lost."""
-        if code in COMMUNICATION_ERRORS:
-            self._lost.add(code)
+        self.connection.lose(code)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
         """Remember that it is there again."""
-        self._lost.discard(code)
+        self.connection.lost.discard(code)
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Take NMT Stop for a lost connection."""
@@ -260,19 +222,8 @@ class Ds402(Application):
             self.communication_error()
 
     def communication_error(self) -> None:
-        """Act as 6007h says, while the motor has power."""
-        if self.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):
-            return
-        match self.parameters.number(indices.ABORT_CONNECTION):
-            case AbortConnection.FAULT:
-                self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
-            case AbortConnection.DISABLE_VOLTAGE:
-                self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
-            case AbortConnection.QUICK_STOP:
-                self.automaton.enter(DriveState.QUICK_STOP_ACTIVE)
-            case _:  # no action, or what a manufacturer might mean
-                return
-        self.request()
+        """Act as 6007h says."""
+        self.connection.abort()
 
     def on_execute(self, now_us: int) -> None:
         """Measure, watch, make a step, command the motor, tell."""
@@ -333,7 +284,7 @@ class Ds402(Application):
         rising, falling = self.controlword & ~before, before & ~self.controlword
         command = command_of(self.controlword)
         if self.state is DriveState.FAULT and rising & Controlword.FAULT_RESET:
-            self._reset_fault()
+            self.faults.reset((*self.supervision.present(), *self.connection.lost))
         elif command is not None:
             self.automaton.obey(command)
         if self.enabled:
@@ -342,22 +293,6 @@ class Ds402(Application):
             if falling & Controlword.START:
                 self.mode.stop()
         self.request()
-
-    def _note(self, code: int) -> None:
-        self._codes.append(code)
-        self.parameters.write(indices.ERROR_CODE, code)
-        self.automaton.react(code)
-        self.request()
-
-    def _reset_fault(self) -> None:
-        """Leave Fault if no cause is left: transition 15."""
-        present = {*self.supervision.present(), *self._lost}
-        if present.isdisjoint(self._codes):
-            for code in self._codes:
-                self.node.emergency_clear(code)
-            self._codes = []
-            self.parameters.write(indices.ERROR_CODE, 0)
-            self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
 
     def _change_mode(self) -> None:
         number = self.parameters.number(indices.MODES_OF_OPERATION)

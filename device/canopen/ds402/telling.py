@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.parameters import clamped
+from tickrig.device.canopen.ds402.statusword import statusword_of
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -20,7 +21,7 @@ def _velocity(drive: Ds402, counts_s: float) -> int:
 
 
 MEASURES: Final[Mapping[Multiplexer, Measure]] = {
-    (indices.STATUSWORD, 0): lambda drive: drive.statusword,
+    (indices.STATUSWORD, 0): statusword_of,
     (indices.POSITION_DEMAND, 0): lambda drive: drive.axis.position_of(drive.reference.position),
     (indices.POSITION_ACTUAL_INTERNAL, 0): lambda drive: drive.motor.counts,
     (indices.POSITION_ACTUAL, 0): lambda drive: drive.axis.position,

@@ -23,6 +23,7 @@ from tickrig.device.canopen.ds402 import maxon, modes
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.ds402.faults import ErrorCode
 from tickrig.device.canopen.ds402.mode import Mode
+from tickrig.device.canopen.ds402.statusword import statusword_of
 from tickrig.device.canopen.ds402.supervision import Bounds
 from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer
 from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Element, Objects
@@ -81,7 +82,7 @@ class Epos(Ds402):
     modes: ClassVar[Mapping[int, type[Mode]]] = {**modes.MODES, **maxon.MODES}
     measures: ClassVar[Mapping[Multiplexer, Measure]] = {
         **MEASURES,
-        (0x6041, 0): lambda drive: drive.statusword | 0x0100 | 0x8000 * drive.axis.homed,
+        (0x6041, 0): lambda drive: statusword_of(drive) | 0x0100 | 0x8000 * drive.axis.homed,
         (0x6078, 0): lambda drive: drive.motor.current_ma,
     }
     bounds: ClassVar[Bounds] = Bounds(supply_mv=(10_000, 30_000))
