@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
-from tickrig.emulators.control import VERSION, Object
+from tickrig.emulators.requests import VERSION, Object
 
 TIMEOUT_S: Final = 5.0
 

@@ -1,4 +1,4 @@
-"""The control socket of a running emulator: many clients, no thread, bounded work."""
+"""A control socket: many clients, no thread, bounded work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import socket
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.control import Control, refusal_line
+from tickrig.emulators.requests import Requests, refusal_line
 from tickrig.emulators.unix_socket import listen_at
 
 MAX_LINE: Final = 4_096
@@ -27,15 +27,15 @@ class ControlServer:
     read its answers is not read from either.
 
     Args:
-        path: where the socket is; the file of a killed emulator is replaced.
+        path: where the socket is; that of a killed process is replaced.
         control: answers the requests.
 
     Raises:
-        FileExistsError: a live emulator is there, or something else.
+        FileExistsError: somebody listens there, or something else.
         OSError: no socket can be made there.
     """
 
-    def __init__(self, path: Path, control: Control) -> None:
+    def __init__(self, path: Path, control: Requests) -> None:
         self._listener = listen_at(path)
         self._path, self._inode = path, path.stat().st_ino
         self._control = control

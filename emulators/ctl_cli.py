@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.control import Object
 from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.requests import Object
 from tickrig.host.cli.duration import format_time, parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.setting import parse_setting

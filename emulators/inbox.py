@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 
-from tickrig.emulators.control import Control, Object
+from tickrig.emulators.control import Control
+from tickrig.emulators.requests import Object
 
 Answers = Future[list[Object]]
 

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, Static
 
-from tickrig.emulators.control import VERSION, Object
+from tickrig.emulators.requests import VERSION, Object
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
 from tickrig.emulators.trace import Mark

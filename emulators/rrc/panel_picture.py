@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.control import Control, Object
+from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.player import Player
+from tickrig.emulators.requests import Object
 from tickrig.emulators.rrc.build import NAME
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario import ScenarioParser

@@ -9,9 +9,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Final
 
-from tickrig.emulators.control import Control, Object
+from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.inbox import Inbox
+from tickrig.emulators.requests import Object
 from tickrig.emulators.rrc.panel import RrcPanel
 
 SWITCH_S: Final = 0.000_2

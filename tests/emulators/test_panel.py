@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.control import Control, Object
+from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.inbox import Inbox
+from tickrig.emulators.requests import Object
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.rrc.panel_picture import picture
