@@ -1,0 +1,184 @@
+"""A System Definition: nodes of a bus, and what joins them (NEDO report, Fig. 108; ours: K16)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+from tickrig.wire.canopen.pdo import MappedObject
+
+PDO_COUNT: Final = 512
+"""PDOs in each direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
+
+
+class Role(StrEnum):
+    """What a node is to its proxy."""
+
+    DEVICE_RTC = "device_rtc"
+    DEVICE = "device"  # off-the-shelf, CiA 301 alone
+    DRIVE = "drive"  # CiA 402
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class PdoName:
+    """A PDO of a node: `16.tpdo2`.
+
+    Attributes:
+        node: node-ID.
+        pdo: `tpdo1`.. or `rpdo1`.., as the device has it.
+    """
+
+    node: int
+    pdo: str
+
+    def __str__(self) -> str:
+        """Write it as a System Definition does."""
+        return f"{self.node}.{self.pdo}"
+
+    @property
+    def index(self) -> int:
+        """The communication parameter: 1400h for `rpdo1`, 1801h for `tpdo2`."""
+        return (0x1800 if self.pdo[0] == "t" else 0x1400) + int(self.pdo[4:]) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class BusEntry:
+    """Which bus, in python-can's words; None leaves it to the command line."""
+
+    channel: str | None = None
+    interface: str | None = None
+    bitrate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MasterEntry:
+    """The server as a node.
+
+    Attributes:
+        node: its node-ID.
+        heartbeat_ms: its producer heartbeat time, 0 for none.
+        rate_hz: of the execution context of the proxies.
+        remove_ms: after how long without a sign of life a proxy is removed.
+        reconnect: whether a proxy that comes back has its connections again.
+        leave: what the server leaves the nodes in: `pre_operational` or `stopped`.
+    """
+
+    node: int = 127
+    heartbeat_ms: int = 100
+    rate_hz: float = 100.0
+    remove_ms: int = 1_000
+    reconnect: bool = True
+    leave: str = "pre_operational"
+
+
+@dataclass(frozen=True, slots=True)
+class PdoEntry:
+    """Parameters that the server writes into a PDO; None leaves what the device has.
+
+    Attributes:
+        mapping: the objects in it.
+        cob_id: its COB-ID.
+        type: transmission type.
+        inhibit_100us: inhibit time in 100 us.
+        event_ms: event timer.
+    """
+
+    mapping: tuple[MappedObject, ...] | None = None
+    cob_id: int | None = None
+    type: int | None = None
+    inhibit_100us: int | None = None
+    event_ms: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEntry:
+    """A node.
+
+    Attributes:
+        id: node-ID.
+        name: instance name of its proxy.
+        eds: file that describes it, seen from the System Definition.
+        role: what it is.
+        heartbeat_ms: its producer heartbeat time.
+        ports: names of ports by PDO, such as `tpdo2`.
+        pdos: what is written into PDOs, by the same names.
+    """
+
+    id: int
+    name: str
+    eds: str
+    role: Role = Role.DEVICE_RTC
+    heartbeat_ms: int = 100
+    ports: Mapping[str, str] = field(default_factory=dict)
+    pdos: Mapping[str, PdoEntry] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SdoEntry:
+    """A value that is written while its node boots.
+
+    Attributes:
+        size: bytes: 1, 2, 4 or 8.
+    """
+
+    node: int
+    index: int
+    sub: int
+    value: int
+    size: int
+
+    @property
+    def data(self) -> bytes:
+        """The bytes that are written."""
+        return self.value.to_bytes(self.size, "little", signed=self.value < 0)
+
+
+@dataclass(frozen=True, slots=True)
+class PdoLink:
+    """A TPDO that an RPDO of another node receives without the PC."""
+
+    source: PdoName
+    target: PdoName
+
+
+@dataclass(frozen=True, slots=True)
+class RtConnection:
+    """Ports that are joined through the PC, such as `Palette0.ai` and `Logger0.in`."""
+
+    source: str
+    target: str
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class StartEntry:
+    """In which order nodes are activated, and whether by themselves.
+
+    Attributes:
+        order: node-IDs; those that are left out follow in the order of the nodes.
+        autoactivate: activate a node when it is ready and all before it are Active.
+    """
+
+    order: tuple[int, ...] = ()
+    autoactivate: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SystemDefinition:
+    """All that the server is told."""
+
+    nodes: tuple[NodeEntry, ...]
+    bus: BusEntry = BusEntry()
+    master: MasterEntry = MasterEntry()
+    sdo: tuple[SdoEntry, ...] = ()
+    pdo_links: tuple[PdoLink, ...] = ()
+    rt_connections: tuple[RtConnection, ...] = ()
+    start: StartEntry = StartEntry()
+
+    @property
+    def start_order(self) -> tuple[int, ...]:
+        """Node-IDs of all nodes in the order in which they are activated."""
+        ids = (node.id for node in self.nodes)
+        return tuple(dict.fromkeys((*self.start.order, *ids)))
