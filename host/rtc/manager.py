@@ -55,12 +55,14 @@ class Manager(Schedule):
 
     @property
     def connectors(self) -> tuple[ConnectorProfile, ...]:
-        """All connectors, each once."""
+        """All connectors between its components, each once."""
+        ports = [port for component in self.components for port in component.ports.values()]
+        own = {port.full_name for port in ports}
         profiles = {
             connector.profile.connector_id: connector.profile
-            for component in self.components
-            for port in component.ports.values()
+            for port in ports
             for connector in port.connectors
+            if own.issuperset(connector.profile.ports)
         }
         return tuple(profiles.values())
 
