@@ -10,12 +10,13 @@ from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, Framing, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.emulator import LineKind
 from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
-from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component, told
+from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
 from tickrig.emulators.serial_options import line_options
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.user_file import told
 from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.refused import Refused
 from tickrig.wire.rtc_lite.codes import Command, ContextType
