@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.emulators.chance import Chance
+from tickrig.device.chance import Chance
 from tickrig.emulators.faults import Fault, FaultKind
 
 

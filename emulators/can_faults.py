@@ -8,7 +8,7 @@ from enum import Enum, auto
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.emulators.chance import Chance, check_rate, threshold_of
+from tickrig.device.chance import Chance, check_rate, threshold_of
 
 DELAY_US: Final = 10_000
 """How long a delayed node sends nothing."""

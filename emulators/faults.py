@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic
 
 from tickrig.device.core import W
-from tickrig.emulators.chance import Chance, check_rate, threshold_of
+from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.emulators.port import Port
 
 Fault = Callable[[int, W], W]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.emulators.lamp import Lamp
 from tickrig.device.core import NEVER
 from tickrig.emulators.byte_faults import BYTE_FAULTS
-from tickrig.emulators.chance import Chance, threshold_of
+from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.faults import FaultyPort
 from tickrig.emulators.rig import Rig, Station

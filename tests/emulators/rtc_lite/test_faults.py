@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.wire.rtc_lite_vectors import raw
-from tickrig.emulators.chance import Chance, threshold_of
+from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 
 PING = raw("0A 43 59 40 01 DD")

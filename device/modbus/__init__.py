@@ -1,0 +1,1 @@
+"""A Modbus slave on a serial line, and the registers it holds."""

@@ -1,0 +1,121 @@
+"""Holding registers under names; a number of 32 bits takes two, its high half first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.wire.modbus.requests import ExceptionCode, Refusal
+
+WORD: Final = 0x1_0000
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """A number that a master sees.
+
+    Attributes:
+        address: of its first register.
+        name: what the device calls it.
+        text: what it is, with its unit.
+        words: registers it takes, 1 or 2.
+        signed: in two's complement.
+        low: smallest value that a master may write.
+        high: largest value that a master may write.
+        initial: value after power-up.
+        writable: a master may write it.
+    """
+
+    address: int
+    name: str
+    text: str
+    words: int = 1
+    signed: bool = False
+    low: int = 0
+    high: int = 0xFFFF
+    initial: int = 0
+    writable: bool = False
+
+
+class Registers:
+    """The numbers of a device.
+
+    A number of 32 bits is written as a whole; half of it is an illegal address.
+
+    Args:
+        table: the numbers.
+        measured: those that are asked for when a master reads them.
+    """
+
+    def __init__(
+        self, table: Iterable[Register], measured: Mapping[str, Callable[[], int]]
+    ) -> None:
+        self.table: Mapping[str, Register] = {register.name: register for register in table}
+        self._at = {
+            register.address + word: (register, word)
+            for register in self.table.values()
+            for word in range(register.words)
+        }
+        self._measured = measured
+        self._values: dict[str, int] = {}
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to what holds after power-up."""
+        self._values = {name: register.initial for name, register in self.table.items()}
+
+    def __getitem__(self, name: str) -> int:
+        """Return a number."""
+        measure = self._measured.get(name)
+        return self._values[name] if measure is None else measure()
+
+    def __setitem__(self, name: str, value: int) -> None:
+        """Set a number, as the device itself does."""
+        self._values[name] = value
+
+    def read(self, first: int, count: int) -> list[int]:
+        """Return registers; Refusal if one is not there."""
+        found = [self._find(address) for address in range(first, first + count)]
+        values = {register.name: self[register.name] for register, _ in found}
+        return [
+            values[register.name] >> 16 * (register.words - 1 - word) & 0xFFFF
+            for register, word in found
+        ]
+
+    def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
+        """Write registers, all or none; return what was written, by name.
+
+        Raises:
+            Refusal: one is not there, or read-only, or would be written by half, or its
+                value is out of range.
+        """
+        written: dict[str, int] = {}
+        at = first
+        while at < first + len(values):
+            register, word = self._find(at)
+            words = values[at - first : at - first + register.words]
+            if word or len(words) < register.words or not register.writable:
+                raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+            written[register.name] = _joined(register, words)
+            at += register.words
+        self._values.update(written)
+        return written
+
+    def _find(self, address: int) -> tuple[Register, int]:
+        try:
+            return self._at[address]
+        except KeyError:
+            raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS) from None
+
+
+def _joined(register: Register, words: Sequence[int]) -> int:
+    value = 0
+    for word in words:
+        value = value * WORD + word
+    top = WORD**register.words
+    if register.signed and value >= top // 2:
+        value -= top
+    if not register.low <= value <= register.high:
+        raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
+    return value

@@ -1,0 +1,156 @@
+"""The motor driver: what a master told it, and what its two wheels do."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Final
+
+from tickrig.device.modbus.registers import Registers
+from tickrig.device.physical import QuantityBank
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.rh3.register_map import TABLE, Command, Fault, Mode, Status
+from tickrig.device.rh3.side import Side
+from tickrig.device.rh3.terminals import SIDES
+
+TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
+DELAYED: Final = TARGETS | {"mode", "command"}
+"""What takes effect after the delay."""
+
+
+class Driver:
+    """Runs two wheels as its registers say (rh3-control, drive protocol, register map A).
+
+    A fault of one wheel takes the power from both and shorts the motors; it stays until
+    it is cleared and its cause is gone. A master that is silent for `watchdog_ms` while
+    the base moves stops it on the ramp; a new target starts it again. An order to enable
+    that cannot be followed is passed over; the status tells.
+
+    Args:
+        parameters: of the base.
+        inputs: what the world does to it.
+
+    Attributes:
+        now_us: the present time, set before anything is asked of it.
+        registers: what a master sees.
+        sides: left and right wheel with their loops.
+    """
+
+    def __init__(self, parameters: BaseParameters, inputs: QuantityBank) -> None:
+        self._inputs, self._delay_us = inputs, parameters.delay_ms * 1_000
+        self.now_us = self._start_us = 0
+        measured = {"status": lambda: int(self.status), "sample": lambda: self._sample}
+        self.registers = Registers(TABLE, measured)
+        self.sides = tuple(
+            Side(name, bit, parameters, self.registers) for bit, name in enumerate(SIDES)
+        )
+        for side in self.sides:
+            measured.update(side.measured)
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Begin anew; what turns goes on turning."""
+        self._start_us = self.now_us
+        self.registers.reset()
+        self._waiting: deque[tuple[int, Mapping[str, int]]] = deque()
+        self._enabled = self._powered = self._tripped = self._stopped = False
+        for side in self.sides:
+            side.power_up()
+
+    @property
+    def status(self) -> Status:
+        """What the driver says of itself."""
+        bits = {
+            Status.ENABLED: self._enabled,
+            Status.MOVING: any(side.wheel.speed for side in self.sides),
+            Status.FAULT: self._faulty,
+            Status.WATCHDOG: self._tripped,
+            Status.CLIPPED: any(side.clipped for side in self.sides),
+            Status.EMERGENCY_STOP: bool(self._inputs["emergency_stop"]),
+            Status.BUMPER: bool(self._inputs["bumper"]),
+        }
+        return Status(sum(bit for bit, is_set in bits.items() if is_set))
+
+    @property
+    def resting(self) -> bool:
+        """Whether a step would change nothing."""
+        return not self._waiting and all(side.resting for side in self.sides)
+
+    def written(self, values: Mapping[str, int]) -> None:
+        """Take what a master wrote, at once or after the delay."""
+        if values.keys() & DELAYED:
+            self._waiting.append((self.now_us + self._delay_us, values))
+
+    def step(self, heard_us: int) -> None:
+        """Let a millisecond pass.
+
+        Args:
+            heard_us: when the master was heard last.
+        """
+        while self._waiting and self._waiting[0][0] <= self.now_us:
+            self._obey(self._waiting.popleft()[1])
+        self._watch(heard_us)
+        self._find_faults()
+        self._power()
+        for side in self.sides:
+            if self._powered:
+                side.drive(stop=self._stopped)
+            else:
+                side.coast(shorted=self._faulty)
+
+    def coast(self) -> None:
+        """Let a millisecond pass without supply: a relay shorts the motors."""
+        for side in self.sides:
+            side.coast(shorted=True)
+
+    @property
+    def _faulty(self) -> bool:
+        return any(side.fault for side in self.sides)
+
+    @property
+    def _sample(self) -> int:
+        return (self.now_us - self._start_us) // 1_000 & 0xFFFF
+
+    def _obey(self, values: Mapping[str, int]) -> None:
+        if values.keys() & TARGETS:
+            self._tripped = self._stopped = False
+        command = values.get("command", Command.NONE)
+        if command == Command.ENABLE:
+            self._enabled = not self._faulty
+        elif command == Command.DISABLE:
+            self._enabled = False
+        elif command in {Command.STOP, Command.QUICK_STOP}:
+            self._stop(quick=command == Command.QUICK_STOP)
+        for side in self.sides:
+            if command == Command.CLEAR_FAULT:
+                side.fault = Fault(0)
+            elif command == Command.ZERO_COUNTERS:
+                side.zero()
+
+    def _stop(self, *, quick: bool) -> None:
+        self._stopped = True
+        for side in self.sides:
+            self.registers[f"target_speed_{side.name}"] = 0
+            if quick:
+                side.halt()
+
+    def _watch(self, heard_us: int) -> None:
+        """Stop when the master is silent."""
+        limit_us = self.registers["watchdog_ms"] * 1_000
+        moving = self._powered and not self._stopped and not self.resting
+        if moving and limit_us and self.now_us - heard_us >= limit_us:
+            self._stop(quick=False)
+            self._tripped = True
+
+    def _find_faults(self) -> None:
+        for side in self.sides:
+            side.find_faults(self._inputs, powered=self._powered)
+        if self._faulty:
+            self._enabled = False
+
+    def _power(self) -> None:
+        powered = self._enabled and self.registers["mode"] != Mode.FREE
+        if powered and not self._powered:
+            for side in self.sides:
+                side.take_over()
+        self._powered = powered

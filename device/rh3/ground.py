@@ -1,0 +1,63 @@
+"""The ground under a base: where its wheels have taken it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.body.contact import Contact
+from tickrig.device.body.pose import Pose
+from tickrig.device.chance import Chance
+from tickrig.device.rh3.parameters import BaseParameters
+
+STEP_S: Final = 1e-3
+HALF: Final = 2.0**63
+
+
+class Ground:
+    """Takes the turning of two wheels for a way over the ground, on exact arcs.
+
+    Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
+
+    Args:
+        parameters: of the base.
+
+    Attributes:
+        pose: where the middle of the axle is; it may be put elsewhere.
+        speed_m_s: forward, in the latest step.
+        turn_rad_s: to the left, in the latest step.
+        left: the left wheel's contact.
+        right: the right wheel's contact.
+    """
+
+    def __init__(self, parameters: BaseParameters) -> None:
+        share_kg, friction = parameters.mass_kg / 2, parameters.friction
+        self.left = Contact(parameters.radius_left_m, share_kg, friction)
+        self.right = Contact(parameters.radius_right_m, share_kg, friction)
+        self._tread_m, self._noise = parameters.tread_m, parameters.noise
+        self._chance = Chance(parameters.seed, "ground")
+        self.pose, self.speed_m_s, self.turn_rad_s = Pose(), 0.0, 0.0
+
+    @property
+    def contacts(self) -> tuple[Contact, Contact]:
+        """Left and right wheel on the ground."""
+        return self.left, self.right
+
+    @property
+    def resting(self) -> bool:
+        """Whether a step without turning would change nothing."""
+        return not (self.speed_m_s or self.turn_rad_s or self.left.slip_m_s or self.right.slip_m_s)
+
+    def step(self, left_rad: float, right_rad: float) -> None:
+        """Let a millisecond pass in which the wheels turned by so much."""
+        left_m = self._roughened(self.left.roll(left_rad, STEP_S))
+        right_m = self._roughened(self.right.roll(right_rad, STEP_S))
+        if left_m or right_m:
+            self.pose = self.pose.moved(left_m, right_m, self._tread_m)
+        self.speed_m_s = (left_m + right_m) / 2 / STEP_S
+        self.turn_rad_s = (right_m - left_m) / self._tread_m / STEP_S
+
+    def _roughened(self, way_m: float) -> float:
+        """Return a way with the noise of the ground: uniform, from one step to the next anew."""
+        if not self._noise or not way_m:
+            return way_m
+        return way_m * (1 + self._noise * (self._chance.draw() / HALF - 1))

@@ -1,0 +1,80 @@
+"""What a base is like; the source and the reason of each number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import tau
+from typing import Final
+
+from tickrig.wire.modbus.rtu import ADDRESSES
+
+GEAR_RATIO: Final = 74.91
+"""Turns of the motor for one of the wheel (RH3 functional specification, RefHardRh3)."""
+ENCODER_COUNTS: Final = 2_000
+"""Counts in a turn of the motor (the same)."""
+COUNTS_PER_RAD: Final = GEAR_RATIO * ENCODER_COUNTS / tau
+"""Counts in a radian of the wheel: 23 844.6."""
+
+DEFAULT_GAIN: Final = 10
+"""gain_VP, at which the speed loop has its time constant."""
+PER_MILLE: Final = 1_000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseParameters:
+    """A base and the ground it stands on.
+
+    Attributes:
+        address: of the driver on the line, 1..247.
+        radius_left_m: effective radius; 0.0995 is the calibrated one of the specification.
+        radius_right_m: effective radius.
+        tread_m: effective distance between the wheels; 0.464 is the calibrated one.
+        mass_kg: of the robot; a choice, the specification gives none.
+        friction: coefficient between wheels and ground, None if they never slip.
+        response_s: time constant of the speed loop at the default gains without load.
+        delay_ms: from a command's arrival to its effect.
+        rated_nm: torque at a wheel at 1000 per mille; a choice.
+        rated_ma: current at that torque; a choice.
+        friction_nm: of a motor with its gear; the driver makes up for it while it moves.
+        noise: spread of a wheel's way over the ground, as a share of it.
+        seed: of the noise.
+
+    Raises:
+        ValueError: a number that cannot be.
+    """
+
+    address: int = 1
+    radius_left_m: float = 0.0995
+    radius_right_m: float = 0.0995
+    tread_m: float = 0.464
+    mass_kg: float = 60.0
+    friction: float | None = None
+    response_s: float = 0.05
+    delay_ms: int = 0
+    rated_nm: float = 25.0
+    rated_ma: int = 3_000
+    friction_nm: float = 0.5
+    noise: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.address not in ADDRESSES:
+            raise ValueError(f"address {self.address} is not in 1..{ADDRESSES[-1]}")
+        for name in ("radius_left_m", "radius_right_m", "tread_m", "rated_nm"):
+            if not 0 < (value := getattr(self, name)) < 1_000:
+                raise ValueError(f"{name} {value} is not above 0 and below 1000")
+        for name in ("mass_kg", "response_s", "delay_ms", "friction_nm", "noise", "rated_ma"):
+            if not 0 <= (value := getattr(self, name)) <= 60_000:
+                raise ValueError(f"{name} {value} is not in 0..60000")
+        if self.friction is not None and not 0 <= self.friction <= 10:
+            raise ValueError(f"friction {self.friction} is not in 0..10")
+
+    @property
+    def agility(self) -> float:
+        """Counts/ms gained in a millisecond by a per mille of torque."""
+        return 1 / (DEFAULT_GAIN * max(1.0, self.response_s * 1_000))
+
+    def per_mille(self, torque_nm: float) -> float:
+        """Return a torque at a wheel in per mille of the rated one."""
+        return torque_nm / self.rated_nm * PER_MILLE

@@ -1,0 +1,144 @@
+"""One wheel as its driver sees it: loop, counter and faults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.device.modbus.registers import Registers
+from tickrig.device.physical import QuantityBank
+from tickrig.device.rh3.parameters import PER_MILLE, BaseParameters
+from tickrig.device.rh3.position_loop import PositionLoop
+from tickrig.device.rh3.register_map import Fault, Mode
+from tickrig.device.rh3.speed_loop import SpeedLoop
+from tickrig.device.rh3.wheel import Wheel
+
+STALL_MS: Final = 500
+"""How long full torque may turn nothing; a choice."""
+
+INT32: Final = 2**32
+
+
+class Side:
+    """A wheel, its encoder counter and its servo.
+
+    Args:
+        name: `left` or `right`.
+        backward_bit: of the register `direction`.
+        parameters: of the base.
+        registers: of the driver.
+
+    Attributes:
+        name: which side it is.
+        wheel: the mechanics.
+        fault: why it has no power.
+        clipped: its target was above the speed limit.
+    """
+
+    def __init__(
+        self, name: str, backward_bit: int, parameters: BaseParameters, registers: Registers
+    ) -> None:
+        self.name, self.wheel = name, Wheel(parameters)
+        self._registers, self._backward_bit = registers, backward_bit
+        self._speed_loop = SpeedLoop(registers, self.wheel.friction)
+        self._position_loop = PositionLoop(registers)
+        self._rated_ma, self._zero = parameters.rated_ma, 0
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Count from 0, without a fault."""
+        self.fault, self.clipped = Fault(0), False
+        self._counted = self._stalled_ms = 0
+        self.take_over()
+        self.zero()
+
+    def zero(self) -> None:
+        """Count from 0 on."""
+        self._zero = self.wheel.counts
+
+    def take_over(self) -> None:
+        """Take power at the speed that the wheel has."""
+        self._speed_loop.take_over(self.wheel.speed)
+        self._position_loop.begin()
+
+    def halt(self) -> None:
+        """Want standstill at once, without a ramp."""
+        self._speed_loop.reference = 0.0
+
+    @property
+    def measured(self) -> dict[str, Callable[[], int]]:
+        """What a master reads of it."""
+        return {
+            f"fault_{self.name}": lambda: int(self.fault),
+            f"position_{self.name}": lambda: self._signed(self.wheel.counts - self._zero),
+            f"speed_{self.name}": lambda: self._signed(round(self.wheel.speed * 1_000)),
+            f"current_{self.name}": lambda: self._signed(self.milliamperes),
+        }
+
+    @property
+    def torque(self) -> float:
+        """Torque of the motor, per mille of the rated one."""
+        return self._speed_loop.torque
+
+    @property
+    def milliamperes(self) -> int:
+        """Current of the motor."""
+        return round(self.torque * self._rated_ma / PER_MILLE)
+
+    @property
+    def resting(self) -> bool:
+        """Whether a step with the same target would change nothing."""
+        still = not (self._counted or self._stalled_ms) and self.wheel.held(self.torque)
+        return still and self._speed_loop.settled
+
+    def touched(self, inputs: QuantityBank) -> None:
+        """Take over what the world does to the wheel."""
+        self.wheel.load_nm = inputs[f"load_{self.name}_nm"]
+        self.wheel.jammed = bool(inputs[f"jam_{self.name}"])
+
+    def find_faults(self, inputs: QuantityBank, *, powered: bool) -> None:
+        """Look at what the electronics see."""
+        if inputs["emergency_stop"]:
+            self.fault |= Fault.EMERGENCY_STOP
+        if inputs[f"encoder_unplugged_{self.name}"]:
+            self.fault |= Fault.ENCODER
+        if powered and inputs[f"short_circuit_{self.name}"]:
+            self.fault |= Fault.OVER_CURRENT
+        if self._stalled_ms >= STALL_MS:
+            self.fault |= Fault.STALL
+
+    def drive(self, *, stop: bool) -> None:
+        """Turn for a millisecond as the registers say."""
+        wanted = 0.0 if stop else self._wanted()
+        limit = self._registers["speed_limit"] / 1e3
+        target = min(max(wanted, -limit), limit)
+        self.clipped = target != wanted
+        torque = self._speed_loop.step(target, self._counted)
+        before = self.wheel.counts
+        self.wheel.step(torque)
+        self._counted = self.wheel.counts - before
+        stalled = abs(torque) >= PER_MILLE and not self._counted
+        self._stalled_ms = self._stalled_ms + 1 if stalled else 0
+
+    def coast(self, *, shorted: bool) -> None:
+        """Turn for a millisecond without power, or with the motor shorted."""
+        self._speed_loop.take_over(0.0)
+        self._counted = self._stalled_ms = 0
+        self.clipped = False
+        if shorted:
+            self.wheel.brake()
+        else:
+            self.wheel.step(0.0)
+
+    def _wanted(self) -> float:
+        """Return the speed that a master wants, counts/ms."""
+        registers = self._registers
+        if registers["mode"] == Mode.VELOCITY:
+            return self._signed(registers[f"target_speed_{self.name}"]) / 1e3
+        goal = self._signed(registers[f"target_position_{self.name}"])
+        return self._position_loop.step(goal - (self.wheel.counts - self._zero))
+
+    def _signed(self, value: int) -> int:
+        """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""
+        value = -value if self._registers["direction"] >> self._backward_bit & 1 else value
+        return (value + INT32 // 2) % INT32 - INT32 // 2
