@@ -28,16 +28,17 @@ CRC_POLYNOMIAL: Final = 0x4599
 # bytes can be fed. Zeros in front of a stream change nothing: the seed is 0.
 _crc16 = crcmod.mkCrcFun(1 << 16 | CRC_POLYNOMIAL << 1, initCrc=0, rev=False, xorOut=0)
 
-_STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
-_EXTENDED_BITS: Final = _STANDARD_BITS + 20
-_EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
+STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
+EXTENDED_BITS: Final = STANDARD_BITS + 20
+"""Bits of an empty frame without stuff bits."""
+EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
 
 # States of the stuffing automaton: value of the latest bit << 2 | length of its
 # run - 1; a run of five is broken at once. Two more states begin a frame: they
 # skip the zeros that fill its first byte up.
-_START_STANDARD: Final = 8
-_START_EXTENDED: Final = 9
-_FILL_BITS: Final = {_START_STANDARD: 5, _START_EXTENDED: 1}
+START_STANDARD: Final = 8
+START_EXTENDED: Final = 9
+_FILL_BITS: Final = {START_STANDARD: 5, START_EXTENDED: 1}
 
 
 def frame_bits(frame: CanFrame) -> int:
@@ -47,16 +48,16 @@ def frame_bits(frame: CanFrame) -> int:
         dlc = len(data)
     control = remote << 6 | dlc
     if extended:
-        arbitration = (can_id >> 18) << 20 | _EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
+        arbitration = (can_id >> 18) << 20 | EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
         stream = (arbitration << 7 | control).to_bytes(5, "big") + data
-        bits, state = _EXTENDED_BITS + 8 * len(data), _START_EXTENDED << 8
+        bits, state = EXTENDED_BITS + 8 * len(data), START_EXTENDED << 8
     else:
         stream = (can_id << 7 | control).to_bytes(3, "big") + data
-        bits, state = _STANDARD_BITS + 8 * len(data), _START_STANDARD << 8
+        bits, state = STANDARD_BITS + 8 * len(data), START_STANDARD << 8
     for byte in stream + _checksum(stream):
         state += byte
-        bits += _STUFFED[state]
-        state = _NEXT[state]
+        bits += STUFFED[state]
+        state = NEXT[state]
     return bits
 
 
@@ -64,6 +65,12 @@ def _checksum(stream: bytes) -> bytes:
     """Return the CRC, and a bit unlike its last one: it fills the byte and is never stuffed."""
     crc: int = _crc16(stream)
     return (crc | ~crc >> 1 & 1).to_bytes(2, "big")
+
+
+def crc16(stream: bytes) -> int:
+    """Return the CRC of a bit stream, times two."""
+    crc: int = _crc16(stream)
+    return crc
 
 
 def _feed(state: int, byte: int) -> tuple[int, int]:
@@ -81,5 +88,7 @@ def _feed(state: int, byte: int) -> tuple[int, int]:
 
 
 _FED: Final = tuple(_feed(state, byte) for state in range(10) for byte in range(256))
-_NEXT: Final = tuple(state << 8 for state, _ in _FED)
-_STUFFED: Final = tuple(stuffed for _, stuffed in _FED)
+NEXT: Final = tuple(state << 8 for state, _ in _FED)
+"""By state << 8 | byte: the state after it << 8."""
+STUFFED: Final = tuple(stuffed for _, stuffed in _FED)
+"""By state << 8 | byte: how many bits are stuffed."""

@@ -1,0 +1,54 @@
+"""The gaps of all identifiers of a log, as `Gaps` counts them; needs numpy."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from tickrig.host.monitor.buckets import EXACT_US, SUB_BITS
+from tickrig.host.monitor.gaps import Gaps
+from tickrig.host.monitor.runs import Ints, Runs
+
+MANTISSA_BITS: Final = 52
+EXPONENT_BIAS: Final = 1023
+
+
+def column_gaps(runs: Runs, gaps_us: Ints) -> list[Gaps]:
+    """Return the gaps of each run.
+
+    Args:
+        runs: frames by identifier.
+        gaps_us: the gap before each row of `runs.order`.
+    """
+    wander_us = np.abs(np.diff(gaps_us, prepend=0))
+    buckets = column_buckets(gaps_us)
+    return [
+        _of_run(gaps_us[begin + 1 : end], wander_us[begin + 2 : end], buckets[begin + 1 : end])
+        for begin, end in zip(runs.begins.tolist(), runs.ends.tolist(), strict=True)
+    ]
+
+
+def _of_run(gaps_us: Ints, wander_us: Ints, buckets: npt.NDArray[np.int16]) -> Gaps:
+    gaps = Gaps()
+    if len(gaps_us):
+        gaps.count, gaps.total_us = len(gaps_us), int(gaps_us.sum())
+        gaps.min_us, gaps.max_us = int(gaps_us.min()), int(gaps_us.max())
+        gaps.wander_us = int(wander_us.sum())
+        lowest = int(buckets.min())
+        counts = np.bincount(buckets - lowest)
+        filled = np.flatnonzero(counts)
+        gaps.buckets = dict(zip((filled + lowest).tolist(), counts[filled].tolist(), strict=True))
+    return gaps
+
+
+def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
+    """Return the bucket of each time, as `bucket_of` does.
+
+    A bucket is the exponent and the first bits of the mantissa of a floating-point number: both
+    are read off its bits. Times up to 2**53 us are exact in it.
+    """
+    bits = times_us.astype(np.float64).view(np.int64) >> MANTISSA_BITS - SUB_BITS
+    wide = bits - (EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)
+    return np.where(times_us < EXACT_US, times_us, wide).astype(np.int16)

@@ -1,0 +1,115 @@
+"""Statistics of a whole log at once, the same as `Traffic` finds frame by frame; needs numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tickrig.host.monitor.column_bits import column_bits
+from tickrig.host.monitor.column_changes import column_changes
+from tickrig.host.monitor.column_gaps import column_gaps
+from tickrig.host.monitor.controller import Controller
+from tickrig.host.monitor.frame_columns import FrameColumns, Frames, frame_of
+from tickrig.host.monitor.ident import ERROR
+from tickrig.host.monitor.load import WINDOW_US, Load, Window
+from tickrig.host.monitor.runs import Ints, Runs
+from tickrig.host.monitor.tally import IdRow
+from tickrig.host.monitor.traffic import BusRow, Snapshot
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+
+def snapshot_of(columns: FrameColumns) -> Snapshot:
+    """Return what a log holds."""
+    if not len(columns.at_us):
+        return Snapshot()
+    now_us = int(columns.at_us[-1])
+    buses, rows = [], []
+    for channel, frames in sorted(by_channel(columns)):
+        bus, of_bus = _bus(channel, frames, now_us)
+        buses.append(bus)
+        rows += of_bus
+    return Snapshot(now_us, tuple(buses), tuple(rows))
+
+
+def by_channel(columns: FrameColumns) -> list[tuple[str, Frames]]:
+    """Return the frames of each bus that has any."""
+    present = np.flatnonzero(np.bincount(columns.channel)).tolist()
+    if len(present) == 1:
+        return [(columns.channels[present[0]], Frames.of(columns, slice(None)))]
+    return [
+        (columns.channels[place], Frames.of(columns, np.flatnonzero(columns.channel == place)))
+        for place in present
+    ]
+
+
+def _bus(channel: str, frames: Frames, now_us: int) -> tuple[BusRow, list[IdRow]]:
+    first_us, last_us = int(frames.at_us[0]), int(frames.at_us[-1])
+    went_back = int(np.count_nonzero(np.diff(frames.at_us) < 0))
+    errors, frames = _take_errors(frames)
+    bits = column_bits(frames.ident, frames.dlc, frames.payload)
+    load = Load(first_us)
+    for window in windows_of(first_us, frames.at_us, bits):
+        load.take(*window)
+    row = BusRow(
+        channel,
+        len(frames.at_us),
+        first_us,
+        last_us,
+        load.row(now_us),
+        errors.row(),
+        went_back,
+    )
+    return row, _id_rows(channel, frames, bits)
+
+
+def _take_errors(frames: Frames) -> tuple[Controller, Frames]:
+    errors = Controller()
+    is_error = frames.ident & ERROR != 0
+    if not is_error.any():
+        return errors, frames
+    for row in np.flatnonzero(is_error):
+        frame = frames.heard(row).frame
+        assert isinstance(frame, ErrorFrame)
+        errors.take(frame)
+    return errors, Frames.of(frames, np.flatnonzero(~is_error))
+
+
+def windows_of(first_us: int, at_us: Ints, bits: Ints) -> list[Window]:
+    """Return the seconds that have frames, with their bits, as `Load` opens them."""
+    if not len(at_us):
+        return []
+    seconds = np.maximum.accumulate(np.maximum(at_us - first_us, 0) // WINDOW_US)
+    begins = np.flatnonzero(np.diff(seconds, prepend=-1))
+    sums = np.add.reduceat(bits, begins)
+    starts = seconds[begins] * WINDOW_US + first_us
+    return [Window(*window) for window in zip(starts.tolist(), sums.tolist(), strict=True)]
+
+
+def _id_rows(channel: str, frames: Frames, bits: Ints) -> list[IdRow]:
+    if not len(frames.at_us):
+        return []
+    runs = Runs.of(frames.ident)
+    gaps_us = runs.gaps_us(frames.at_us)
+    changes = column_changes(runs, frames.payload)
+    run_bits = runs.sums(bits[runs.order]).tolist()
+    rows = []
+    for run, gaps in enumerate(column_gaps(runs, gaps_us)):
+        first, last = runs.order[runs.begins[run]], runs.order[runs.ends[run] - 1]
+        ident = int(runs.idents[run])
+        frame = frame_of(ident, int(frames.dlc[last]), int(frames.payload[last]))
+        assert isinstance(frame, CanFrame)
+        rows.append(
+            IdRow(
+                channel,
+                ident,
+                gaps.count + 1,
+                int(frames.at_us[first]),
+                int(frames.at_us[last]),
+                frame,
+                int(gaps_us[runs.ends[run] - 1]) if gaps.count else None,
+                gaps.row(),
+                run_bits[run],
+                changes[run],
+            )
+        )
+    return rows
