@@ -52,6 +52,8 @@ class CommunicationProfile:
         product_code: 1018h:02; the vendor-ID is 0, which is nobody's.
         rpdos: from 1400h on.
         tpdos: from 1800h on.
+        revision: 1018h:03.
+        heartbeat_ms: 1017h.
     """
 
     device_type: int
@@ -61,13 +63,15 @@ class CommunicationProfile:
     product_code: int
     rpdos: Sequence[Pdo]
     tpdos: Sequence[Pdo]
+    revision: int = 0x1_0000
+    heartbeat_ms: int = 0
 
 
 def add_communication(objects: Objects, profile: CommunicationProfile) -> None:
     """Add the objects of CiA 301: errors, heartbeat, SYNC, TIME, store, SDO server, PDOs."""
     _add_identity(objects, profile)
     _add_errors(objects)
-    _add_supervision(objects)
+    _add_supervision(objects, profile)
     for number, pdo in enumerate(profile.rpdos):
         _add_pdo(objects, "RPDO", 0x1400 + number, pdo, _rpdo_timing(pdo))
     for number, pdo in enumerate(profile.tpdos):
@@ -82,7 +86,7 @@ def _add_identity(objects: Objects, profile: CommunicationProfile) -> None:
     identity = (
         ("Vendor-ID", 0),
         ("Product code", profile.product_code),
-        ("Revision number", 0x1_0000),
+        ("Revision number", profile.revision),
         ("Serial number", 1),
     )
     rows = [Element(sub, name, U32, RO, value) for sub, (name, value) in enumerate(identity, 1)]
@@ -98,7 +102,7 @@ def _add_errors(objects: Objects) -> None:
     objects.array(0x1029, "Error behaviour", 1, U8, RW)
 
 
-def _add_supervision(objects: Objects) -> None:
+def _add_supervision(objects: Objects, profile: CommunicationProfile) -> None:
     objects.variable(0x1005, "COB-ID SYNC", U32, RW, 0x80)
     objects.variable(0x1006, "Communication cycle period", U32, RW)
     objects.variable(0x1007, "Synchronous window length", U32, RW)
@@ -107,7 +111,7 @@ def _add_supervision(objects: Objects) -> None:
     objects.variable(0x100C, "Guard time", U16, RW)
     objects.variable(0x100D, "Life time factor", U8, RW)
     objects.array(0x1016, "Consumer heartbeat time", CONSUMERS, U32, RW)
-    objects.variable(0x1017, "Producer heartbeat time", U16, RW)
+    objects.variable(0x1017, "Producer heartbeat time", U16, RW, profile.heartbeat_ms)
     rows = [
         Element(1, "COB-ID client to server", U32, RO, 0x600, relative=True),
         Element(2, "COB-ID server to client", U32, RO, 0x580, relative=True),

@@ -14,7 +14,7 @@ from tickrig.device.rtc_lite.life_cycle import LifeCycle
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
 from tickrig.device.rtc_lite.server import Server
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
-from tickrig.device.rtc_lite.timer import Timer
+from tickrig.device.timer import Timer
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame, fault_frame

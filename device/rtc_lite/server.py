@@ -8,7 +8,7 @@ from typing import Any, Final
 from tickrig.device.rtc_lite.config import RATE_HZ
 from tickrig.device.rtc_lite.life_cycle import LifeCycle
 from tickrig.device.rtc_lite.ports import Port
-from tickrig.device.rtc_lite.timer import Timer
+from tickrig.device.timer import Timer
 from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
 from tickrig.wire.rtc_lite.frame import Frame
 from tickrig.wire.rtc_lite.layout import WITH_FIELDS

@@ -16,6 +16,7 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.profiles import AUTO, application_of
+from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.host.cli.refused import Refused, refuse_path
 
@@ -69,16 +70,25 @@ def make_nodes(
         description = item.description
         dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
-        slave = make_slave(dictionary, item.node_id, memory, description.application)
+        slave = make_slave(
+            dictionary, item.node_id, memory, description.application, description.nmt
+        )
         nodes.append(Node(item.name, slave, wire))
     return nodes
 
 
 def _describe(cache: EdsCache, device: Path | str, profile: str) -> DeviceDescription:
     if isinstance(device, str):
-        return MODELS[device].describe()
+        return MODELS[device].describe() if device in MODELS else _component(device)
     description = _read(cache, device)
     return replace(description, application=application_of(description.template, profile))
+
+
+def _component(spec: str) -> DeviceDescription:
+    try:
+        return describe_rtc(spec)
+    except ValueError as error:
+        raise Refused(str(error)) from None
 
 
 def _read(cache: EdsCache, file: Path) -> DeviceDescription:

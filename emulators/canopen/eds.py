@@ -12,7 +12,12 @@ from tickrig.device.canopen.dictionary import Dictionary, ObjectInfo
 from tickrig.device.canopen.entry import MAX_VARIABLE_BYTES, Access, Entry
 from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
 from tickrig.emulators.canopen.eds_file import EdsFile
-from tickrig.emulators.canopen.eds_objects import Kinds, import_objects, object_kinds
+from tickrig.emulators.canopen.eds_objects import (
+    Kinds,
+    import_objects,
+    is_visible_char,
+    object_kinds,
+)
 from tickrig.emulators.canopen.eds_value import parse_limit, parse_value
 from tickrig.emulators.canopen.predefined import COUNTS, predefined
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -150,6 +155,8 @@ def _hexadecimal(file: EdsFile, section: str, text: str) -> bytes:
 
 
 def _data_type(file: EdsFile, section: str, variable: ODVariable) -> DataType:
+    if is_visible_char(file, section):
+        return DataType.VISIBLE_CHAR
     try:
         return DataType(variable.data_type or 0)
     except ValueError as error:

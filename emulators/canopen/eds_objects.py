@@ -64,6 +64,12 @@ def import_objects(file: EdsFile, kinds: Kinds) -> ObjectDictionary:
     return found
 
 
+def is_visible_char(file: EdsFile, section: str) -> bool:
+    """Say whether 00A0h is the data type of RTC-CANopen here, not one that the file derives."""
+    kind = file.number(section, "DataType")
+    return kind == DataType.VISIBLE_CHAR and f"{kind:X}sub1" not in file.sections
+
+
 def _check(file: EdsFile, kinds: Kinds) -> None:
     """Refuse what the library refuses without naming the section."""
     heads = {index for _, index, sub in file.objects() if sub is None}
@@ -87,6 +93,8 @@ def _text(file: EdsFile, kinds: Kinds) -> str:
                 keys["ObjectType"] = str(int(kinds[index]))
             if file.number(section, "ObjectType") == ObjectCode.DOMAIN:
                 keys["DataType"] = str(int(DataType.DOMAIN))
+            elif is_visible_char(file, section):
+                keys["DataType"] = str(int(DataType.VISIBLE_STRING))
             lines += _section(section, keys)
     for section, keys in file.sections.items():
         if _DERIVED_TYPE.fullmatch(section):

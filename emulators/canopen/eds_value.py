@@ -10,7 +10,7 @@ from tickrig.wire.canopen.datatypes import DataType, Value
 
 NODE_ID: Final = "$NODEID"
 
-TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
 FLOATS: Final = {DataType.REAL32: "f", DataType.REAL64: "d"}
 TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)

@@ -6,8 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.device.canopen.device_rtc.make import application_of
+from tickrig.device.canopen.device_rtc.nmt import RtcNmt
+from tickrig.device.canopen.device_rtc.objects import dictionary_of
+from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
+from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
 from tickrig.emulators.canopen.eds import BIT_RATES_KBIT
@@ -27,6 +32,7 @@ class Model:
         node_id: its node-ID unless told otherwise.
         dictionary: makes the objects with default values.
         application: what it does with them.
+        nmt: how it follows the NMT master.
     """
 
     name: str
@@ -34,6 +40,7 @@ class Model:
     node_id: int
     dictionary: Callable[[], Dictionary]
     application: ServiceMaker
+    nmt: ServiceMaker = NmtSlave
 
     def describe(self) -> DeviceDescription:
         """Return what an EDS would say, and what none can."""
@@ -44,6 +51,7 @@ class Model:
             template,
             self.node_id,
             application=self.application,
+            nmt=self.nmt,
         )
 
 
@@ -68,6 +76,14 @@ _MODELS: Final = (
         epos.NODE_ID,
         epos.dictionary,
         epos.make,
+    ),
+    Model(
+        "rtc-echo",
+        "DeviceRTC whose out-port says what its in-port heard, both Long",
+        48,
+        lambda: dictionary_of(Echo.profile()),
+        application_of(Echo),
+        RtcNmt,
     ),
 )
 

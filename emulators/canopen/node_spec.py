@@ -10,6 +10,7 @@ from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.user_file import SUFFIX
 from tickrig.host.cli.refused import Refused
 
 LSS: Final = "lss"
@@ -23,7 +24,7 @@ class NodeSpec:
     """One node.
 
     Attributes:
-        device: its EDS or DCF, or the name of a model.
+        device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
         profile: of `profiles.CHOICES`, None for what holds for all nodes.
     """
@@ -34,9 +35,9 @@ class NodeSpec:
 
 
 def parse_node(text: str) -> Iterator[NodeSpec]:
-    """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `lss=a.eds` or `a.dcf`; Refused if it is none.
+    """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
 
-    A name is that of a model, unless there is such a file.
+    Refused if it is none of them. A name is that of a model, unless there is such a file.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]
@@ -65,5 +66,7 @@ def parse_ids(what: str, text: str) -> Iterable[int]:
 
 
 def _device(name: str) -> Path | str:
+    if f"{SUFFIX}:" in name:
+        return name
     file = Path(name)
     return name if name in MODELS and not file.exists() else file

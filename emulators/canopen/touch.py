@@ -22,7 +22,7 @@ REAL32_MAX: Final = 3.4028234663852886e38
 REAL64_MAX: Final = 1.7976931348623157e308
 
 _NAME: Final = re.compile(r"0x([0-9A-Fa-f]{4})(?::([0-9]{1,3}|0x[0-9A-Fa-f]{1,2}))?")
-_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 
 
 class Touch(Protocol):

@@ -41,6 +41,8 @@ class DataType(IntEnum):
     UNSIGNED48 = 0x19
     UNSIGNED56 = 0x1A
     UNSIGNED64 = 0x1B
+    VISIBLE_CHAR = 0xA0
+    """One character; not of CiA 301, but of Table 4 of RTC-CANopen (NEDO report, 3.4.43.3)."""
 
     @property
     def bits(self) -> int:
@@ -104,10 +106,15 @@ _OTHER: Final = {
     DataType.REAL64: 64,
     DataType.TIME_OF_DAY: 48,
     DataType.TIME_DIFFERENCE: 48,
+    DataType.VISIBLE_CHAR: 8,
 }
 _BITS: Final = {**_SIGNED, **_UNSIGNED, **_OTHER}
 _FLOATS: Final = {DataType.REAL32: "<f", DataType.REAL64: "<d"}
-_TEXTS: Final = {DataType.VISIBLE_STRING: "latin-1", DataType.UNICODE_STRING: "utf-16-le"}
+_TEXTS: Final = {
+    DataType.VISIBLE_STRING: "latin-1",
+    DataType.UNICODE_STRING: "utf-16-le",
+    DataType.VISIBLE_CHAR: "latin-1",
+}
 
 
 def _float_decoder(layout: str) -> Callable[[bytes], float]:
@@ -121,6 +128,7 @@ def _float_decoder(layout: str) -> Callable[[bytes], float]:
 _DECODE: Final[dict[DataType, Callable[[bytes], Value]]] = {
     **{kind: _float_decoder(layout) for kind, layout in _FLOATS.items()},
     DataType.VISIBLE_STRING: lambda data: data.decode("latin-1"),
+    DataType.VISIBLE_CHAR: lambda data: data.decode("latin-1"),
     DataType.UNICODE_STRING: lambda data: data.decode("utf-16-le", "replace"),
 }
 
@@ -135,7 +143,7 @@ def _encode(kind: DataType, value: Value) -> bytes:
     if kind in _FLOATS:
         return struct.pack(_FLOATS[kind], value)
     if isinstance(value, str):
-        return value.encode(_TEXTS.get(kind, "ascii"))
+        value = value.encode(_TEXTS.get(kind, "ascii"))
     if not isinstance(value, bytes) or (kind.size and len(value) != kind.size):
         raise TypeError
     return value

@@ -1,4 +1,4 @@
-"""The timer of the device as execution context (type 22h)."""
+"""A timer of a device as execution context: RTC-Lite type 22h, DeviceRTC."""
 
 from __future__ import annotations
 

@@ -1,0 +1,88 @@
+"""DeviceRTC: a component at work in a CANopen slave."""
+
+from __future__ import annotations
+
+from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
+from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
+from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.pdo_producer import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.timer import Timer
+from tickrig.wire.canopen.nmt import NmtState
+
+
+class DeviceRtc(Application):
+    """Runs a component with the NMT state of its node (NEDO report, 3.4.43.3, Fig. 110).
+
+    Callbacks take no time. What the state does at the component's rate begins one
+    period after the state was entered.
+
+    Not emulated: service ports, configuration sets, several components on one node.
+
+    Args:
+        node: the slave; its dictionary is that of the component.
+        slot: its place in the order of a tick.
+        kind: the component.
+
+    Attributes:
+        life: the life cycle, with the component.
+
+    Raises:
+        ValueError: physical inputs that cannot be.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int, kind: type[Component]) -> None:
+        super().__init__(node, slot)
+        self._kind, self._places = kind, kind.profile().placed()
+        self.has_inputs(inputs_of(kind))
+        self.life = LifeCycle(node, self._make)
+        self.outputs = outputs_of(self.life.component)
+        self._timer = Timer(kind.rate_hz)
+        node.on_state.append(self._moved)
+
+    def read(self, name: str) -> float | str:
+        """Return the present value of a physical output."""
+        return text_of(self.life, name)
+
+    def power_on(self) -> None:
+        """Begin with a new component."""
+        self.life.create()
+
+    def start(self) -> None:
+        """Do nothing until the node has booted."""
+        self._timer.stop()
+
+    def on_execute(self, now_us: int) -> None:
+        """Run what the state of the component does, if a period has ended."""
+        if self.inputs[SHUT_DOWN]:
+            self.life.finalize()
+        if self._timer.elapsed(now_us):
+            self.life.run()
+        self.schedule(self._timer.due_us)
+
+    def _moved(self, old: NmtState, new: NmtState) -> None:
+        """Let the new state count its periods from now on, then run the callbacks."""
+        self._timer.stop()
+        if self.life.activity:
+            self._timer.start(self.node.now_us)
+        self.request()
+        self.life.moved(old, new)
+
+    def _make(self) -> Component:
+        """Make a component and join it to the dictionary."""
+        component = self._kind()
+        component.inputs = self.inputs
+        for place in self._places:
+            entries = [self.node.dictionary[place.index, sub] for sub in place.subs]
+            port = component.ports[place.profile.name]
+            if isinstance(port, InPort):
+                port.join(entries)
+            elif isinstance(port, OutPort):
+                port.join(entries, self._event)
+        return component
+
+    def _event(self, entry: Entry) -> None:
+        PdoProducer.of(self.node).request_for(entry)

@@ -1,0 +1,35 @@
+"""Slaves that are DeviceRTCs."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.device import DeviceRtc
+from tickrig.device.canopen.device_rtc.nmt import RtcNmt
+from tickrig.device.canopen.device_rtc.objects import dictionary_of
+from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.stack import make_slave
+
+
+def application_of(kind: type[Component]) -> ServiceMaker:
+    """Return what makes the application of a component; it wants `RtcNmt` as NMT slave."""
+    return partial(DeviceRtc, kind=kind)
+
+
+def make_device_rtc(
+    kind: type[Component], node_id: int, nonvolatile: Nonvolatile | None = None
+) -> CanopenSlave:
+    """Make a slave that is a DeviceRTC.
+
+    Args:
+        kind: the component.
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life.
+
+    Raises:
+        ValueError: a component or a node-ID that cannot be.
+    """
+    dictionary = dictionary_of(kind.profile())
+    return make_slave(dictionary, node_id, nonvolatile, application_of(kind), RtcNmt)

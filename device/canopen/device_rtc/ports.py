@@ -1,0 +1,82 @@
+"""Data ports of a DeviceRTC: a value in the dictionary, carried by a PDO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
+
+from tickrig.device.canopen.entry import Entry
+from tickrig.wire.rtc_canopen.port_types import PortType
+from tickrig.wire.rtc_canopen.profile import Direction, PortProfile
+
+T = TypeVar("T")
+
+
+class Port(Generic[T]):
+    """What both kinds of ports have.
+
+    Args:
+        name: a letter, then up to 31 letters, digits and underscores.
+        port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
+    """
+
+    direction: Direction
+
+    def __init__(self, name: str, port_type: PortType[T]) -> None:
+        self.name, self.port_type = name, port_type
+        self.entries: Sequence[Entry] = ()
+
+    @property
+    def profile(self) -> PortProfile:
+        """The port as the profile of its component has it."""
+        return PortProfile(self.name, self.direction, self.port_type)
+
+    @property
+    def value(self) -> T:
+        """The present value."""
+        return self.port_type.decode([entry.data for entry in self.entries])
+
+
+class InPort(Port[T]):
+    """Where the bus writes, by RPDO or SDO, and the component reads.
+
+    Attributes:
+        is_new: whether the bus has written since it was read, also the same value.
+    """
+
+    direction = Direction.IN
+    is_new = False
+
+    def join(self, entries: Sequence[Entry]) -> None:
+        """Take its value from these objects."""
+        self.entries = entries
+        for entry in entries:
+            entry.written = self._mark
+
+    def read(self) -> T:
+        """Return the present value; it is not new any more."""
+        self.is_new = False
+        return self.value
+
+    def _mark(self) -> None:
+        self.is_new = True
+
+
+class OutPort(Port[T]):
+    """Where the component writes; its TPDO goes out once in a tick with a write."""
+
+    direction = Direction.OUT
+
+    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
+        """Leave its value in these objects; `event` sends those PDOs that carry one."""
+        self.entries, self._event = entries, event
+
+    def write(self, value: T) -> None:
+        """Leave a value; it is sent in Active, also if it is the same as before.
+
+        Raises:
+            ValueError: the type has no such value.
+        """
+        for entry, data in zip(self.entries, self.port_type.encode(value), strict=True):
+            entry.assign(data)
+            self._event(entry)

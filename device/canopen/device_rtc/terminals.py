@@ -1,0 +1,66 @@
+"""The physical side of a DeviceRTC: what the component declares, its ports and its state."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final
+
+from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
+from tickrig.device.physical import Input, Kind, Output
+
+SHUT_DOWN: Final = "shut_down"
+
+INPUTS: Final = (
+    Input(
+        SHUT_DOWN,
+        "button: the component ends, and the node is silent until a power cut",
+        Kind.BUTTON,
+    ),
+)
+"""Every DeviceRTC has these; a component may add its own."""
+
+OUTPUTS: Final = (
+    Output("rtc_state", "Created, Inactive, Active, Error or Finalized"),
+    Output("callback", "the callback that ran last"),
+    Output("executed", "how often on_execute ran"),
+)
+"""Every DeviceRTC has these; each port adds its value as in.NAME or out.NAME."""
+
+
+def inputs_of(kind: type[Component]) -> tuple[Input, ...]:
+    """Return the physical inputs of a component; ValueError if two have the same name."""
+    table = (*INPUTS, *kind.physical)
+    name, count = Counter(item.name for item in table).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{kind.__name__}: {count} inputs are called {name!r}")
+    return table
+
+
+def outputs_of(component: Component) -> dict[str, Output]:
+    """Return the physical outputs of a component."""
+    ports = [
+        Output(f"{port.direction.value}.{port.name}", f"value of this {port.direction.value}-port")
+        for port in component.ports.values()
+    ]
+    return {output.name: output for output in (*OUTPUTS, *ports)}
+
+
+def text_of(life: LifeCycle, name: str) -> float | str:
+    """Return the present value of an output; KeyError if there is none."""
+    match name:
+        case "rtc_state":
+            return life.state.value
+        case "callback":
+            return life.latest
+        case "executed":
+            return life.executed
+    value = life.component.ports[name.partition(".")[2]].value
+    if isinstance(value, tuple):
+        return " ".join(str(_plain(element)) for element in value)
+    return _plain(value)
+
+
+def _plain(value: float | str) -> float | str:
+    """Return a truth value as a number."""
+    return int(value) if isinstance(value, bool) else value

@@ -1,0 +1,1 @@
+"""RTC-CANopen: what a DeviceRTC and those who talk to it know alike."""

@@ -1,0 +1,179 @@
+"""The profile of a DeviceRTC, and where its ports are in the dictionary (DECISION K2, K3, K17)."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+from tickrig.wire.rtc_canopen.port_types import PortType
+
+FIRST_PORT: Final = 0x2100
+"""Index of the first port; the others follow in order of declaration."""
+
+MOST_PORTS: Final = 4
+"""In-ports, and out-ports: the pre-defined connection set has so many COB-IDs each way."""
+
+RATE_HZ: Final = range(1, 1001)
+HEARTBEAT_MS: Final = 100
+"""Producer heartbeat time of a DeviceRTC (DECISION K14)."""
+
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+_VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
+
+
+class Direction(Enum):
+    """Way of the data, seen from the device."""
+
+    IN = "in"
+    OUT = "out"
+
+
+@dataclass(frozen=True, slots=True)
+class PortProfile:
+    """A port as it is declared.
+
+    Attributes:
+        name: a letter, then up to 31 letters, digits and underscores.
+        direction: in-port or out-port.
+        port_type: type of its values.
+    """
+
+    name: str
+    direction: Direction
+    port_type: PortType[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedPort:
+    """A port with its objects and its PDO.
+
+    Attributes:
+        profile: the port.
+        index: of its object.
+        number: of its RPDO or TPDO, 1..4.
+    """
+
+    profile: PortProfile
+    index: int
+    number: int
+
+    @property
+    def cob_id(self) -> int:
+        """CAN-ID without the node-ID: of RPDO n for an in-port, of TPDO n for an out-port."""
+        first = 0x200 if self.profile.direction is Direction.IN else 0x180
+        return first + 0x100 * (self.number - 1)
+
+    @property
+    def subs(self) -> tuple[int, ...]:
+        """Sub-indices of its elements: 0 of a variable, 1 and up of an array."""
+        length = self.profile.port_type.length
+        return (0,) if length == 1 else tuple(range(1, length + 1))
+
+    @property
+    def mapping(self) -> tuple[int, ...]:
+        """What its PDO carries, as the mapping parameter says it."""
+        bits = 8 * self.profile.port_type.data_type.size
+        return tuple(MappedObject(self.index, sub, bits).encode() for sub in self.subs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RtcProfile:
+    """What a component says of itself.
+
+    Attributes:
+        type_name: as a name of a port; 1008h.
+        version: as 1.0 or 1.0.2; 100Ah, and the revision number 1018h:03.
+        vendor: who made it, for the EDS.
+        category: what it is, for people.
+        rate_hz: how often `on_execute` runs, 1..1000 Hz.
+        product_code: 1018h:02; unless given, the CRC-32 of the type name.
+        ports: in order of declaration.
+
+    Raises:
+        ValueError: one line that says what came and what is allowed.
+    """
+
+    type_name: str
+    version: str = "1.0"
+    vendor: str = ""
+    category: str = ""
+    rate_hz: int = 100
+    product_code: int = 0
+    ports: tuple[PortProfile, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check all of it (DECISION K17)."""
+        _check_name("type_name", self.type_name)
+        if not _VERSION.fullmatch(self.version):
+            raise ValueError(f"version {self.version!r} is not like 1.0 or 1.0.2")
+        for what, text in (("vendor", self.vendor), ("category", self.category)):
+            if not _fits_a_line(text):
+                raise ValueError(f"{what} {text!r} is not one line of ASCII")
+        if self.rate_hz not in RATE_HZ:
+            raise ValueError(f"rate_hz {self.rate_hz} is not in 1..{RATE_HZ[-1]}")
+        if not 0 <= self.product_code <= 0xFFFF_FFFF:
+            raise ValueError(f"product_code {self.product_code} is not in 0..0xFFFFFFFF")
+        _check_ports(self.ports)
+
+    @property
+    def code(self) -> int:
+        """Product code, 1018h:02."""
+        return self.product_code or zlib.crc32(self.type_name.encode())
+
+    @property
+    def revision(self) -> int:
+        """Revision number, 1018h:03: major and minor version in 16 bits each."""
+        major, minor = self.version.split(".")[:2]
+        return int(major) << 16 | int(minor)
+
+    def placed(self, direction: Direction | None = None) -> tuple[PlacedPort, ...]:
+        """Return the ports with their places; those of one direction, or all."""
+        return tuple(port for port in self._place() if direction in (None, port.profile.direction))
+
+    def _place(self) -> Iterator[PlacedPort]:
+        numbers = Counter[Direction]()
+        for index, port in enumerate(self.ports, FIRST_PORT):
+            numbers[port.direction] += 1
+            yield PlacedPort(port, index, numbers[port.direction])
+
+
+def _check_ports(ports: tuple[PortProfile, ...]) -> None:
+    for name, count in Counter(port.name for port in ports).items():
+        if count > 1:
+            raise ValueError(f"{count} ports are called {name!r}")
+    for direction in Direction:
+        count = sum(port.direction is direction for port in ports)
+        if count > MOST_PORTS:
+            raise ValueError(f"{count} {direction.value}-ports; {MOST_PORTS} have a COB-ID")
+    for port in ports:
+        _check_port(port)
+
+
+def _check_port(port: PortProfile) -> None:
+    _check_name("port", port.name)
+    kind = port.port_type
+    if not kind.bits:
+        raise ValueError(f"port {port.name}: {kind.name} does not fit a PDO; use an SDO")
+    if kind.bits > MAX_PDO_BITS:
+        raise ValueError(
+            f"port {port.name}: {kind.length} x {kind.name} are {kind.bits} bits, "
+            f"a PDO has {MAX_PDO_BITS}"
+        )
+
+
+def _check_name(what: str, name: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise ValueError(
+            f"{what} {name!r} is not a letter and up to 31 letters, digits and underscores"
+        )
+
+
+def _fits_a_line(text: str) -> bool:
+    """Say whether an EDS, C and YAML hold a text as it is."""
+    return text.isascii() and text.isprintable() and text == text.strip() and ";" not in text
