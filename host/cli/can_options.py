@@ -15,7 +15,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from tickrig.host.cli.options import Decorator, add_options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.setting import parse_setting
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
         The bus, its interface and its channel.
 
     Raises:
-        Refused: none is named, or it cannot be opened.
+        Refused: none is named; BusUnavailable: it cannot be opened.
     """
     import can  # noqa: PLC0415 - slow
     from can.util import load_config  # noqa: PLC0415
@@ -149,7 +149,7 @@ def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
         bus = can.Bus(**{"single_handle": True, **given})
     except Exception as error:  # its drivers raise whatever they come across, NameError even
         name = interface if channel is None else f"{interface} {channel}"
-        raise Refused(f"CAN bus {name}: {_reason(error)}") from None
+        raise BusUnavailable(f"CAN bus {name}: {_reason(error)}") from None
     return bus, interface, channel
 
 

@@ -13,6 +13,10 @@ class Refused(click.ClickException):
     exit_code = 2
 
 
+class BusUnavailable(Refused):
+    """A bus that is named well and cannot be opened."""
+
+
 def refuse_path(what: str, error: OSError) -> NoReturn:
     """Say that a path cannot be used, and why."""
     raise Refused(f"{what} {error.filename2 or error.filename}: {error.strerror}") from error

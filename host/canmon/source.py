@@ -1,0 +1,104 @@
+"""Where frames come from: buses, log files or standard input, under one face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from tickrig.host.canmon.file_source import FileSource
+from tickrig.host.canmon.source_word import BusWord, FileWord, parse_source
+from tickrig.host.canmon.stdin_source import StdinSource
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.heard import Heard
+
+SOURCE_HELP = """\b
+SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
+         can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
+         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
+         run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
+         -                         standard input: candump -L, or canmon dump --jsonl"""
+"""For the help text of a verb that takes SOURCE words."""
+
+
+class Source(Protocol):
+    """Frames as they come in.
+
+    Attributes:
+        live: it goes on by itself; False where all of it is there already.
+    """
+
+    live: bool
+
+    @property
+    def ended(self) -> bool:
+        """Say that no more will come."""
+        ...
+
+    @property
+    def lost(self) -> int:
+        """Frames that were there and did not get here, as far as anybody told."""
+        ...
+
+    @property
+    def failed(self) -> str:
+        """Why it ended before its time; empty if it did not."""
+        ...
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Wait for a first frame, then return all that are there; none if none came."""
+        ...
+
+    def words(self) -> list[str]:
+        """Say what was no frame or got lost, one line each."""
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds; closing twice is no error."""
+        ...
+
+
+def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:
+    """Open what SOURCE words name: one or more buses, or files, or standard input.
+
+    Files are merged by time; buses are read as frames come in.
+
+    Args:
+        words: SOURCE words; without any the options name a bus.
+        options: interface, bit rate and such of the buses.
+
+    Raises:
+        Refused: words that name nothing, or things that do not go together.
+        SourceFailed: a bus or file that cannot be opened.
+    """
+    options = options or BusOptions()
+    if not words and not options:
+        raise Refused(
+            "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
+        )
+    parsed = [parse_source(word) for word in words]
+    files = [word for word in parsed if isinstance(word, FileWord)]
+    buses = [word for word in parsed if isinstance(word, BusWord)]
+    if parsed == [None]:
+        return StdinSource()
+    if len(files) == len(parsed) > 0:
+        return FileSource(files)
+    if len(buses) < len(parsed):
+        raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
+    from tickrig.host.canmon.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only
+
+    return open_buses(buses or [BusWord()], options)
+
+
+def is_log(word: str) -> bool:
+    """Say whether a SOURCE word names a log file."""
+    return isinstance(parse_source(word), FileWord)
+
+
+def log_path(word: str) -> Path:
+    """Return the log file that a word names; Refused if it names none."""
+    parsed = parse_source(word)
+    if not isinstance(parsed, FileWord):
+        raise Refused(f"{word!r} is no log file")
+    return parsed.path

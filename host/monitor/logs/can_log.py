@@ -1,0 +1,104 @@
+"""Log files that python-can reads: ASC, BLF, TRC, CSV and, with asammdf, MF4.
+
+Its readers of text end at the first line that they do not understand, and pass
+over others in silence. Here the lines are watched: such a line is counted, and
+reading goes on behind it.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import can
+from can.io.blf import BLFParseError
+
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.can_heard import to_heard
+from tickrig.host.monitor.logs.log_format import LogFormat
+from tickrig.host.monitor.logs.log_reader import LogError, open_log
+from tickrig.host.monitor.logs.tally import BadLines, Tally
+from tickrig.host.monitor.logs.watched_lines import WatchedLines
+
+UNNAMED: Final = "can0"
+"""What a bus without a name or number is called."""
+
+BROKEN: Final = (
+    *(ValueError, LookupError, TypeError, ArithmeticError, EOFError, NotImplementedError),
+    *(struct.error, zlib.error, BLFParseError, can.CanError),
+)
+"""What python-can's readers raise in files that they do not understand."""
+
+OTHER_OBJECTS: Final = "objects that are no frames"
+
+_TEXT: Final[dict[LogFormat, Any]] = {
+    LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),
+    LogFormat.TRC: can.TRCReader,
+    LogFormat.CSV: can.CSVReader,
+}
+
+
+class CanLogReader:
+    """A reader of a log that python-can understands."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self._kind, self.tally = path, kind, Tally()
+
+    @property
+    def bad_lines(self) -> BadLines:
+        """Lines that are none of the log, so far."""
+        return self.tally.bad_lines
+
+    def __iter__(self) -> Iterator[Heard]:
+        """Read the file."""
+        self.tally = Tally()
+        for message in self._messages():
+            heard = to_heard(message, channel_name(message.channel), self.tally)
+            if heard is not None:
+                yield heard
+
+    def _messages(self) -> Iterator[can.Message]:
+        with open_log(self._path) as file:
+            try:
+                if self._kind in _TEXT:
+                    yield from self._text(WatchedLines(_decoded(file), self._kind, self.tally))
+                elif self._kind is LogFormat.BLF:
+                    yield from self._blf(can.BLFReader(file))
+                else:
+                    yield from can.MF4Reader(file)
+            except BROKEN as error:
+                reason = " ".join(str(error).split()) or type(error).__name__
+                raise LogError(f"{self._path} is no {self._kind} log: {reason}") from error
+
+    def _text(self, lines: WatchedLines) -> Iterator[can.Message]:
+        reader = _TEXT[self._kind](lines)
+        while not lines.ended:
+            try:
+                for message in reader:
+                    lines.taken()
+                    yield message
+            except BROKEN as error:
+                lines.refused(error)
+
+    def _blf(self, reader: can.BLFReader) -> Iterator[can.Message]:
+        count = 0
+        for count, message in enumerate(reader, 1):  # noqa: B007 - counted
+            yield message
+        if reader.object_count > count:
+            self.tally.passed_over[OTHER_OBJECTS] += reader.object_count - count
+
+
+def channel_name(channel: object) -> str:
+    """Return the name of a bus; some formats have numbers alone."""
+    name = "_".join(str(channel).split())
+    if channel is None or not name:
+        return UNNAMED
+    return f"can{name}" if name.isdecimal() else name
+
+
+def _decoded(file: Any) -> io.TextIOWrapper:
+    return io.TextIOWrapper(file, "utf-8", errors="replace")

@@ -1,0 +1,62 @@
+"""What a log holds beside frames: counted, so that nothing is lost in silence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Final
+
+KEPT: Final = 5
+"""Bad lines that are kept; the others are counted."""
+
+SHOWN: Final = 60
+"""Characters of a bad line that are shown."""
+
+
+@dataclass(slots=True)
+class BadLines:
+    """Lines that are none of their log.
+
+    Attributes:
+        count: how many.
+        first: number and text of the first few.
+    """
+
+    count: int = 0
+    first: list[tuple[int, str]] = field(default_factory=list)
+
+    def add(self, number: int, line: str) -> None:
+        """Count a line."""
+        self.count += 1
+        if len(self.first) < KEPT:
+            self.first.append((number, line))
+
+    def words(self, name: str) -> list[str]:
+        """Say it to people, one line each; nothing if there are none."""
+        said = [
+            f"{name}: line {number} is no frame: {line!r:.{SHOWN}}" for number, line in self.first
+        ]
+        if self.count > len(self.first):
+            said.append(f"{name}: {self.count} lines are no frames; the first {KEPT} are shown")
+        return said
+
+
+@dataclass(slots=True)
+class Tally:
+    """What was not returned as a frame.
+
+    Attributes:
+        bad_lines: lines that are none of the log.
+        passed_over: kinds of frames that classic CAN does not have, and how many.
+        lost: frames that the recorder says it lost.
+    """
+
+    bad_lines: BadLines = field(default_factory=BadLines)
+    passed_over: Counter[str] = field(default_factory=Counter)
+    lost: int = 0
+
+    def words(self, name: str) -> list[str]:
+        """Say it to people, one line each; nothing if all was returned."""
+        said = self.bad_lines.words(name)
+        said += [f"{name}: {count} {what} passed over" for what, count in self.passed_over.items()]
+        return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])

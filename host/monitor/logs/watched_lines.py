@@ -1,0 +1,65 @@
+"""Lines of a text file that somebody else reads: which of them came to nothing."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterator
+from typing import Final, TextIO
+
+from tickrig.host.monitor.logs.log_format import LogFormat
+from tickrig.host.monitor.logs.tally import Tally
+
+OTHER_LINES: Final = "lines with other events"
+
+_EVENTS: Final = {
+    LogFormat.ASC: re.compile(r"\s*[0-9]+\.[0-9]+\s+(?!Start of measurement)\S"),
+    LogFormat.TRC: re.compile(r"\s*[0-9]+\)?\s"),
+    LogFormat.CSV: re.compile(r"\s*[0-9]"),
+}
+"""Lines that carry something: neither header nor comment."""
+
+
+class WatchedLines(Iterator[str]):
+    """A file for a reader that takes line after line.
+
+    A reader that raises may be started again: it finds an empty line first, for
+    readers take a first line as header, and then what follows the bad one.
+
+    Attributes:
+        ended: the file has no more lines.
+    """
+
+    def __init__(self, file: TextIO, kind: LogFormat, tally: Tally) -> None:
+        self._file, self._event, self._tally = file, _EVENTS[kind], tally
+        self._line, self._number, self._again, self.ended = "", 0, False, False
+
+    def __next__(self) -> str:
+        """Return the next line; the one before it came to nothing if it was not taken."""
+        if self._again:
+            self._again = False
+            return "\n"
+        if self._event.match(self._line):
+            self._tally.passed_over[OTHER_LINES] += 1
+        self._line = ""
+        try:
+            self._line = next(self._file)
+        except StopIteration:
+            self.ended = True
+            raise
+        self._number += 1
+        return self._line
+
+    def taken(self) -> None:
+        """Note that the latest line came to a frame."""
+        self._line = ""
+
+    def refused(self, error: Exception) -> None:
+        """Note that the latest line is none of the log; raise what is wrong with the file."""
+        if self.ended or isinstance(error, (EOFError, zlib.error)):
+            raise error
+        self._tally.bad_lines.add(self._number, self._line.rstrip("\r\n"))
+        self._line, self._again = "", True
+
+    def close(self) -> None:
+        """Leave the file to whom it belongs."""

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import can
+import pytest
+
+from tickrig.emulators.can_channels import CHANNELS
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig
+from tickrig.host.canmon.bus_source import BusSource
+from tickrig.host.canmon.failure import SourceFailed
+from tickrig.host.canmon.source import Source, open_source
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused
+from tickrig.host.errors import LinkClosed
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.tally import Tally
+from tickrig.wire.can import CanFrame
+
+PATIENCE_US = 10_000_000
+
+
+class Fed:
+    """A reader that gives what it was given, and then is unplugged."""
+
+    name, lost, stepped = "fed", 0, False
+
+    def __init__(self, *batches: list[Heard]) -> None:
+        self.tally, self._batches, self.closed = Tally(), iter(batches), False
+
+    def read(self, timeout_us: int, /) -> list[Heard]:
+        for batch in self._batches:
+            return batch
+        raise LinkClosed("fed: Network is down")
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def bench() -> Iterator[can.BusABC]:
+    with can.Bus(interface="virtual", channel="canmon-bench") as bus:
+        yield bus
+
+
+def wait(source: Source, done: Callable[[list[Heard]], bool]) -> list[Heard]:
+    heard: list[Heard] = []
+    deadline = time.monotonic() + PATIENCE_US / 1e6
+    while not done(heard):
+        assert time.monotonic() < deadline
+        heard += source.poll(100_000)
+    return heard
+
+
+def heard(count: int) -> list[Heard]:
+    return [Heard(number, "fed", CanFrame(number)) for number in range(count)]
+
+
+@pytest.mark.realtime
+def test_a_bus_is_named_by_interface_and_channel(bench: can.BusABC) -> None:
+    source = open_source(["virtual:canmon-bench,123:7FF"])
+    for can_id in (0x122, 0x123):
+        bench.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=b"\x01"))
+    (one,) = wait(source, bool)
+    assert (one.channel, one.frame, one.sent) == ("canmon-bench", CanFrame(0x123, b"\x01"), False)
+    source.close()
+
+
+@pytest.mark.realtime
+def test_options_name_a_bus_as_well_and_can_fd_is_counted(bench: can.BusABC) -> None:
+    source = open_source([], BusOptions(interface="virtual", channel="canmon-bench"))
+    bench.send(can.Message(arbitration_id=1, is_extended_id=False, is_fd=True, data=bytes(12)))
+    bench.send(can.Message(arbitration_id=2, is_extended_id=False))
+    wait(source, bool)
+    source.close()
+    assert source.words() == ["canmon-bench: 1 CAN FD frames passed over"]
+
+
+@pytest.mark.realtime
+def test_frames_that_nobody_fetches_are_lost_and_counted() -> None:
+    reader = Fed(heard(4), heard(4))
+    source = BusSource([reader], [None], queue_frames=5)
+    wait(source, lambda _: source.lost == 3)
+    source.close()
+    assert source.words() == ["3 frames found the queue full"]
+
+
+@pytest.mark.realtime
+def test_what_came_before_the_bus_was_unplugged_is_still_returned() -> None:
+    source = BusSource([Fed(heard(2))], [None])
+    assert len(wait(source, lambda _: source.ended)) == 2
+    assert source.failed == "fed: Network is down"
+    source.close()
+
+
+@pytest.mark.realtime
+def test_closing_twice_closes_each_bus() -> None:
+    reader = Fed()
+    source = BusSource([reader], [None])
+    source.close()
+    source.close()
+    assert reader.closed
+
+
+def test_a_rig_in_virtual_time_is_a_bus_whose_time_passes_while_it_is_polled() -> None:
+    rig = Rig()
+    with CHANNELS.offer("desk", rig, CanWire()):
+        source = open_source(["sim:desk"])
+        assert source.poll(250_000) == []
+        source.close()
+    assert rig.now_us == 250_000
+
+
+def test_a_bus_that_cannot_be_opened_fails() -> None:
+    with pytest.raises(SourceFailed, match="nowhere"):
+        open_source(["socketcan:nowhere"])
+
+
+def test_an_unknown_interface_is_refused() -> None:
+    with pytest.raises(Refused, match="'nothing' is none of python-can"):
+        open_source(["nothing:0"])
