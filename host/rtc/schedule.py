@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from tickrig.host.link import NEVER
 from tickrig.host.rtc.connector import Connector
 from tickrig.host.rtc.execution_context import ExecutionContext
 
 
+class Item(Protocol):
+    """Something that a schedule ticks beside execution contexts and connectors."""
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do; `NEVER` if that is not known."""
+        ...
+
+    def tick(self, now_us: int, /) -> None:
+        """Go on to `now_us`."""
+
+
 class Schedule:
     """Runs what is due. It has no clock: `tick` is told the time.
 
-    In one tick the execution contexts run in the order in which they were
-    added, then connectors push, then what was put off is done. In virtual time
-    `run_to` ticks; in real time somebody else waits for `due_us` and ticks.
+    In one tick other items go on first, then the execution contexts run in the
+    order in which they were added, then connectors push, then what was put off
+    is done. In virtual time `run_to` ticks; in real time somebody else waits
+    for `due_us` and ticks.
 
     Attributes:
         now_us: the time it was told last.
@@ -23,6 +36,7 @@ class Schedule:
 
     def __init__(self) -> None:
         self.now_us = 0
+        self._items: tuple[Item, ...] = ()
         self._contexts: list[ExecutionContext] = []
         self._publishing: list[Connector[Any]] = []
         self._put_off: list[Callable[[], None]] = []
@@ -34,6 +48,8 @@ class Schedule:
         due_us = min((context.due_us for context in self._contexts), default=NEVER)
         for connector in self._publishing:
             due_us = min(due_us, connector.due_us)
+        for item in self._items:
+            due_us = min(due_us, item.due_us)
         return max(due_us, self.now_us)
 
     def tick(self, now_us: int) -> None:
@@ -42,6 +58,8 @@ class Schedule:
         Who skips a `due_us` skips its periods: each execution context runs one at most.
         """
         self.now_us, self._ticking = now_us, True
+        for item in self._items:
+            item.tick(now_us)
         for context in self._contexts:
             context.tick(now_us)
         for connector in self._publishing:
@@ -78,6 +96,14 @@ class Schedule:
     def drop_context(self, context: ExecutionContext) -> None:
         """Run an execution context no more."""
         self._contexts.remove(context)
+
+    def run_item(self, item: Item) -> None:
+        """Tick something else, too, from now on."""
+        self._items += (item,)
+
+    def drop_item(self, item: Item) -> None:
+        """Tick it no more."""
+        self._items = tuple(other for other in self._items if other is not item)
 
     def run_connector(self, connector: Connector[Any]) -> None:
         """Let a connector push from now on, if it pushes later than it is written to."""

@@ -57,7 +57,7 @@ def _polled(data: bytes | bytearray) -> int:
     return 1
 
 
-_WITH_STATE: Final = (
+WITH_STATE: Final = (
     *(Command.INITIALIZE, Command.STATE, Command.FINALIZE),
     *(Command.ACTIVATE, Command.DEACTIVATE, Command.EXECUTE, Command.ABORT),
     *(Command.ERROR, Command.RESET, Command.STARTUP, Command.SHUTDOWN),
@@ -66,7 +66,7 @@ _WITH_STATE: Final = (
 
 REQUESTS: Final[Mapping[Command, Layout]] = MappingProxyType(
     {
-        **dict.fromkeys((*_WITH_STATE, Command.PROFILE, Command.CONTEXT), _fixed(0)),
+        **dict.fromkeys((*WITH_STATE, Command.PROFILE, Command.CONTEXT), _fixed(0)),
         Command.PING: _fixed(1),
         Command.RATE: _fixed(2),
         Command.WRITE: _port_data,
@@ -77,7 +77,7 @@ REQUESTS: Final[Mapping[Command, Layout]] = MappingProxyType(
 
 REPLIES: Final[Mapping[Command, Layout]] = MappingProxyType(
     {
-        **dict.fromkeys((*_WITH_STATE, Command.PING, Command.CONTEXT), _reply(1)),
+        **dict.fromkeys((*WITH_STATE, Command.PING, Command.CONTEXT), _reply(1)),
         **dict.fromkeys((Command.RATE, Command.WRITE), _fixed(1)),
         **dict.fromkeys((Command.IN_PROFILE, Command.OUT_PROFILE), _counted),
         **dict.fromkeys(

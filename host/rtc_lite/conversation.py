@@ -1,0 +1,210 @@
+"""Requests, replies and PINGs between a proxy and its device, one at a time (DECISION L8)."""
+
+from __future__ import annotations
+
+import logging
+from typing import Final
+
+from tickrig.host.errors import LinkError
+from tickrig.host.link import Link
+from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.rtc_lite.watch import Watch
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, State
+from tickrig.wire.rtc_lite.decoder import Decoder
+from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
+from tickrig.wire.rtc_lite.messages import (
+    PortData,
+    PortProfile,
+    Reply,
+    parse_port_data,
+    parse_port_profile,
+    parse_reply,
+)
+
+POLL_US: Final = 1_000
+"""How often the answer to a PING is looked for."""
+
+SILENCE_US: Final = 20_000
+"""Silence after which the rest of a broken frame is not waited for."""
+
+PROFILE_US: Final = 10_000_000
+"""How long all frames of a profile may take (RTnoProxy)."""
+
+RETRIES: Final = 3
+"""For requests that may be repeated, at start-up (DECISION L13)."""
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class Conversation:
+    """What a proxy says and hears.
+
+    `ask` waits for a reply, for `reply_us` at most. A reply that does not come
+    begins a burst of PINGs, which nobody waits for: `tick` goes on with it.
+    While it lasts, and after a device was lost, nothing else is sent. As the
+    device answers in order, an answered PING also means that no late reply is
+    on its way.
+
+    Args:
+        link: the line to the device.
+        settings: how long to wait, how to sum up.
+
+    Attributes:
+        watch: counts the PINGs.
+        state: of the device, as far as its replies tell; None if nobody knows.
+        pushed: data of out-ports, not yet taken.
+        in_ports: in-ports that the device has described.
+        out_ports: out-ports that it has described.
+    """
+
+    def __init__(self, link: Link[bytes], settings: Settings) -> None:
+        self._link, self._settings = link, settings
+        self._decoder = Decoder(REPLIES, settings.checksum)
+        self.watch = Watch(settings.ping_period_us, settings.reply_us, settings.pings, link.now_us)
+        self.state: State | None = None
+        self.pushed: list[PortData] = []
+        self.in_ports: list[PortProfile] = []
+        self.out_ports: list[PortProfile] = []
+        self._reply: Reply | None = None
+        self._awaited: Command | None = None
+        self._byte_us = self._looked_us = self._deadline_us = link.now_us
+
+    @property
+    def now_us(self) -> int:
+        """Time on the clock of the link."""
+        return self._link.now_us
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do."""
+        due_us = self.watch.due_us
+        return min(due_us, self._looked_us + POLL_US) if self.watch.asked else due_us
+
+    def tick(self) -> None:
+        """Take what has arrived, and send a PING if one is due."""
+        self.poll()
+        if (number := self.watch.tick(self.now_us)) is not None:
+            self._ping(number)
+
+    def ask(self, command: Command, data: bytes = b"") -> Reply | None:
+        """Send a request and wait for its reply; None without one, or if nothing may be sent."""
+        if not self._free():
+            return None
+        reply = self._exchange(Frame(command, data))
+        if reply is None:
+            _LOG.info("no reply to %s", command.value.decode())
+            self._ping(self.watch.doubt(self.now_us))
+        return reply
+
+    def insist(self, command: Command) -> Reply | None:
+        """Send a request until it is answered, 4 times at most; a missing reply has no effect."""
+        for _ in range(1 + RETRIES):
+            if (reply := self._exchange(Frame(command))) is not None:
+                return reply
+        return None
+
+    def post(self, frame: Frame) -> None:
+        """Send a frame and wait for nothing."""
+        if self.now_us - self._byte_us >= SILENCE_US:
+            self._decoder.clear()
+        _LOG.debug("> %s", frame.body)
+        try:
+            self._link.send(frame.encode(self._settings.checksum))
+        except LinkError as error:
+            _LOG.debug("not sent: %s", error)
+
+    def poll(self) -> None:
+        """Take what has arrived."""
+        self._looked_us = self.now_us
+        self._hear(0)
+
+    def listen(self, duration_us: int) -> None:
+        """Take what arrives meanwhile."""
+        until_us = self.now_us + duration_us
+        while self.now_us < until_us and self._hear(until_us - self.now_us):
+            continue
+
+    def _free(self) -> bool:
+        """Whether a request may be sent; waits for the answer to a PING that is under way."""
+        watch = self.watch
+        while watch.pending and self.now_us < watch.due_us:
+            if not self._hear(watch.due_us - self.now_us):
+                break
+        return not (watch.asked or watch.doubted or watch.lost)
+
+    def _exchange(self, request: Frame) -> Reply | None:
+        """Send a request and wait for its reply."""
+        self.poll()  # what nobody waits for any more
+        self._awaited, self._reply = request.command, None
+        self.in_ports, self.out_ports = [], []
+        if request.command in WITH_STATE:
+            self.state = None
+        self.post(request)
+        reply = self._await_reply()
+        self._awaited = None
+        return reply
+
+    def _await_reply(self) -> Reply | None:
+        limit_us = self.now_us + PROFILE_US
+        self._deadline_us = self.now_us + self._settings.reply_us
+        while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
+            if not self._hear(self._deadline_us - self.now_us):
+                break
+        return self._reply
+
+    def _ping(self, number: int) -> None:
+        self.post(Frame(Command.PING, bytes([number])))
+
+    def _hear(self, timeout_us: int) -> bool:
+        """Wait for bytes and take them; False if the line is gone."""
+        try:
+            data = self._link.receive(timeout_us)
+        except LinkError as error:
+            _LOG.debug("not heard: %s", error)
+            return False
+        if self._decoder.lost:
+            self._decoder.clear()
+        if data:
+            self._byte_us = self.now_us
+        for found in self._decoder.push(data):
+            if isinstance(found, Frame):
+                self._take(found)
+        return True
+
+    def _take(self, frame: Frame) -> None:
+        """Note what a frame says."""
+        _LOG.debug("< %s", frame.body)
+        self.watch.heard_us = self.now_us
+        match frame.command:
+            case Command.DATA:
+                self.pushed.append(parse_port_data(frame.data))
+            case Command.IN_PROFILE | Command.OUT_PROFILE:
+                self._take_profile(frame)
+            case command if command in FAULT_COMMANDS.values():
+                if self._awaited is not None:
+                    self._reply = Reply(frame.data[0])  # no status, so nothing that is OK
+            case command:
+                self._take_reply(command, parse_reply(frame))
+
+    def _take_profile(self, frame: Frame) -> None:
+        if frame.data[0] and self._awaited is Command.PROFILE:
+            is_in = frame.command is Command.IN_PROFILE
+            ports = self.in_ports if is_in else self.out_ports
+            ports.append(parse_port_profile(frame.data))
+            self._deadline_us = self.now_us + self._settings.reply_us
+
+    def _take_reply(self, command: Command, reply: Reply) -> None:
+        if command is Command.PING and reply.ok:
+            self.watch.answered(reply.fields[0])
+        if command in WITH_STATE and reply.fields:
+            self.state = _state(reply.fields[0])
+        if command is self._awaited:
+            self._reply = reply
+
+
+def _state(code: int) -> State | None:
+    try:
+        return State(code)
+    except ValueError:
+        return None

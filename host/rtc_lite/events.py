@@ -1,0 +1,54 @@
+"""What a proxy tells beside its state."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from tickrig.host.rtc.component_action import guarded
+from tickrig.host.rtc.states import ReturnCode
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class EventKind(StrEnum):
+    """What happened."""
+
+    PASSIVE_ERROR = "PassiveError"  # the device reported an error, or one reply was lost
+    FATAL_ERROR = "FatalError"  # no answer to any PING: power cut, dead link
+    REMOVED = "Removed"  # the proxy was taken out of the system
+    REDISCOVERED = "Rediscovered"  # the device is back, with a new proxy
+
+
+@dataclass(frozen=True, slots=True)
+class ProxyEvent:
+    """Something that happened to a proxy.
+
+    Attributes:
+        at_us: when, on the clock of its link.
+        kind: what.
+        instance_name: to which proxy.
+    """
+
+    at_us: int
+    kind: EventKind
+    instance_name: str
+
+
+Listener = Callable[[ProxyEvent], None]
+"""Told of events; what it raises is logged, and nothing else comes of it."""
+
+
+def tell(listener: Listener | None, event: ProxyEvent) -> None:
+    """Log an event, and tell whoever listens."""
+    _LOG.info("%s: %s at %.3f s", event.instance_name, event.kind, event.at_us / 1e6)
+
+    def listen() -> ReturnCode:
+        if listener is not None:
+            listener(event)
+        return ReturnCode.RTC_OK
+
+    guarded(event.instance_name, listen)

@@ -1,0 +1,282 @@
+"""The proxy: an ordinary RT component to everybody else, whose work a small device does."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import ClassVar, Final
+
+from tickrig.host.errors import DeviceRefused, LinkError
+from tickrig.host.link import Link
+from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution_context import ExecutionContext
+from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc_lite.conversation import Conversation
+from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
+from tickrig.host.rtc_lite.relays import InRelay, OutRelay, in_relay, out_relay
+from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.rtc_lite.start_up import DeviceProfile, start_up
+from tickrig.wire.errors import FieldError, WireError
+from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
+from tickrig.wire.rtc_lite.messages import Reply
+
+MIRROR_US: Final = 100_000
+"""How often the state of a device is asked that executes by its own timer: each 10th tick."""
+
+MAX_RATE_HZ: Final = 0xFFFF
+
+_OK: Final = ReturnCode.RTC_OK
+_CODES: Final[dict[int, ReturnCode]] = {
+    Status.OK: ReturnCode.RTC_OK,
+    Status.WRONG_STATE: ReturnCode.PRECONDITION_NOT_MET,
+    Status.NO_IN_PORT: ReturnCode.BAD_PARAMETER,
+    Status.NO_OUT_PORT: ReturnCode.BAD_PARAMETER,
+    Status.UNSUPPORTED: ReturnCode.UNSUPPORTED,
+}
+"""What a callback returns for a status; RTC_ERROR for any other, and without a reply."""
+
+_TO_INACTIVE: Final = {
+    State.CREATED: Command.INITIALIZE,
+    State.ACTIVE: Command.ABORT,
+    State.ERROR: Command.RESET,
+}
+"""What brings a device one step nearer to Inactive, on_reset of the proxy."""
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class RtcLiteProxy(RtComponent):
+    """Stands for an RTC-Lite component (Suzuki et al., RSJ 2007).
+
+    Each callback asks the device for the same, and waits for the reply in the
+    period itself, 100 ms at most: data that go in come out in the same period.
+    Somebody calls `tick` when `due_us` has come, so that PINGs are sent;
+    `attach` sees to that.
+
+    Not emulated: service ports and configuration sets, which RTC-Lite has not;
+    packets of RTno.
+
+    Args:
+        instance_name: unique in a system.
+        link: the line to the device. The time on its clock is the proxy's.
+        settings: waits and checksum.
+        listener: told of events.
+
+    Attributes:
+        device: what the device says of itself; None before `on_initialize`.
+        fatal_us: when the device was found to be lost; None as long as it is there.
+        refused_values: how many values did not fit the device, and were dropped.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec(
+        "RtcLiteProxy", "Proxy of an RTC-Lite component", category="RTC-Lite"
+    )
+
+    def __init__(
+        self,
+        instance_name: str,
+        link: Link[bytes],
+        settings: Settings | None = None,
+        listener: Listener | None = None,
+    ) -> None:
+        super().__init__(instance_name)
+        self._settings, self._listener = settings or Settings(), listener
+        self._talk = Conversation(link, self._settings)
+        self.device: DeviceProfile | None = None
+        self.fatal_us: int | None = None
+        self.refused_values = 0
+        self._ins: list[InRelay] = []
+        self._outs: dict[bytes, OutRelay] = {}
+        self._failed = False  # a callback failed, so that Error comes next
+        self._untold = False  # an error of which nobody knows whether it is a fatal one
+        self._mirrored_us = 0
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do, on the clock of the link."""
+        return self._talk.due_us
+
+    @property
+    def device_state(self) -> State | None:
+        """State of the device as it said last; None if nobody knows."""
+        return self._talk.state
+
+    @property
+    def profile(self) -> ComponentProfile:
+        """The component as it is, with the type of the one on the device."""
+        device = self.device
+        properties = (
+            {}
+            if device is None
+            else {
+                "rtc_lite.type_name": device.type_name,
+                "rtc_lite.context": f"0x{device.context:02X}",
+            }
+        )
+        return replace(super().profile, properties=properties)
+
+    def tick(self) -> None:
+        """Send PINGs and look for their answers; a device that is lost leads to Error."""
+        self._talk.tick()
+        if self._talk.watch.lost and self.fatal_us is None:
+            self.fatal_us, self._untold = self._talk.now_us, False
+            self._tell(EventKind.FATAL_ERROR)
+            for context in self.contexts:
+                context.abort_component(self)
+
+    def on_initialize(self) -> ReturnCode:
+        """Bring the device to Inactive, and make a port of each of its ports."""
+        for port in tuple(self.ports.values()):
+            self.remove_port(port)
+        try:
+            self.device = start_up(self._talk, self._settings.boot_us)
+            self._make_ports(self.device)
+        except (LinkError, DeviceRefused, WireError, RtcRefused) as error:
+            _LOG.warning("%s: no start-up: %s", self.instance_name, error)
+            return ReturnCode.RTC_ERROR
+        return _OK
+
+    def on_finalize(self) -> ReturnCode:
+        """Finalize the device."""
+        return self._command(Command.FINALIZE)
+
+    def on_startup(self, ec: ExecutionContext) -> ReturnCode:
+        """Tell a device that wants to know."""
+        return self._optional(Command.STARTUP)
+
+    def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
+        """Tell a device that wants to know."""
+        return self._optional(Command.SHUTDOWN)
+
+    def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
+        """Give the nearest whole rate to a device that executes by its own timer."""
+        if not self._by_timer:
+            return _OK
+        rate_hz = min(max(1, round(ec.rate_hz)), MAX_RATE_HZ)
+        return self._command(Command.RATE, rate_hz.to_bytes(2, "little"))
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Activate the device."""
+        code = self._command(Command.ACTIVATE)
+        self._failed = code is not _OK
+        return code
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Deactivate the device, unless Error comes next: it is aborted then."""
+        return _OK if self._failed else self._command(Command.DEACTIVATE)
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Hand data in, let the device execute, and hand data out."""
+        code = self._hand_in()
+        if code is _OK:
+            code = self._mirror() if self._by_timer else self._command(Command.EXECUTE)
+        self._hand_out()
+        self._failed = code is not _OK
+        return code
+
+    def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
+        """Let the device follow into Error, if it is not there."""
+        self._untold = self.fatal_us is None
+        self._tell_passive()
+        return self._follow()
+
+    def on_error(self, ec: ExecutionContext) -> ReturnCode:
+        """Let the device run on_error; one whose reply was lost is made to follow first."""
+        self._tell_passive()
+        code = self._follow()
+        if self._talk.state is State.ERROR and not self._by_timer:
+            code = self._command(Command.ERROR)
+        self._hand_out()
+        return code
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Bring the device to Inactive, from whatever state it is in."""
+        for _ in _TO_INACTIVE:
+            state = self._known_state()
+            if state is None or state is State.INACTIVE:
+                break
+            code = self._command(_TO_INACTIVE[state]) if state in _TO_INACTIVE else None
+            if code not in {_OK, ReturnCode.PRECONDITION_NOT_MET}:
+                return ReturnCode.RTC_ERROR
+        return _OK if self._talk.state is State.INACTIVE else ReturnCode.RTC_ERROR
+
+    @property
+    def _by_timer(self) -> bool:
+        return self.device is not None and self.device.context is ContextType.TIMER
+
+    def _make_ports(self, device: DeviceProfile) -> None:
+        self._ins = [in_relay(profile) for profile in device.in_ports]
+        self._outs = {profile.name: out_relay(profile) for profile in device.out_ports}
+        for inlet in self._ins:
+            self.add_port(inlet.port)
+        for outlet in self._outs.values():
+            self.add_port(outlet.port)
+
+    def _command(self, command: Command, data: bytes = b"") -> ReturnCode:
+        return _code_of(self._talk.ask(command, data))
+
+    def _optional(self, command: Command) -> ReturnCode:
+        """Ask for a callback that a device may leave out."""
+        code = self._command(command)
+        return _OK if code is ReturnCode.UNSUPPORTED else code
+
+    def _known_state(self) -> State | None:
+        """Return the state of the device; ask for it if nobody knows."""
+        if self._talk.state is None:
+            self._talk.ask(Command.STATE)
+        return self._talk.state
+
+    def _follow(self) -> ReturnCode:
+        if self._known_state() is State.ACTIVE:
+            return self._command(Command.ABORT)
+        return _OK
+
+    def _mirror(self) -> ReturnCode:
+        """Ask each 10th tick whether the device is still Active."""
+        now_us = self._talk.now_us
+        if now_us - self._mirrored_us < MIRROR_US:
+            self._talk.poll()
+            return _OK
+        self._mirrored_us = now_us
+        code = self._command(Command.STATE)
+        return code if self._talk.state is State.ACTIVE else ReturnCode.RTC_ERROR
+
+    def _hand_in(self) -> ReturnCode:
+        """Write one new value to each in-port of the device."""
+        for relay in self._ins:
+            try:
+                data = relay.take()
+            except FieldError as error:
+                self.refused_values += 1
+                _LOG.warning("%s: value dropped: %s", relay.port.full_name, error)
+                continue
+            if data is None:
+                continue
+            if (code := self._command(Command.WRITE, data.encode())) is not _OK:
+                return code
+        return _OK
+
+    def _hand_out(self) -> None:
+        """Write to the OutPorts what has arrived."""
+        pushed, self._talk.pushed = self._talk.pushed, []
+        for data in pushed:
+            try:
+                self._outs[data.name].give(data.data, self._talk.now_us)
+            except (KeyError, FieldError) as error:
+                self.refused_values += 1
+                _LOG.warning("%s: data dropped: %s", self.instance_name, error)
+
+    def _tell_passive(self) -> None:
+        """Tell of an error once it is known that the device is there."""
+        if self._untold and not self._talk.watch.doubted:
+            self._untold = False
+            self._tell(EventKind.PASSIVE_ERROR)
+
+    def _tell(self, kind: EventKind) -> None:
+        tell(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name))
+
+
+def _code_of(reply: Reply | None) -> ReturnCode:
+    error = ReturnCode.RTC_ERROR
+    return error if reply is None else _CODES.get(reply.status, error)

@@ -1,0 +1,79 @@
+"""What is said before a proxy is an RT component: state, profile, execution context, initialize."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tickrig.host.errors import DeviceRefused, LinkTimeout
+from tickrig.host.rtc_lite.conversation import Conversation
+from tickrig.wire.rtc_lite.codes import Command, ContextType, State
+from tickrig.wire.rtc_lite.messages import PortProfile, Reply, parse_component_profile
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceProfile:
+    """What a device says of itself.
+
+    Attributes:
+        type_name: type of its component.
+        in_ports: its in-ports.
+        out_ports: its out-ports.
+        context: who makes it execute.
+    """
+
+    type_name: str
+    in_ports: tuple[PortProfile, ...]
+    out_ports: tuple[PortProfile, ...]
+    context: ContextType
+
+
+def start_up(talk: Conversation, boot_us: int) -> DeviceProfile:
+    """Bring a device to Inactive, and ask what it is.
+
+    Raises:
+        LinkTimeout: no reply.
+        DeviceRefused: a reply that does not lead to Inactive.
+        WireError: a profile that cannot be read.
+    """
+    talk.listen(boot_us)
+    _demand(Command.STATE, talk.insist(Command.STATE))
+    if talk.state is State.ACTIVE:
+        _demand(Command.DEACTIVATE, talk.ask(Command.DEACTIVATE))
+    elif talk.state is State.ERROR:
+        _demand(Command.RESET, talk.ask(Command.RESET))
+    profile = _ask_profile(talk)
+    if talk.state is State.CREATED:
+        _demand(Command.INITIALIZE, talk.ask(Command.INITIALIZE))
+    if talk.state is not State.INACTIVE:
+        state = "unknown" if talk.state is None else talk.state.name
+        raise DeviceRefused(f"the state of the device is {state}, not INACTIVE", state)
+    return profile
+
+
+def _ask_profile(talk: Conversation) -> DeviceProfile:
+    reply = _demand(Command.PROFILE, talk.insist(Command.PROFILE))
+    told = parse_component_profile(reply.fields)
+    ins, outs = tuple(talk.in_ports), tuple(talk.out_ports)
+    if (len(ins), len(outs)) != (told.in_ports, told.out_ports):
+        counts = f"{told.in_ports} in-ports and {told.out_ports} out-ports"
+        raise DeviceRefused(f"{counts} announced, {len(ins)} and {len(outs)} described", "CZ")
+    return DeviceProfile(told.type_name.decode("latin-1"), ins, outs, _ask_context(talk))
+
+
+def _ask_context(talk: Conversation) -> ContextType:
+    code = _demand(Command.CONTEXT, talk.insist(Command.CONTEXT)).fields[0]
+    try:
+        return ContextType(code)
+    except ValueError:
+        text = f"execution context 0x{code:02X}, 0x21 and 0x22 are known"
+        raise DeviceRefused(text, "BB") from None
+
+
+def _demand(command: Command, reply: Reply | None) -> Reply:
+    """Return a reply that is there and OK."""
+    name = command.value.decode()
+    if reply is None:
+        raise LinkTimeout(f"no reply to {name}")
+    if not reply.ok:
+        raise DeviceRefused(f"{name} was refused with {reply.status:#04x}", chr(reply.status))
+    return reply
