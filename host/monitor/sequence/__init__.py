@@ -1,0 +1,1 @@
+"""Sequences: frames to send and frames to expect, step by step, told the time."""

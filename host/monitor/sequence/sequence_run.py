@@ -1,0 +1,162 @@
+"""A sequence as it is carried out."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable
+from enum import StrEnum
+from typing import Final, NamedTuple, assert_never
+
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.sequence.steps import (
+    FOREVER,
+    Condition,
+    Expect,
+    Repeat,
+    Send,
+    Sequence,
+    Step,
+    Wait,
+)
+from tickrig.wire.can import CanFrame, Frames
+
+NEVER: Final = 1 << 62
+"""When a sequence that has ended wants to be called."""
+
+
+class Mark(StrEnum):
+    """What a note is about."""
+
+    SENT = ">"
+    MET = "ok"
+    MISSED = "?"
+    END = "."
+
+
+class Note(NamedTuple):
+    """What happened when."""
+
+    at_us: int
+    mark: Mark
+    text: str
+
+
+class _Pause(NamedTuple):
+    until_us: int
+    conditions: tuple[Condition, ...] = ()
+
+
+_Play = Generator[_Pause, bool, bool]
+"""Yields pauses, is sent whether they were met, and returns whether to carry on."""
+
+
+class SequenceRun:
+    """Carries out a sequence as time passes.
+
+    Waits are counted from when the step before was due, so they do not drift. Frames that one
+    call brings are taken before its time runs out.
+
+    Args:
+        sequence: what to do.
+
+    Attributes:
+        done: it has ended.
+        met: how many expectations were met.
+        missed: how many were not.
+        notes: what happened; whoever shows them may take them out.
+    """
+
+    def __init__(self, sequence: Sequence) -> None:
+        self._sequence = sequence
+        self._begun, self._at_us = False, 0
+        self._play = self._all(sequence.steps)
+        self._pause = _Pause(0)
+        self._out: list[CanFrame] = []
+        self.done = False
+        self.met = self.missed = 0
+        self.notes: list[Note] = []
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame."""
+        return self._pause.until_us
+
+    def tick(self, now_us: int, heard: Iterable[Heard] = ()) -> Frames:
+        """Take in what was heard, carry out what is due, and return what to send.
+
+        Args:
+            now_us: the time; the first call begins the sequence.
+            heard: frames since the last call; those that this program sent are passed over.
+        """
+        if not self._begun:
+            self._begun, self._at_us = True, now_us
+            self._resume(now_us, None)
+        for one in heard:
+            if self._pause.conditions and not one.sent:
+                self._hear(one, now_us)
+        while self.due_us <= now_us:
+            self._resume(self._pause.until_us, not self._pause.conditions)
+        out, self._out = tuple(self._out), []
+        return out
+
+    def _hear(self, heard: Heard, now_us: int) -> None:
+        conditions = self._pause.conditions
+        for number, condition in enumerate(conditions):
+            if condition.matches(heard):
+                left = conditions[:number] + conditions[number + 1 :]
+                self._pause = _Pause(self._pause.until_us, left)
+                if not left:
+                    self._resume(now_us, True)
+                return
+
+    def _resume(self, at_us: int, met: bool | None) -> None:
+        """Carry on at a time up to the next pause; None begins."""
+        self._at_us = at_us
+        try:
+            self._pause = next(self._play) if met is None else self._play.send(met)
+        except StopIteration:
+            self.done, self._pause = True, _Pause(NEVER)
+            self._note(Mark.END, f"{self.met} met, {self.missed} missed")
+
+    def _all(self, steps: tuple[Step, ...]) -> _Play:
+        for step in steps:
+            if not (yield from self._one(step)):
+                return False
+        return True
+
+    def _one(self, step: Step) -> _Play:
+        match step:
+            case Send(_, frames):
+                self._send(frames)
+            case Wait(_, wait_us):
+                yield _Pause(self._at_us + wait_us)
+            case Expect():
+                return (yield from self._expect(step))
+            case Repeat(_, times, steps):
+                count = 0
+                while times == FOREVER or count < times:
+                    if not (yield from self._all(steps)):
+                        return False
+                    count += 1
+            case _ as never:
+                assert_never(never)
+        return True
+
+    def _send(self, frames: Frames) -> None:
+        self._out += frames
+        for frame in frames:
+            self._note(Mark.SENT, str(frame))
+
+    def _expect(self, step: Expect) -> _Play:
+        wanted = " and ".join(condition.text for condition in step.conditions)
+        if (yield _Pause(self._at_us + step.within_us, step.conditions)):
+            self.met += 1
+            self._note(Mark.MET, wanted)
+            return True
+        self.missed += 1
+        missing = " and ".join(condition.text for condition in self._pause.conditions)
+        place = self._sequence.locate(step.place)
+        self._note(Mark.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms")
+        return (yield from self._all(step.on_fail)) and step.goes_on
+
+    def _note(self, mark: Mark, text: str) -> None:
+        self.notes.append(Note(self._at_us, mark, text))
