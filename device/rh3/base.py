@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.device.body.contact import Contact
-from tickrig.device.core import NEVER
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
@@ -18,13 +17,18 @@ from tickrig.device.rh3.terminals import INPUTS, OUTPUTS, SIDES
 
 TICK_US: Final = 1_000
 
+LOOK_US: Final = 10_000
+"""How often the world looks at it."""
+
 
 class Rh3Base:
     """The base of Reference Hardware 3 as a Modbus RTU slave; a `Device[bytes]`.
 
     The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its
-    place, with the register map of `register_map`. In each tick: bytes from the line,
-    targets, watchdog and faults, servo, ground.
+    place, with the register map of `register_map`. In each millisecond: bytes from the
+    line, targets, watchdog and faults, servo, ground. Nobody need tick it for that: what
+    has passed since is made up for. `read` gives what was to be seen at the latest
+    multiple of `LOOK_US`.
 
     Not emulated: the library libsvm, battery, heat, the outline of the robot.
 
@@ -34,6 +38,7 @@ class Rh3Base:
     Attributes:
         inputs: what the world does to it, see `terminals.INPUTS`.
         ground: where it is; its pose may be set.
+        sides: left and right wheel with their loops.
         slave: its end of the line.
     """
 
@@ -41,11 +46,11 @@ class Rh3Base:
         self.parameters = parameters or BaseParameters()
         self.inputs = QuantityBank(INPUTS)
         self.ground = Ground(self.parameters)
-        self._driver = Driver(self.parameters, self.inputs)
-        self.slave = ModbusSlave(
-            self._driver.registers, self._driver.written, self.parameters.address
-        )
-        self._on, self._now_us = True, 0
+        self._driver = driver = Driver(self.parameters, self.inputs)
+        self.sides = driver.sides
+        self.slave = ModbusSlave(driver.registers, driver.written, self.parameters.address)
+        self._on, self._moving, self._unseen, self._now_us = True, False, True, 0
+        self._seen = {name: read(self) for name, read in _READ.items()}
 
     @property
     def tick_us(self) -> int:
@@ -57,9 +62,10 @@ class Rh3Base:
         """When anything would happen without input."""
         if self.inputs.changed:
             return 0
-        if not (self._driver.resting and self.ground.resting):
-            return self._now_us + TICK_US
-        return self.slave.due_us if self._on else NEVER
+        due_us = self.slave.due_us
+        if self._unseen:
+            due_us = min(due_us, self._now_us - self._now_us % LOOK_US + LOOK_US)
+        return due_us
 
     @property
     def outputs(self) -> Mapping[str, Output]:
@@ -68,51 +74,64 @@ class Rh3Base:
 
     @property
     def status(self) -> Status:
-        """What the driver says of itself; none without supply."""
+        """What the driver says of itself; nothing without supply."""
         return self._driver.status if self._on else Status(0)
-
-    @property
-    def sides(self) -> tuple[Side, ...]:
-        """Left and right wheel with their loops."""
-        return self._driver.sides
 
     def reset(self) -> None:
         """Begin as after power-up, where it stands."""
         self._driver.power_up()
         self.slave.reset()
-        self._on, self.inputs.changed = True, True
+        self._on = self.inputs.changed = True
 
     def read(self, name: str, /) -> float:
         """Return one of `outputs`; KeyError if unknown."""
-        return _READ[name](self)
+        return self._seen[name]
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Let a millisecond pass."""
-        self._now_us = self._driver.now_us = now_us
+        """Let time pass up to now."""
+        self._catch_up(now_us)
         if self.inputs.changed:
             self._touched()
+        sent = b""
         if self._on:
+            served = self.slave.served
             sent = self.slave.tick(now_us, rx)
-            self._driver.step(self.slave.heard_us)
-        else:
-            sent = b""
-            self._driver.coast()
-        self._move()
+            self._unseen |= bool(rx) or self.slave.served != served
+        self._step()
+        if now_us % LOOK_US == 0:
+            self._seen = {name: read(self) for name, read in _READ.items()}
+            self._unseen = self._moving
         return sent
 
+    def _catch_up(self, now_us: int) -> None:
+        """Make the steps of the milliseconds before this one."""
+        driver = self._driver
+        while self._moving and driver.now_us < now_us - TICK_US:
+            driver.now_us += TICK_US
+            self._step()
+        self._now_us = driver.now_us = now_us
+
+    def _step(self) -> None:
+        driver, ground = self._driver, self.ground
+        if self._on:
+            driver.step(self.slave.heard_us)
+        else:
+            driver.coast()
+        left, right = self.sides
+        ground.step(left.wheel.turned_rad, right.wheel.turned_rad)
+        self._moving = not (driver.resting and ground.resting)
+        self._unseen |= self._moving
+
     def _touched(self) -> None:
-        self.inputs.changed = False
-        for side in self._driver.sides:
+        self.inputs.changed, self._unseen = False, True
+        for side in self.sides:
             side.touched(self.inputs)
         on = not self.inputs["power_cut"]
         if on != self._on:
             self._on = on
             self._driver.power_up()
             self.slave.reset()
-
-    def _move(self) -> None:
-        left, right = (side.wheel.turned_rad for side in self._driver.sides)
-        self.ground.step(left, right)
+        self._driver.find_faults()
 
 
 _OUTPUTS: Final = {output.name: output for output in OUTPUTS}

@@ -54,6 +54,7 @@ class Driver:
         self.registers.reset()
         self._waiting: deque[tuple[int, Mapping[str, int]]] = deque()
         self._enabled = self._powered = self._tripped = self._stopped = False
+        self._mode, self._faulty = Mode.FREE, False
         for side in self.sides:
             side.power_up()
 
@@ -78,6 +79,8 @@ class Driver:
 
     def written(self, values: Mapping[str, int]) -> None:
         """Take what a master wrote, at once or after the delay."""
+        for side in self.sides:
+            side.configure()
         if values.keys() & DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
@@ -90,11 +93,12 @@ class Driver:
         while self._waiting and self._waiting[0][0] <= self.now_us:
             self._obey(self._waiting.popleft()[1])
         self._watch(heard_us)
-        self._find_faults()
-        self._power()
+        if any(side.stalled for side in self.sides):
+            self.find_faults()
+        powered, stop = self._power(), self._stopped
         for side in self.sides:
-            if self._powered:
-                side.drive(stop=self._stopped)
+            if powered:
+                side.drive(stop=stop, to_position=self._mode is Mode.POSITION)
             else:
                 side.coast(shorted=self._faulty)
 
@@ -104,53 +108,63 @@ class Driver:
             side.coast(shorted=True)
 
     @property
-    def _faulty(self) -> bool:
-        return any(side.fault for side in self.sides)
-
-    @property
     def _sample(self) -> int:
         return (self.now_us - self._start_us) // 1_000 & 0xFFFF
+
+    def find_faults(self) -> None:
+        """Look for faults, and take the power from both wheels if there is one."""
+        for side in self.sides:
+            side.find_faults(self._inputs, powered=self._powered)
+        self._faulty = any(side.fault for side in self.sides)
+        if self._faulty:
+            self._enabled = False
 
     def _obey(self, values: Mapping[str, int]) -> None:
         if values.keys() & TARGETS:
             self._tripped = self._stopped = False
-        command = values.get("command", Command.NONE)
-        if command == Command.ENABLE:
-            self._enabled = not self._faulty
-        elif command == Command.DISABLE:
-            self._enabled = False
-        elif command in {Command.STOP, Command.QUICK_STOP}:
-            self._stop(quick=command == Command.QUICK_STOP)
         for side in self.sides:
-            if command == Command.CLEAR_FAULT:
-                side.fault = Fault(0)
-            elif command == Command.ZERO_COUNTERS:
-                side.zero()
+            side.obey(values)
+        self._mode = Mode(values.get("mode", self._mode))
+        match values.get("command"):
+            case Command.ENABLE:
+                self._enabled = not self._faulty
+            case Command.DISABLE:
+                self._enabled = False
+            case Command.STOP | Command.QUICK_STOP as command:
+                self._stop(quick=command == Command.QUICK_STOP)
+            case Command.CLEAR_FAULT:
+                self._clear_faults()
+            case Command.ZERO_COUNTERS:
+                for side in self.sides:
+                    side.zero()
+            case _:
+                return
+
+    def _clear_faults(self) -> None:
+        for side in self.sides:
+            side.fault = Fault(0)
+        self.find_faults()
 
     def _stop(self, *, quick: bool) -> None:
         self._stopped = True
         for side in self.sides:
-            self.registers[f"target_speed_{side.name}"] = 0
-            if quick:
-                side.halt()
+            side.stop(quick=quick)
 
     def _watch(self, heard_us: int) -> None:
         """Stop when the master is silent."""
         limit_us = self.registers["watchdog_ms"] * 1_000
-        moving = self._powered and not self._stopped and not self.resting
-        if moving and limit_us and self.now_us - heard_us >= limit_us:
+        if not limit_us or self.now_us - heard_us < limit_us:
+            return
+        if self._powered and not self._stopped and not self.resting:
             self._stop(quick=False)
             self._tripped = True
 
-    def _find_faults(self) -> None:
-        for side in self.sides:
-            side.find_faults(self._inputs, powered=self._powered)
-        if self._faulty:
-            self._enabled = False
-
-    def _power(self) -> None:
-        powered = self._enabled and self.registers["mode"] != Mode.FREE
-        if powered and not self._powered:
+    def _power(self) -> bool:
+        """Return whether the wheels have power."""
+        powered = self._enabled and self._mode is not Mode.FREE
+        if powered != self._powered:
+            self._powered = powered
             for side in self.sides:
                 side.take_over()
-        self._powered = powered
+            self.find_faults()
+        return self._powered and self._enabled

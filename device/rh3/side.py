@@ -1,15 +1,15 @@
-"""One wheel as its driver sees it: loop, counter and faults."""
+"""One wheel as its driver sees it: loops, counter and faults."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import PER_MILLE, BaseParameters
 from tickrig.device.rh3.position_loop import PositionLoop
-from tickrig.device.rh3.register_map import Fault, Mode
+from tickrig.device.rh3.register_map import Fault
 from tickrig.device.rh3.speed_loop import SpeedLoop
 from tickrig.device.rh3.wheel import Wheel
 
@@ -49,8 +49,15 @@ class Side:
         """Count from 0, without a fault."""
         self.fault, self.clipped = Fault(0), False
         self._counted = self._stalled_ms = 0
+        self._speed, self._goal = 0.0, 0
+        self.configure()
         self.take_over()
         self.zero()
+
+    def configure(self) -> None:
+        """Take over gains and limits."""
+        self._backward = self._registers["direction"] >> self._backward_bit & 1
+        self._speed_loop.configure(self._registers)
 
     def zero(self) -> None:
         """Count from 0 on."""
@@ -61,9 +68,18 @@ class Side:
         self._speed_loop.take_over(self.wheel.speed)
         self._position_loop.begin()
 
-    def halt(self) -> None:
-        """Want standstill at once, without a ramp."""
-        self._speed_loop.reference = 0.0
+    def obey(self, values: Mapping[str, int]) -> None:
+        """Take new targets."""
+        if (speed := values.get(f"target_speed_{self.name}")) is not None:
+            self._speed = self._signed(speed) / 1e3
+        if (goal := values.get(f"target_position_{self.name}")) is not None:
+            self._goal = self._signed(goal)
+
+    def stop(self, *, quick: bool) -> None:
+        """Want standstill, with or without a ramp."""
+        self._speed, self._registers[f"target_speed_{self.name}"] = 0.0, 0
+        if quick:
+            self._speed_loop.reference = 0.0
 
     @property
     def measured(self) -> dict[str, Callable[[], int]]:
@@ -72,7 +88,7 @@ class Side:
             f"fault_{self.name}": lambda: int(self.fault),
             f"position_{self.name}": lambda: self._signed(self.wheel.counts - self._zero),
             f"speed_{self.name}": lambda: self._signed(round(self.wheel.speed * 1_000)),
-            f"current_{self.name}": lambda: self._signed(self.milliamperes),
+            f"current_{self.name}": lambda: self._signed(self._milliamperes),
         }
 
     @property
@@ -81,15 +97,11 @@ class Side:
         return self._speed_loop.torque
 
     @property
-    def milliamperes(self) -> int:
-        """Current of the motor."""
-        return round(self.torque * self._rated_ma / PER_MILLE)
-
-    @property
     def resting(self) -> bool:
         """Whether a step with the same target would change nothing."""
-        still = not (self._counted or self._stalled_ms) and self.wheel.held(self.torque)
-        return still and self._speed_loop.settled
+        if self.wheel.speed or self._counted or self._stalled_ms:
+            return False
+        return self._speed_loop.settled and self.wheel.held(self.torque)
 
     def touched(self, inputs: QuantityBank) -> None:
         """Take over what the world does to the wheel."""
@@ -104,20 +116,32 @@ class Side:
             self.fault |= Fault.ENCODER
         if powered and inputs[f"short_circuit_{self.name}"]:
             self.fault |= Fault.OVER_CURRENT
-        if self._stalled_ms >= STALL_MS:
+        if self.stalled:
             self.fault |= Fault.STALL
 
-    def drive(self, *, stop: bool) -> None:
-        """Turn for a millisecond as the registers say."""
-        wanted = 0.0 if stop else self._wanted()
-        limit = self._registers["speed_limit"] / 1e3
-        target = min(max(wanted, -limit), limit)
-        self.clipped = target != wanted
-        torque = self._speed_loop.step(target, self._counted)
-        before = self.wheel.counts
-        self.wheel.step(torque)
-        self._counted = self.wheel.counts - before
-        stalled = abs(torque) >= PER_MILLE and not self._counted
+    @property
+    def stalled(self) -> bool:
+        """Whether full torque has turned nothing for long."""
+        return self._stalled_ms >= STALL_MS
+
+    def drive(self, *, stop: bool, to_position: bool) -> None:
+        """Turn for a millisecond as the targets say."""
+        wheel = self.wheel
+        if stop:
+            wanted = 0.0
+        elif to_position:
+            wanted = self._position_loop.step(self._goal - (wheel.counts - self._zero))
+        else:
+            wanted = self._speed
+        limit = self._speed_loop.limit
+        self.clipped = not -limit <= wanted <= limit
+        if self.clipped:
+            wanted = limit if wanted > 0 else -limit
+        torque = self._speed_loop.step(wanted, self._counted)
+        before = wheel.counts
+        wheel.step(torque)
+        self._counted = wheel.counts - before
+        stalled = not self._counted and abs(torque) >= PER_MILLE
         self._stalled_ms = self._stalled_ms + 1 if stalled else 0
 
     def coast(self, *, shorted: bool) -> None:
@@ -130,15 +154,11 @@ class Side:
         else:
             self.wheel.step(0.0)
 
-    def _wanted(self) -> float:
-        """Return the speed that a master wants, counts/ms."""
-        registers = self._registers
-        if registers["mode"] == Mode.VELOCITY:
-            return self._signed(registers[f"target_speed_{self.name}"]) / 1e3
-        goal = self._signed(registers[f"target_position_{self.name}"])
-        return self._position_loop.step(goal - (self.wheel.counts - self._zero))
+    @property
+    def _milliamperes(self) -> int:
+        return round(self.torque * self._rated_ma / PER_MILLE)
 
     def _signed(self, value: int) -> int:
         """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""
-        value = -value if self._registers["direction"] >> self._backward_bit & 1 else value
+        value = -value if self._backward else value
         return (value + INT32 // 2) % INT32 - INT32 // 2

@@ -25,11 +25,19 @@ class SpeedLoop:
     Attributes:
         reference: the target behind its ramp, counts/ms.
         torque: of the latest step, per mille.
+        limit: the highest speed, counts/ms.
     """
 
     def __init__(self, registers: Registers, friction: float) -> None:
-        self._registers, self._friction = registers, friction
+        self._friction = friction
+        self.configure(registers)
         self.take_over(0.0)
+
+    def configure(self, registers: Registers) -> None:
+        """Take over gains and limits."""
+        self._vp, self._vi, self._vd = (registers[f"gain_v{gain}"] for gain in "pid")
+        self._ramp = registers["acceleration_limit"] / 1e6
+        self.limit = registers["speed_limit"] / 1e3
 
     def take_over(self, speed: float) -> None:
         """Begin anew at a speed, so that nothing jerks."""
@@ -48,18 +56,22 @@ class SpeedLoop:
             target: counts/ms.
             counted: counts of the latest millisecond.
         """
-        registers = self._registers
-        most = registers["acceleration_limit"] / 1e6
-        self.reference += min(max(target - self.reference, -most), most)
-        error = self.reference - counted
-        self._sum = min(max(self._sum + error, -INTEGRAL_LIMIT), INTEGRAL_LIMIT)
-        torque = (
-            registers["gain_vp"] * error
-            + registers["gain_vi"] * self._sum
-            + registers["gain_vd"] * (error - self._error)
-        )
+        reference, ramp = self.reference, self._ramp
+        if target != reference:
+            if target > reference + ramp:
+                target = reference + ramp
+            elif target < reference - ramp:
+                target = reference - ramp
+            self.reference = reference = target
+        error = reference - counted
+        torque = self._vp * error + self._vd * (error - self._error)
+        if self._vi:
+            self._sum = min(max(self._sum + error, -INTEGRAL_LIMIT), INTEGRAL_LIMIT)
+            torque += self._vi * self._sum
         self._error = error
-        if self.reference:
-            torque += copysign(self._friction, self.reference)
-        self.torque = min(max(torque, -PER_MILLE), PER_MILLE)
-        return self.torque
+        if reference:
+            torque += copysign(self._friction, reference)
+        if not -PER_MILLE <= torque <= PER_MILLE:
+            torque = copysign(PER_MILLE, torque)
+        self.torque = torque
+        return torque
