@@ -1,0 +1,1 @@
+"""CAN traffic as CANopen objects: decoded from evidence, nothing assumed."""

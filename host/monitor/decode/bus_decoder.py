@@ -1,0 +1,220 @@
+"""One bus decoded: what each CAN-ID means, by the standard and by what was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+from tickrig.host.monitor.decode.decoded import Decoded, Signal
+from tickrig.host.monitor.decode.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.lss_messages import decode_lss
+from tickrig.host.monitor.decode.memory import DEVICE_TYPE, NodeMemory
+from tickrig.host.monitor.decode.network_services import (
+    decode_emcy,
+    decode_error_control,
+    decode_nmt,
+    decode_sync,
+    decode_time,
+)
+from tickrig.host.monitor.decode.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
+from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step
+from tickrig.host.monitor.decode.transfer import Direction, Outcome, Transfer, write_entry
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
+from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
+from tickrig.wire.canopen.nmt import NMT_COB_ID
+from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID
+
+Route = Callable[[int, CanFrame], Decoded]
+
+SYNC_ID: Final = 0x080
+TIME_ID: Final = 0x100
+PDO_IDS: Final = range(0x181, 0x580)
+NODE_MASK: Final = 0x7F
+COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
+SDO_SERVERS: Final = range(0x1201, 0x1280)
+PRE_DEFINED: Final[dict[int, Route]] = {
+    NMT_COB_ID: decode_nmt,
+    SYNC_ID: decode_sync,
+    TIME_ID: decode_time,
+    LSS_MASTER_COB_ID: decode_lss,
+    LSS_SLAVE_COB_ID: decode_lss,
+}
+
+
+class BusDecoder:
+    """Decodes the frames of one bus, in the order in which they were heard.
+
+    Which CAN-ID is what, the pre-defined connection set says, until an EDS or SDO traffic
+    says otherwise (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
+
+    Args:
+        eds: what files say, by node-ID.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
+        self._eds = eds
+        self._memories: dict[int, NodeMemory] = {}
+        self._channels: dict[tuple[int, int], SdoChannel] = {}
+        self._guarded: set[int] = set()
+        self._pdos = PdoTable()
+        self._told: dict[int, Route] = {}
+        self._routes: dict[int, Route] = {}
+        for node, objects in eds.items():
+            self._refresh(pdos_of(node, (index for index, _ in objects.values)))
+            for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *SDO_SERVERS):
+                self._learn_cob_ids(node, index)
+
+    def take(self, at_us: int, frame: CanFrame) -> Decoded:
+        """Decode a frame with an 11-bit identifier."""
+        route = self._routes.get(frame.can_id)
+        if route is None:
+            route = self._routes[frame.can_id] = self._route(frame.can_id)
+        return route(at_us, frame)
+
+    def pending(self, now_us: int) -> tuple[Transfer, ...]:
+        """Return the SDO transfers that run."""
+        found = (channel.pending(now_us) for channel in self._channels.values())
+        return tuple(self._named(transfer) for transfer in found if transfer)
+
+    def memory(self, node: int) -> NodeMemory:
+        """Return what is known of a node."""
+        memory = self._memories.get(node)
+        if memory is None:
+            memory = self._memories[node] = NodeMemory(self._eds.get(node))
+        return memory
+
+    def _route(self, can_id: int) -> Route:
+        told = self._told.get(can_id) or PRE_DEFINED.get(can_id)
+        if told is not None:
+            return told
+        layout = self._pdos.layout(can_id)
+        if layout is not None:
+            return layout.decode
+        node = can_id & NODE_MASK
+        return self._node_route(node, can_id) if node else _raw
+
+    def _node_route(self, node: int, can_id: int) -> Route:
+        """Return what the pre-defined connection set says of a CAN-ID with a node-ID in it."""
+        match can_id - node:
+            case 0x080:
+                return partial(_emcy, node)
+            case 0x580 | 0x600:
+                return self._sdo_route(node, can_id, REQUEST_COB_ID + node)
+            case 0x700:
+                return partial(self._error_control, node)
+            case _:
+                return partial(_unmapped, node) if can_id in PDO_IDS else _raw
+
+    def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
+        channel = self._channels.setdefault((node, request_id), SdoChannel(node))
+        take = channel.request if can_id == request_id else channel.response
+        return partial(self._sdo, node, take)
+
+    def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
+        guarded = node in self._guarded
+        decoded = decode_error_control(node, frame, guarded=guarded)
+        if frame.remote:
+            self._guarded.add(node)
+        else:
+            self._guarded.discard(node)
+        if decoded.kind == "boot-up" and self.memory(node).boot():
+            self._refresh(self._pdos.known(node))
+        return decoded
+
+    def _sdo(
+        self, node: int, take: Callable[[int, bytes], Step], at_us: int, frame: CanFrame
+    ) -> Decoded:
+        if frame.remote:
+            return Decoded("sdo", node, "remote frame")
+        step = take(at_us, frame.data)
+        if not step.ended:
+            return Decoded("sdo", node, step.text, (), "", step.entry)
+        for transfer in step.ended:
+            self._learn(transfer)
+        ended = tuple(self._named(transfer) for transfer in step.ended)
+        last = ended[-1]
+        text = "; ".join(str(transfer) for transfer in ended)
+        return Decoded("sdo", node, text, _signals(last), last.source, step.entry, ended)
+
+    def _named(self, transfer: Transfer) -> Transfer:
+        """Return it with name and value of its object."""
+        if transfer.entry is None:
+            return transfer
+        text = self.memory(transfer.node).describe(*transfer.entry)
+        value, written = (None, "") if transfer.data is None else text.read(transfer.data)
+        return replace(
+            transfer, name=text.name, value=value, text=written, unit=text.unit, source=text.source
+        )
+
+    def _learn(self, transfer: Transfer) -> None:
+        """Take a transferred value as evidence."""
+        entry, data = transfer.entry, transfer.data
+        if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
+            return
+        memory = self.memory(transfer.node)
+        was_drive = memory.is_drive
+        if transfer.direction is Direction.UPLOAD:
+            memory.read(entry, data)
+        else:
+            memory.written(entry, data)
+        if entry[0] in PDO_OBJECTS:
+            self._refresh(pdos_of(transfer.node, (entry[0],)))
+        elif memory.is_drive != was_drive or entry == DEVICE_TYPE:
+            self._refresh(self._pdos.known(transfer.node))
+        self._learn_cob_ids(transfer.node, entry[0])
+
+    def _refresh(self, pdos: Iterable[Pdo]) -> None:
+        """Read again what is known of some PDOs."""
+        for pdo in pdos:
+            for can_id in self._pdos.update(pdo, self.memory(pdo.node)):
+                self._routes.pop(can_id, None)
+
+    def _learn_cob_ids(self, node: int, index: int) -> None:
+        """Learn a CAN-ID that is not that of the pre-defined connection set."""
+        if index in SDO_SERVERS:
+            request, response = (self._told_id(node, index, sub) for sub in (1, 2))
+            if request is not None and response is not None:
+                self._tell(request, self._sdo_route(node, request, request))
+                self._tell(response, self._sdo_route(node, response, request))
+            return
+        can_id = self._told_id(node, index, 0)
+        if can_id is None:
+            return
+        match index:
+            case 0x1005:
+                self._tell(can_id, decode_sync)
+            case 0x1012:
+                self._tell(can_id, decode_time)
+            case 0x1014:
+                self._tell(can_id, partial(_emcy, node))
+
+    def _told_id(self, node: int, index: int, sub: int) -> int | None:
+        cob_id = self.memory(node).number(index, sub)
+        flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
+        return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
+
+    def _tell(self, can_id: int, route: Route) -> None:
+        self._told[can_id] = route
+        self._routes.pop(can_id, None)
+
+
+def _signals(transfer: Transfer) -> tuple[Signal, ...]:
+    if transfer.outcome is not Outcome.DONE or transfer.value is None or transfer.flaws:
+        return ()
+    name = transfer.name or write_entry(transfer.entry)
+    return (Signal(name, transfer.value, transfer.unit, transfer.text),)
+
+
+def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
+    return decode_emcy(node, frame)
+
+
+def _unmapped(node: int, at_us: int, frame: CanFrame) -> Decoded:
+    return Decoded("unmapped", node, "RTR" if frame.remote else "no mapping was heard")
+
+
+def _raw(at_us: int, frame: CanFrame) -> Decoded:
+    return Decoded("raw")

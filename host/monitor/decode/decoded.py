@@ -1,0 +1,56 @@
+"""What a frame says, once it is decoded."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from tickrig.host.monitor.decode.transfer import Transfer
+from tickrig.wire.canopen.datatypes import Value
+
+EDS: Final = "eds"
+SEEN: Final = "seen"
+DBC: Final = "dbc"
+"""Where names and mappings come from: a file, SDO traffic, a DBC file; else the standard."""
+
+
+class Signal(NamedTuple):
+    """A value of a frame.
+
+    Attributes:
+        name: in lower case, a member of a record behind a dot; `6041h:00` where nobody named it.
+        value: what it is.
+        unit: as the EDS or DBC file gives it, else empty.
+        text: how people read it where that is not the value itself.
+    """
+
+    name: str
+    value: Value
+    unit: str = ""
+    text: str = ""
+
+    def __str__(self) -> str:
+        """Write name and value."""
+        return f"{self.name}={self.text or str(self.value)}{self.unit}"
+
+
+class Decoded(NamedTuple):
+    """A frame, for people and filters.
+
+    Attributes:
+        kind: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1.., rpdo1.., lss, dbc,
+            error, rrc, rtc-lite; unmapped for a PDO nobody described, raw for all else.
+        node: whose object it is; None where it belongs to none.
+        text: one line.
+        signals: the values in it.
+        source: `EDS`, `SEEN`, `DBC`; empty where the standard alone says it.
+        entry: index and sub-index that an SDO frame is about.
+        transfers: the SDO transfers that ended with this frame.
+    """
+
+    kind: str
+    node: int | None = None
+    text: str = ""
+    signals: tuple[Signal, ...] = ()
+    source: str = ""
+    entry: tuple[int, int] | None = None
+    transfers: tuple[Transfer, ...] = ()

@@ -1,0 +1,64 @@
+"""All that was heard decoded, on any number of buses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from tickrig.host.monitor.decode.bus_decoder import BusDecoder
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.eds_objects import EdsObjects, read_eds
+from tickrig.host.monitor.decode.error_frame_text import decode_error
+from tickrig.host.monitor.decode.memory import NodeMemory
+from tickrig.host.monitor.decode.transfer import Transfer
+from tickrig.host.monitor.heard import Heard
+from tickrig.wire.can_error import ErrorFrame
+
+NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
+
+
+class Decoder:
+    """Decodes what was heard, in order; each bus has its own nodes.
+
+    Args:
+        eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus.
+
+    Raises:
+        OSError: a file cannot be read.
+        EdsError: it is malformed.
+    """
+
+    def __init__(self, eds: Mapping[int, Path | EdsObjects] = NO_EDS) -> None:
+        self._eds = {
+            node: read_eds(item, node) if isinstance(item, Path) else item
+            for node, item in eds.items()
+        }
+        self._buses: dict[str, BusDecoder] = {}
+
+    def take(self, heard: Heard) -> Decoded:
+        """Decode a frame, and learn from it."""
+        frame = heard.frame
+        if isinstance(frame, ErrorFrame):
+            return decode_error(frame)
+        if frame.extended:
+            return Decoded("raw")
+        bus = self._buses.get(heard.channel)
+        if bus is None:
+            bus = self._bus(heard.channel)
+        return bus.take(heard.at_us, frame)
+
+    def pending(self, now_us: int) -> tuple[Transfer, ...]:
+        """Return the SDO transfers that run, as they would end now."""
+        return tuple(item for bus in self._buses.values() for item in bus.pending(now_us))
+
+    def memory(self, channel: str, node: int) -> NodeMemory:
+        """Return what is known of a node."""
+        return self._bus(channel).memory(node)
+
+    def _bus(self, channel: str) -> BusDecoder:
+        bus = self._buses.get(channel)
+        if bus is None:
+            bus = self._buses[channel] = BusDecoder(self._eds)
+        return bus

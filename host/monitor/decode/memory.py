@@ -1,0 +1,102 @@
+"""What SDO traffic and an EDS have told of the objects of one node."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.monitor.decode.decoded import EDS, SEEN
+from tickrig.host.monitor.decode.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.decode.standard_objects import describe_drive, describe_standard
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
+
+STORE: Final = 0x1010
+SAVE: Final = b"save"
+DEVICE_TYPE: Final = (0x1000, 0)
+STATUSWORD: Final = (0x6041, 0)
+STATUSWORD_BYTES: Final = 2
+DRIVE_PROFILE: Final = 402
+COMMUNICATION: Final = range(0x1000, 0x2000)
+"""Objects that say how the others travel."""
+
+Entry = tuple[int, int]
+
+
+class NodeMemory:
+    """The values of a node's objects, as far as they are known.
+
+    A value that was written lasts until the node boots; then those count that it had
+    before, unless it has stored them (1010h).
+
+    Args:
+        eds: what its file says; power-on values count until traffic says otherwise.
+    """
+
+    def __init__(self, eds: EdsObjects | None = None) -> None:
+        self.eds = eds or EdsObjects()
+        self._power_on: dict[Entry, bytes] = {}
+        self._now: dict[Entry, bytes] = {}
+        self._written: set[Entry] = set()
+        self._has_statusword = False
+
+    def read(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was uploaded."""
+        self._keep(entry, data)
+        if entry not in self._written:
+            self._power_on[entry] = data
+
+    def written(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was downloaded and confirmed."""
+        if entry[0] == STORE:
+            if data == SAVE:
+                self._power_on, self._written = dict(self._now), set()
+            return
+        self._keep(entry, data)
+        self._written.add(entry)
+
+    def _keep(self, entry: Entry, data: bytes) -> None:
+        if entry[0] in COMMUNICATION:
+            self._now[entry] = data
+        elif entry == STATUSWORD and len(data) == STATUSWORD_BYTES:
+            self._has_statusword = True
+
+    def boot(self) -> bool:
+        """Go back to power-on values; return whether that changes any."""
+        changed = self._now != self._power_on
+        self._now, self._written = dict(self._power_on), set()
+        return changed
+
+    def number(self, index: int, sub: int) -> int | None:
+        """Return a value; None where nobody told it."""
+        data = self._now.get((index, sub), self.eds.values.get((index, sub)))
+        return None if data is None else int.from_bytes(data, "little")
+
+    def source(self, index: int) -> str:
+        """Say where the values of an object come from: traffic, where it told any."""
+        entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
+        if any(entry in self._now for entry in entries):
+            return SEEN
+        return EDS if any(entry in self.eds.values for entry in entries) else ""
+
+    def maps_statusword(self) -> None:
+        """Learn that a PDO carries 16 bits of 6041h."""
+        self._has_statusword = True
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a drive of CiA 402.
+
+        Its device type says so; where that is not known, 6041h:00 with 16 bits does, which no
+        other profile has.
+        """
+        device_type = self.number(*DEVICE_TYPE)
+        if device_type is None:
+            return self._has_statusword
+        return device_type & 0xFFFF == DRIVE_PROFILE
+
+    def describe(self, index: int, sub: int) -> ObjectText:
+        """Return what is known of an object."""
+        text = self.eds.texts.get((index, sub)) or describe_standard(index, sub)
+        if text is None and self.is_drive:
+            text = describe_drive(index, sub)
+        return text or ObjectText()
