@@ -9,13 +9,16 @@ from typing import Final
 from tickrig.host.link import NEVER, Link
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.manager import DEFAULT_RATE_HZ, Manager
+from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc_lite.conversation import POLL_US, Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import Frame
+
+RATE_HZ: Final = 10.0
+"""A period that two round trips at 57600 bit/s do not fill."""
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -43,17 +46,18 @@ class Attachment:
     settings: Settings
     listener: Listener | None = None
     context: ExecutionContext | None = None
-    rate_hz: float = DEFAULT_RATE_HZ
+    rate_hz: float = RATE_HZ
     proxy: RtcLiteProxy | None = field(default=None, init=False)
     _talk: Conversation | None = field(default=None, init=False)  # with a device that is away
     _look_us: int = field(default=NEVER, init=False)
-    _ahead_us: int = field(default=0, init=False)  # time of the manager, seen from the link's
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do, as the manager counts time."""
-        due_us = self._link_due_us
-        return due_us if due_us == NEVER else due_us + self._ahead_us
+        """When `tick` has something to do, as the manager counts time; its clock may be another."""
+        link_due_us = self._link_due_us
+        if link_due_us == NEVER:
+            return NEVER
+        return self.manager.now_us + max(0, link_due_us - self.link.now_us)
 
     def begin(self) -> RtcLiteProxy:
         """Make a proxy and add it; RtcRefused if its device does not start up."""
@@ -65,7 +69,6 @@ class Attachment:
 
     def tick(self, now_us: int) -> None:
         """Mind the proxy, or look for the device."""
-        self._ahead_us = now_us - self.link.now_us
         if self.proxy is not None:
             self._mind(self.proxy)
         elif self._talk is not None:
@@ -132,7 +135,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
     *,
     listener: Listener | None = None,
     context: ExecutionContext | None = None,
-    rate_hz: float = DEFAULT_RATE_HZ,
+    rate_hz: float = RATE_HZ,
 ) -> RtcLiteProxy:
     """Add a proxy to a system, named with the lowest number that is free: `LiteA0`.
 

@@ -53,7 +53,7 @@ class Conversation:
     Attributes:
         watch: counts the PINGs.
         state: of the device, as far as its replies tell; None if nobody knows.
-        pushed: data of out-ports, not yet taken.
+        pushed: data of out-ports, not yet taken, with the time at which they arrived.
         in_ports: in-ports that the device has described.
         out_ports: out-ports that it has described.
     """
@@ -63,7 +63,7 @@ class Conversation:
         self._decoder = Decoder(REPLIES, settings.checksum)
         self.watch = Watch(settings.ping_period_us, settings.reply_us, settings.pings, link.now_us)
         self.state: State | None = None
-        self.pushed: list[PortData] = []
+        self.pushed: list[tuple[int, PortData]] = []
         self.in_ports: list[PortProfile] = []
         self.out_ports: list[PortProfile] = []
         self._reply: Reply | None = None
@@ -178,7 +178,7 @@ class Conversation:
         self.watch.heard_us = self.now_us
         match frame.command:
             case Command.DATA:
-                self.pushed.append(parse_port_data(frame.data))
+                self.pushed.append((self.now_us, parse_port_data(frame.data)))
             case Command.IN_PROFILE | Command.OUT_PROFILE:
                 self._take_profile(frame)
             case command if command in FAULT_COMMANDS.values():

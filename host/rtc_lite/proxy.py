@@ -260,9 +260,9 @@ class RtcLiteProxy(RtComponent):
     def _hand_out(self) -> None:
         """Write to the OutPorts what has arrived."""
         pushed, self._talk.pushed = self._talk.pushed, []
-        for data in pushed:
+        for at_us, data in pushed:
             try:
-                self._outs[data.name].give(data.data, self._talk.now_us)
+                self._outs[data.name].give(data.data, at_us)
             except (KeyError, FieldError) as error:
                 self.refused_values += 1
                 _LOG.warning("%s: data dropped: %s", self.instance_name, error)
