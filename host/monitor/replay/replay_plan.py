@@ -1,0 +1,99 @@
+"""What of a log is sent where and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from tickrig.host.monitor.heard import Heard
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+FOREVER: Final = 0
+"""As `loops`."""
+
+LEAST_LOOP_US: Final = 1_000
+
+
+class Due(NamedTuple):
+    """A frame that is to be sent.
+
+    Attributes:
+        at_us: when, counted from the start of the replay.
+        channel: on which bus.
+        frame: what.
+    """
+
+    at_us: int
+    channel: str
+    frame: CanFrame
+
+
+@dataclass(slots=True)
+class ReplayPlan:
+    """Frames of a log in the order of the log; time in it never goes back.
+
+    Args:
+        log: the frames; read again for each loop.
+        channels: where each bus of the log goes; frames of other buses are left out.
+        speed: how many times faster, 0 without any pause.
+        from_us: what is earlier than this after the first frame is left out,
+        to_us: what is later likewise; None for the end.
+        loops: how often, `FOREVER` until it is stopped. A loop begins where the one before
+            ends: at `to_us`, else with the last frame, and at least 1 ms after it began.
+
+    Attributes:
+        left_out: frames of other buses, and error frames, that were in the span.
+
+    Raises:
+        ValueError: a span that is empty, or a speed below 0.
+    """
+
+    log: Iterable[Heard]
+    channels: Mapping[str, str]
+    speed: float = 1.0
+    from_us: int = 0
+    to_us: int | None = None
+    loops: int = 1
+    left_out: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.speed < 0:
+            raise ValueError(f"speed {self.speed:g}; 0 is as fast as can be, 1 as recorded")
+        if self.to_us is not None and self.to_us <= self.from_us:
+            raise ValueError(f"from {self.from_us} us to {self.to_us} us there is nothing")
+
+    def __iter__(self) -> Iterator[Due]:
+        """Yield the frames; a log without any ends also an endless replay."""
+        begin_us, loop = 0, 0
+        while self.loops == FOREVER or loop < self.loops:
+            end_us, sent = begin_us, False
+            for at_us, heard in self._span():
+                end_us = begin_us + at_us
+                if isinstance(heard.frame, ErrorFrame) or heard.channel not in self.channels:
+                    self.left_out += 1
+                    continue
+                sent = True
+                yield Due(self._scaled(end_us), self.channels[heard.channel], heard.frame)
+            if not sent:
+                return
+            loop += 1
+            end_us = end_us if self.to_us is None else begin_us + self.to_us - self.from_us
+            begin_us = max(end_us, begin_us + LEAST_LOOP_US)
+
+    def _span(self) -> Iterator[tuple[int, Heard]]:
+        """Yield what is in the span, with its time after the beginning of the span."""
+        first_us: int | None = None
+        latest_us = 0
+        for heard in self.log:
+            first_us = heard.at_us if first_us is None else first_us
+            latest_us = max(latest_us, heard.at_us - first_us)
+            if self.to_us is not None and latest_us > self.to_us:
+                return
+            if latest_us >= self.from_us:
+                yield latest_us - self.from_us, heard
+
+    def _scaled(self, at_us: int) -> int:
+        return round(at_us / self.speed) if self.speed else 0

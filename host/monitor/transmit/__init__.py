@@ -1,0 +1,1 @@
+"""Frames to send: cyclic, with counters and checksums, and PDOs by the names of their objects."""

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_counter
+from tickrig.wire.can import CanFrame
+
+FRAME = CanFrame.parse("123#0000")
+
+
+def test_a_frame_is_sent_each_period() -> None:
+    cyclic = Cyclic(FRAME, 10_000, fields=FrameFields((parse_counter("1:5..6"),)))
+    sent = [frame for now_us in range(0, 35_000, 500) for frame in cyclic.tick(now_us)]
+    assert [str(frame) for frame in sent] == ["123#0005", "123#0006", "123#0005", "123#0006"]
+    assert cyclic.due_us == 40_000
+
+
+def test_a_count_ends_it() -> None:
+    cyclic = Cyclic(FRAME, 10, count=2)
+    assert sum(len(cyclic.tick(now_us)) for now_us in range(100)) == 2
+    assert (cyclic.due_us, cyclic.tick(1 << 50)) == (NEVER, ())
+
+
+@given(st.lists(st.integers(0, 50_000), min_size=1, max_size=50))
+def test_it_never_drifts_however_late_it_is_called(steps_us: list[int]) -> None:
+    cyclic, now_us = Cyclic(FRAME, 10_000), 0
+    for step_us in steps_us:
+        now_us += step_us
+        cyclic.tick(now_us)
+        assert cyclic.due_us % 10_000 == 0
+        assert 0 < cyclic.due_us - now_us <= 10_000
+    assert (cyclic.sent + cyclic.missed) * 10_000 == cyclic.due_us
+
+
+def test_a_period_must_be_longer_than_nothing() -> None:
+    with pytest.raises(ValueError, match="1 us is the least"):
+        Cyclic(FRAME, 0)
+    with pytest.raises(ValueError, match="no byte 2"):
+        Cyclic(FRAME, 1, fields=FrameFields((parse_counter("2:0..1"),)))
