@@ -98,8 +98,8 @@ def test_a_short_pdo_is_not_processed() -> None:
 
 
 def test_bits_and_dummies_lie_behind_each_other() -> None:
-    mapped = "585#4F00160003000000 585#4300160101010060 585#4300160207000500 585#4300160308020060 205#81AB"
-    decoded = last(mapped)
+    mapping = "585#4F00160003000000 585#4300160101010060 585#4300160207000500 585#4300160308020060"
+    decoded = last(f"{mapping} 205#81AB")
     assert decoded.kind == "rpdo1"
     assert [(s.name, s.value) for s in decoded.signals] == [("6000h:01", 1), ("6000h:02", 0xAB)]
 
