@@ -12,10 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.ident import EXTENDED, ident_of
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
-
-EXTENDED_FLAG: Final = 0x8000_0000
-REMOTE_FLAG: Final = 0x4000_0000
 
 _RULE: Final = re.compile(r"([0-9A-Fa-f]{1,8})([:~])([0-9A-Fa-f]{1,8})")
 _ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
@@ -26,8 +24,7 @@ def flagged_id(heard: Heard) -> int:
     frame = heard.frame
     if isinstance(frame, ErrorFrame):
         return ERROR_FLAG | frame.error_class
-    flags = EXTENDED_FLAG * frame.extended | REMOTE_FLAG * frame.remote
-    return flags | frame.can_id
+    return ident_of(frame)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +50,7 @@ class CandumpFilter:
         rules, error_mask, joined = [], 0, False
         for word in text.split(","):
             if rule := _RULE.fullmatch(word):
-                flag = EXTENDED_FLAG if len(rule[1]) == 8 else 0
+                flag = EXTENDED if len(rule[1]) == 8 else 0
                 mask = int(rule[3], 16) & ~ERROR_FLAG
                 rules.append((int(rule[1], 16) | flag, mask, rule[2] == "~"))
             elif errors := _ERRORS.fullmatch(word):
@@ -66,7 +63,7 @@ class CandumpFilter:
 
     def passes(self, flagged: int) -> bool:
         """Say whether a frame is wanted, by its identifier with flags."""
-        if flagged & ERROR_FLAG and not flagged & EXTENDED_FLAG:
+        if flagged & ERROR_FLAG and not flagged & EXTENDED:
             return bool(flagged & self.error_mask & ~ERROR_FLAG)
         held = ((flagged & mask == ident & mask) != inverse for ident, mask, inverse in self.rules)
         return not self.rules or (all(held) if self.joined else any(held))

@@ -49,7 +49,7 @@ def parse_log_line(line: str, number: int, tally: Tally) -> Heard | None:
     parse = parse_json_line if text.startswith("{") else _parse_candump
     heard = parse(text, tally)
     if heard is None:
-        tally.bad_lines.add(number, line)
+        tally.bad_lines.add(number, line.rstrip("\r"))
     return heard if isinstance(heard, Heard) else None
 
 

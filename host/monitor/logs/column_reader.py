@@ -1,0 +1,75 @@
+"""A log file as columns, many lines at a time.
+
+A candump log is read in blocks. Its usual lines are taken apart all at once
+(`candump_block`); every other line goes through the parser of single lines, so
+that the result is the same, frame for frame. Other formats are read frame by frame.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from tickrig.host.monitor.logs.candump_block import CandumpBlock
+from tickrig.host.monitor.logs.columns import ChannelNames, Columns, Rows, joined
+from tickrig.host.monitor.logs.log_format import LogFormat, log_format
+from tickrig.host.monitor.logs.log_line import parse_log_line
+from tickrig.host.monitor.logs.log_reader import LogError, LogReader, open_log, read_log
+from tickrig.host.monitor.logs.tally import Tally
+
+BLOCK_BYTES: Final = 1 << 20
+BATCH: Final = 1 << 16
+
+
+def read_columns(path: Path) -> Columns:
+    """Read a whole log.
+
+    Raises:
+        LogFormatError: the file's name tells no format.
+        OSError: the file cannot be read.
+        LogError: it is not what its name says, or has more than 256 buses.
+    """
+    channels = ChannelNames()
+    if log_format(path) is not LogFormat.CANDUMP:
+        reader = read_log(path)
+        return joined(_batches(reader, channels), channels, reader.tally)
+    tally = Tally()
+    with open_log(path) as file:
+        return joined(_blocks(file, path, channels, tally), channels, tally)
+
+
+def _batches(reader: LogReader, channels: ChannelNames) -> Iterator[Rows]:
+    frames = iter(reader)
+    while batch := list(islice(frames, BATCH)):
+        yield Rows.of(batch, channels)
+
+
+def _blocks(file: BinaryIO, path: Path, channels: ChannelNames, tally: Tally) -> Iterator[Rows]:
+    rest, number, more = b"", 0, True
+    while more:
+        try:
+            data = file.read(BLOCK_BYTES)
+        except (EOFError, zlib.error) as error:
+            raise LogError(f"{path}: {error}") from error
+        more = bool(data)
+        whole, _, rest = (rest + data).rpartition(b"\n") if more else (rest, b"", b"")
+        if whole:
+            rows = _take_apart(whole + b"\n", number, channels, tally)
+            number += len(rows.known)
+            yield rows
+
+
+def _take_apart(text: bytes, number: int, channels: ChannelNames, tally: Tally) -> Rows:
+    """Return a row for each line; `number` lines are before them."""
+    block = CandumpBlock(text)
+    rows = Rows(len(block.starts))
+    block.take(rows, channels)
+    for row in (~rows.known).nonzero()[0].tolist():
+        heard = parse_log_line(block.line(row), number + row + 1, tally)
+        if heard is None:
+            continue
+        rows.put(row, heard, channels.place(heard.channel))
+    return rows
