@@ -61,6 +61,16 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
     return list(found.values())
 
 
+def describe_device(name: str) -> DeviceDescription:
+    """Describe a model, or the DeviceRTC of a user's file; Refused if there is none."""
+    if name in MODELS:
+        return MODELS[name].describe()
+    try:
+        return describe_rtc(name)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+
+
 def make_nodes(
     described: Iterable[Described], wire: CanWire, store: StoreFile | None = None
 ) -> list[Node]:
@@ -79,16 +89,9 @@ def make_nodes(
 
 def _describe(cache: EdsCache, device: Path | str, profile: str) -> DeviceDescription:
     if isinstance(device, str):
-        return MODELS[device].describe() if device in MODELS else _component(device)
+        return describe_device(device)
     description = _read(cache, device)
     return replace(description, application=application_of(description.template, profile))
-
-
-def _component(spec: str) -> DeviceDescription:
-    try:
-        return describe_rtc(spec)
-    except ValueError as error:
-        raise Refused(str(error)) from None
 
 
 def _read(cache: EdsCache, file: Path) -> DeviceDescription:

@@ -9,11 +9,13 @@ from typing import Any, Final
 import click
 from click.shell_completion import CompletionItem
 
+from tickrig.emulators.canopen.build import describe_device
 from tickrig.emulators.canopen.eds_writer import write_eds as format_eds
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.profiles import AUTO, CHOICES
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
+from tickrig.emulators.canopen.rtc import one_line_for
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
 from tickrig.emulators.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -42,6 +44,7 @@ def complete_node(
     metavar="NAME",
     help=f"Device that needs no file: {', '.join(MODELS)}.",
 )
+@click.option("--rtc", metavar="FILE.py:Class", help="DeviceRTC: the component of a file of yours.")
 @click.option("--node-id", metavar="N", help="1..127, or lss for a node that waits for LSS.")
 @click.option(
     "--node",
@@ -61,7 +64,7 @@ def complete_node(
 @click.option(
     "--write-eds",
     type=PATH,
-    help="Write the EDS of --model to a file (- is standard output), and end.",
+    help="Write the EDS of --model or --rtc to a file (- is standard output), and end.",
 )
 @bus_options
 @click.option("--store", type=PATH, help="File for what is stored by 1010h and LSS.")
@@ -74,6 +77,7 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     eds: Path | None,
     dcf: Path | None,
     model: str | None,
+    rtc: str | None,
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
@@ -95,6 +99,7 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     canopen-slave-emu --eds motor.eds --node-id lss --store memory.json -c can0 -i socketcan
     canopen-slave-emu --eds motor.eds --node-id 5 --scenario start.txt > run.log
     canopen-slave-emu --rig examples/rigs/beego.toml -i socketcan -c vcan0
+    canopen-slave-emu --rtc my_rtc.py:Gripper --node-id 16 -i socketcan -c vcan0
     canopen-slave-emu --model epos --write-eds epos.eds
 
     \b
@@ -102,30 +107,29 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     eval "$(_CANOPEN_SLAVE_EMU_COMPLETE=bash_source canopen-slave-emu)"
     """  # noqa: D301 - click wants the backspace
     if write_eds:
-        _write_eds(model, write_eds)
+        _write_eds(model, rtc, write_eds)
         return
     bus = BusOptions(**{name: options.pop(name) for name in BUS_FIELDS})
     file = RigFile(()) if rig is None else read_rig(rig)
-    specs = (*_specs(eds, dcf, model, node_id), *_more(nodes), *file.nodes)
+    given = {"--eds": eds, "--dcf": dcf, "--model": model, "--rtc": rtc}
+    specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
     run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, **options))
-    context.exit(run.run())
+    with one_line_for(spec.device for spec in specs):
+        context.exit(run.run())
 
 
-def _specs(
-    eds: Path | None, dcf: Path | None, model: str | None, node_id: str | None
-) -> Iterator[NodeSpec]:
-    """Give the nodes of --eds, --dcf or --model."""
-    given = {"--eds": eds, "--dcf": dcf, "--model": model}
-    named = [option for option, value in given.items() if value]
+def _specs(given: dict[str, Path | str | None], node_id: str | None) -> Iterator[NodeSpec]:
+    """Give the nodes of --eds, --dcf, --model or --rtc."""
+    named = {option: device for option, device in given.items() if device}
     if len(named) > 1:
         raise Refused(f"{' and '.join(named)} name the same thing: give one of them")
-    device = eds or dcf or model
-    if device and node_id:
-        yield from (NodeSpec(device, number) for number in parse_ids("--node-id", node_id))
-    elif device:
-        yield NodeSpec(device, None)
-    elif node_id:
-        raise Refused("--node-id belongs to --eds, --dcf or --model; with --node write N=FILE")
+    for device in named.values():
+        numbers = parse_ids("--node-id", node_id) if node_id else (None,)
+        yield from (NodeSpec(device, number) for number in numbers)
+    if node_id and not named:
+        raise Refused(
+            "--node-id belongs to --eds, --dcf, --model or --rtc; with --node write N=FILE"
+        )
 
 
 def _more(nodes: tuple[str, ...]) -> Iterator[NodeSpec]:
@@ -133,11 +137,11 @@ def _more(nodes: tuple[str, ...]) -> Iterator[NodeSpec]:
         yield from parse_node(text)
 
 
-def _write_eds(model: str | None, path: Path) -> None:
-    """Write the EDS of a model."""
-    if model is None:
-        raise Refused("--write-eds belongs to --model")
-    description = MODELS[model].describe()
+def _write_eds(model: str | None, rtc: str | None, path: Path) -> None:
+    """Write the EDS of a model or a component."""
+    if not (model or rtc):
+        raise Refused("--write-eds belongs to --model or --rtc")
+    description = describe_device(model or rtc or "")
     text = format_eds(description.template, description.info)
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=False)

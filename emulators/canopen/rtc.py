@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import traceback
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
+
+import click
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.make import application_of, make_device_rtc
@@ -11,6 +17,7 @@ from tickrig.device.canopen.device_rtc.objects import dictionary_of
 from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
 from tickrig.emulators.canopen.eds import BIT_RATES_KBIT
 from tickrig.emulators.user_file import find_class, told
+from tickrig.host.cli.refused import Refused
 
 ANY_ID: Final = 1
 
@@ -41,3 +48,19 @@ def describe_rtc(spec: str) -> DeviceDescription:
     except Exception as error:  # a user's constructor may raise anything
         raise ValueError(f"{spec}: {told(error, spec.rpartition(':')[0])}") from None
     return describe_component(spec, kind, None)
+
+
+@contextmanager
+def one_line_for(devices: Iterable[Path | str]) -> Iterator[None]:
+    """Say in a line what a callback of a user's file raised; other errors pass."""
+    files = {spec.rpartition(":")[0]: spec for spec in devices if isinstance(spec, str)}
+    try:
+        yield
+    except click.exceptions.Exit:
+        raise
+    except Exception as error:  # a user's callback may raise anything
+        frames = traceback.extract_tb(error.__traceback__)
+        mine = next((file for file in files if any(file == at.filename for at in frames)), None)
+        if mine is None:
+            raise
+        raise Refused(f"{files[mine]}: {told(error, mine)}") from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
 from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.pdo_producer import PdoProducer
@@ -77,11 +76,7 @@ class DeviceRtc(Application):
         component.inputs = self.inputs
         for place in self._places:
             entries = [self.node.dictionary[place.index, sub] for sub in place.subs]
-            port = component.ports[place.profile.name]
-            if isinstance(port, InPort):
-                port.join(entries)
-            elif isinstance(port, OutPort):
-                port.join(entries, self._event)
+            component.ports[place.profile.name].join(entries, self._event)
         return component
 
     def _event(self, entry: Entry) -> None:

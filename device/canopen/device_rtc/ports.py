@@ -26,6 +26,10 @@ class Port(Generic[T]):
         self.name, self.port_type = name, port_type
         self.entries: Sequence[Entry] = ()
 
+    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
+        """Keep its value in these objects; `event` sends the TPDOs that carry one."""
+        self.entries, self._event = entries, event
+
     @property
     def profile(self) -> PortProfile:
         """The port as the profile of its component has it."""
@@ -47,9 +51,9 @@ class InPort(Port[T]):
     direction = Direction.IN
     is_new = False
 
-    def join(self, entries: Sequence[Entry]) -> None:
-        """Take its value from these objects."""
-        self.entries = entries
+    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
+        """Keep its value in these objects, and hear of each write."""
+        super().join(entries, event)
         for entry in entries:
             entry.written = self._mark
 
@@ -66,10 +70,6 @@ class OutPort(Port[T]):
     """Where the component writes; its TPDO goes out once in a tick with a write."""
 
     direction = Direction.OUT
-
-    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Leave its value in these objects; `event` sends those PDOs that carry one."""
-        self.entries, self._event = entries, event
 
     def write(self, value: T) -> None:
         """Leave a value; it is sent in Active, also if it is the same as before.

@@ -189,10 +189,10 @@ def test_lss_finds_a_node_without_node_id() -> None:
     ("words", "error"),
     [
         ("", "no node: give --eds FILE --node-id N, --model NAME, --node N=FILE or --rig FILE"),
-        ("--node-id 5", "--node-id belongs to --eds, --dcf or --model; with --node write N=FILE"),
+        ("--node-id 5", "--node-id belongs to --eds, --dcf, --model or --rtc; with --node write"),
         (f"--eds {EDS} --dcf {DCF}", "--eds and --dcf name the same thing: give one of them"),
         (f"--dcf {DCF} --model f-palette", "--dcf and --model name the same thing"),
-        (f"--eds {EDS} --write-eds x.eds", "--write-eds belongs to --model"),
+        (f"--eds {EDS} --write-eds x.eds", "--write-eds belongs to --model or --rtc"),
         ("--model f-palette --write-eds /nowhere/x", "EDS /nowhere/x: No such file"),
         (f"--node 5={EDS} --profile 402 --node 5=f-palette", "node 5 is there twice"),
         (f"--eds {EDS}", f"{EDS} gives no node-ID: add --node-id 1..127, or --node-id lss"),

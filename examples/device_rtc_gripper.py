@@ -1,0 +1,43 @@
+"""A gripper as DeviceRTC: an RT component on the microcontroller of a CANopen slave.
+
+`canopen-slave-emu --rtc examples/device_rtc_gripper.py:Gripper --node-id 16 -c vcan0 -i socketcan`
+runs it. NMT Start activates it; while its motor is hot it ends in Error.
+"""
+
+from __future__ import annotations
+
+from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
+from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+from tickrig.device.physical import Input
+from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT
+
+STEP_UM = 500
+HOT_DC = 900
+
+
+class Gripper(Component):
+    """Opens to what the in-port says, 500 um each 10 ms, and says how wide it is."""
+
+    type_name = "Gripper"
+    category = "actuator"
+    physical = (Input("motor_dc", "at the motor", low=-400, high=1_250, unit="0.1 degC"),)
+    target_um = InPort("target_um", SHORT)
+    width_um = OutPort("width_um", SHORT)
+    moving = OutPort("moving", BOOLEAN)
+
+    def on_execute(self) -> Result:
+        """Move towards the target."""
+        width_um, target_um = self.width_um.value, self.target_um.read()
+        step_um = max(-STEP_UM, min(STEP_UM, target_um - width_um))
+        if step_um or self.moving.value:
+            self.width_um.write(width_um + step_um)
+            self.moving.write(step_um != 0)
+        return self.error_check()
+
+    def error_check(self) -> Result:
+        """Look at the temperature."""
+        return ERROR if self.inputs["motor_dc"] > HOT_DC else None
+
+    def on_reset(self) -> Result:
+        """Stay in Error until it is cooler."""
+        return self.error_check()
