@@ -8,6 +8,7 @@ from tickrig import __version__
 from tickrig.emulators.ctl_cli import ctl
 from tickrig.emulators.demo_cli import demo
 from tickrig.emulators.replay_cli import replay_command
+from tickrig.emulators.rtc.cli import rtc
 
 
 @click.group()
@@ -19,6 +20,7 @@ def main() -> None:
     tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
     tickrig replay run.trace                      replay a recorded run
     tickrig demo rrc                              see a device and a host at work
+    tickrig rtc run system.toml                   run RT components
 
     \b
     Completion of commands and options in the shell:
@@ -31,3 +33,4 @@ def main() -> None:
 main.add_command(ctl)
 main.add_command(demo)
 main.add_command(replay_command)
+main.add_command(rtc)

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.ask import ask
 from tickrig.emulators.requests import Object
 from tickrig.host.cli.duration import format_time, parse_time_us
 from tickrig.host.cli.refused import Refused
@@ -39,7 +39,7 @@ def ctl(context: click.Context, /, socket: Path) -> None:
 @click.pass_obj
 def describe(socket: Path, as_json: bool) -> None:
     """List inputs, groups, outputs and faults."""
-    _show(_ask(socket, "describe"), _describe, as_json)
+    _show(ask(socket, "describe"), _describe, as_json)
 
 
 @ctl.command()
@@ -49,7 +49,7 @@ def describe(socket: Path, as_json: bool) -> None:
 def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
     """Show inputs and outputs by NAME, all if none is named."""
     fields = {"names": list(names)} if names else {}
-    _show(_ask(socket, "get", **fields), _values, as_json)
+    _show(ask(socket, "get", **fields), _values, as_json)
 
 
 @ctl.command("set", context_settings={"ignore_unknown_options": True})
@@ -60,7 +60,7 @@ def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
 def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> None:
     """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
     _show(
-        _ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
+        ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
         _nothing,
         as_json,
     )
@@ -77,7 +77,7 @@ def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
         duration_us = parse_time_us(duration)
     except ValueError as error:
         raise Refused(str(error)) from None
-    _show(_ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
+    _show(ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
 
 
 @ctl.command()
@@ -86,7 +86,7 @@ def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
 @click.pass_obj
 def fault(socket: Path, spec: str, as_json: bool) -> None:
     """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
-    _show(_ask(socket, "fault", spec=spec), _nothing, as_json)
+    _show(ask(socket, "fault", spec=spec), _nothing, as_json)
 
 
 @ctl.command()
@@ -95,7 +95,7 @@ def fault(socket: Path, spec: str, as_json: bool) -> None:
 @click.pass_obj
 def clear(socket: Path, name: str, as_json: bool) -> None:
     """Let the fault NAME go."""
-    _show(_ask(socket, "clear", name=name), _nothing, as_json)
+    _show(ask(socket, "clear", name=name), _nothing, as_json)
 
 
 @ctl.command()
@@ -104,7 +104,7 @@ def clear(socket: Path, name: str, as_json: bool) -> None:
 @click.pass_obj
 def lines(socket: Path, since: int, as_json: bool) -> None:
     """Show the latest lines on the wire, at most 100."""
-    _show(_ask(socket, "lines", since=since), _lines, as_json)
+    _show(ask(socket, "lines", since=since), _lines, as_json)
 
 
 @ctl.command()
@@ -112,7 +112,7 @@ def lines(socket: Path, since: int, as_json: bool) -> None:
 @click.pass_obj
 def status(socket: Path, as_json: bool) -> None:
     """Show how the run is going: time, late ticks, lost bytes, faults."""
-    _show(_ask(socket, "status"), _status, as_json)
+    _show(ask(socket, "status"), _status, as_json)
 
 
 @ctl.command()
@@ -120,23 +120,7 @@ def status(socket: Path, as_json: bool) -> None:
 @click.pass_obj
 def stop(socket: Path, as_json: bool) -> None:
     """End the emulator."""
-    _show(_ask(socket, "stop"), _nothing, as_json)
-
-
-def _ask(socket: Path, do: str, **fields: object) -> Object:
-    try:
-        with ControlClient(socket) as client:
-            return client.ask(do, **fields)
-    except TimeoutError:
-        raise Refused(f"socket {socket}: the emulator does not answer") from None
-    except OSError as error:
-        hint = ", is the emulator running?" if isinstance(error, _NOBODY) else ""
-        raise Refused(f"socket {socket}: {error.strerror or error}{hint}") from None
-    except ValueError as error:
-        raise Refused(str(error)) from None
-
-
-_NOBODY = (FileNotFoundError, ConnectionRefusedError)
+    _show(ask(socket, "stop"), _nothing, as_json)
 
 
 def _show(answer: Object, words: Callable[[Any], list[str]], as_json: bool) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 import click
 
@@ -19,6 +16,7 @@ from tickrig.emulators.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.player import Player
 from tickrig.emulators.scenario import Line, ScenarioParser
 from tickrig.emulators.serving_clock import ServingClock
+from tickrig.emulators.signals import stopped_by_signals
 from tickrig.emulators.workbench import Workbench
 from tickrig.host.cli.refused import Refused, refuse_path
 
@@ -58,7 +56,7 @@ class EmulatorRun(ABC):
         faults, scenario = self._checked()
         with ExitStack() as stack:
             if self._in_real_time:
-                stack.enter_context(self._stopped_by_signals())
+                stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
             stack.callback(bench.close)
             self._serve_control(stack, bench)
@@ -114,22 +112,10 @@ class EmulatorRun(ABC):
         while bench.running and not self._stopped:
             bench.step()
 
-    @contextmanager
-    def _stopped_by_signals(self) -> Iterator[None]:
-        """Let Ctrl-C, SIGTERM and a closed terminal end the run after its tick."""
-
-        def stop(number: int, frame: FrameType | None) -> None:
-            self._stopped = True
-            if self._running:
-                self._running.stop()
-
-        signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        before = {number: signal.signal(number, stop) for number in signals}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+    def _stop(self) -> None:
+        self._stopped = True
+        if self._running:
+            self._running.stop()
 
     def _sum_up(self, bench: Workbench, player: Player | None) -> int:
         """Say how it went; 1 if an expectation was not met."""

@@ -1,0 +1,1 @@
+"""A system of RT components that runs: the commands `tickrig rtc`."""

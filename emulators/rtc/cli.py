@@ -1,0 +1,73 @@
+"""The command `tickrig rtc`: run a system of RT components, and work with a running one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from tickrig.emulators.rtc.at import VARIABLE, default_path
+from tickrig.emulators.rtc.conf_cli import conf
+from tickrig.emulators.rtc.print_cli import print_
+from tickrig.emulators.rtc.run import SystemOptions, run_system
+from tickrig.emulators.rtc.verbs_cli import VERBS
+from tickrig.host.cli.options import PATH
+
+
+@click.group()
+def rtc() -> None:
+    """Run RT components, and work with them while they run, in the manner of rtshell.
+
+    Components are named ConsoleIn0 or localhost/ConsoleIn0.rtc, ports
+    ConsoleIn0.out or localhost/ConsoleIn0.rtc:out.
+
+    \b
+    tickrig rtc run system.toml               in one terminal; in another one
+    tickrig rtc ls -l
+    tickrig rtc con ConsoleIn0.out ConsoleOut0.in
+    tickrig rtc act ConsoleIn0 ConsoleOut0
+    tickrig rtc print ConsoleIn0.out
+    tickrig rtc inject ConsoleOut0.in 5
+
+    Exit status 0; 1 where a component did not get to the state that was asked
+    for; 2 with one line where something was refused, and nothing changed.
+    """  # noqa: D301 - click wants the backspace
+
+
+@rtc.command()
+@click.argument("system", type=PATH)
+@click.option(
+    "--control",
+    type=PATH,
+    envvar=VARIABLE,
+    default=default_path,
+    metavar="PATH",
+    help=f"Control socket to serve; also from {VARIABLE}.",
+)
+@click.option(
+    "--component",
+    "components",
+    multiple=True,
+    metavar="FILE.py:Class",
+    help="Another type of components; may be repeated.",
+)
+@click.option("--rate", "rate_hz", type=float, metavar="HZ", help="Rate of all components.")
+@click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
+@click.option("--console", is_flag=True, help="Numbers typed here go to each ConsoleIn.")
+def run(**options: Any) -> None:
+    """Run the system of a file in real time, until Ctrl-C.
+
+    SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
+    System Editor write it. Types that are known: ConsoleIn, ConsoleOut, SeqIn,
+    SeqOut, ConfigSample. What arrives at a ConsoleOut is printed.
+
+    \b
+    tickrig rtc run system.toml
+    tickrig rtc run system.xml --component my_rtc.py:Scale --save after.toml
+    seq 1 5 | tickrig rtc run chain.toml --console
+    """  # noqa: D301 - click wants the backspace
+    run_system(SystemOptions(**options))
+
+
+for _command in (*VERBS, conf, print_):
+    rtc.add_command(_command)

@@ -1,0 +1,151 @@
+"""What can be asked of a running system of RT components (docs/rtc.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tickrig.emulators.requests import Object, Requests, short, text_of, whole
+from tickrig.emulators.rtc.descriptions import describe_component
+from tickrig.host.rtc.configuration import Configuration
+from tickrig.host.rtc.literal import literal
+from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.port import AnyPort
+from tickrig.host.rtc.probes import Probes
+from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.rtc.rts_profile import write_rts_profile
+from tickrig.host.rtc.system import describe
+from tickrig.host.rtc.system_toml import write_toml
+
+
+class SystemControl(Requests):
+    """Answers requests about one system; it must not be ticking meanwhile.
+
+    Args:
+        manager: the system.
+        runner: who runs it.
+    """
+
+    def __init__(self, manager: Manager, runner: RealTime) -> None:
+        self._manager, self._runner, self._probes = manager, runner, Probes(manager)
+        runner.after_tick.append(self._probes.tick)
+        super().__init__(
+            {
+                "describe": (self._describe, ("names",)),
+                "connect": (self._connect, ("ports", "properties", "name")),
+                "disconnect": (self._disconnect, ("ports",)),
+                "activate": (self._move(manager.activate), ("name",)),
+                "deactivate": (self._move(manager.deactivate), ("name",)),
+                "reset": (self._move(manager.reset), ("name",)),
+                "delete": (self._move(manager.delete), ("name",)),
+                "set_parameter": (self._set_parameter, ("name", "parameter", "value", "set")),
+                "activate_set": (self._activate_set, ("name", "set")),
+                "seen": (self._seen, ("port", "since")),
+                "inject": (self._inject, ("port", "value")),
+                "save": (self._save, ("format",)),
+                "status": (self._status, ()),
+                "stop": (self._stop, ()),
+            }
+        )
+
+    def saved(self, what: str) -> str:
+        """Return the system as a file; ValueError unless `what` is `toml` or `xml`."""
+        match what:
+            case "toml":
+                return write_toml(describe(self._manager))
+            case "xml":
+                return write_rts_profile(self._manager)
+            case _:
+                raise ValueError(f"format is toml or xml, not {short(what)}")
+
+    def _describe(self, request: Object) -> Object:
+        manager = self._manager
+        names = _texts(request, "names", 0) if "names" in request else ()
+        components = [manager.find(name) for name in names] or manager.components
+        return {
+            "components": [describe_component(manager, component) for component in components],
+            "types": list(manager.types),
+        }
+
+    def _connect(self, request: Object) -> Object:
+        first, second = _texts(request, "ports", 2)
+        properties = request.get("properties", {})
+        if not isinstance(properties, dict) or not all(
+            isinstance(value, str) for value in properties.values()
+        ):
+            raise ValueError(f"properties are strings by name, not {short(properties)}")
+        name = text_of({"name": "", **request}, "name")
+        profile = self._manager.connect(first, second, properties, name=name)
+        return {"name": profile.name, "properties": dict(profile.properties)}
+
+    def _disconnect(self, request: Object) -> Object:
+        names = _texts(request, "ports", 0)
+        if len(names) == 2:
+            self._manager.disconnect(*names)
+            return {}
+        for port in self._ports(*names):
+            port.disconnect_all()
+        return {}
+
+    def _ports(self, *names: str) -> tuple[AnyPort, ...]:
+        """Return a port, or all those of a component."""
+        if len(names) != 1:
+            raise ValueError(f"ports are one or two names, not {len(names)}")
+        (name,) = names
+        if ":" in name or ("." in name and "/" not in name):
+            return (self._manager.port(name),)
+        return tuple(self._manager.find(name).ports.values())
+
+    def _move(self, ask: Callable[[str], None]) -> Callable[[Object], Object]:
+        def move(request: Object) -> Object:
+            ask(text_of(request, "name"))
+            return {}
+
+        return move
+
+    def _set_parameter(self, request: Object) -> Object:
+        set_id = text_of({"set": "", **request}, "set")
+        value = text_of(request, "value")
+        self._configuration(request).set(text_of(request, "parameter"), value, set_id)
+        return {}
+
+    def _activate_set(self, request: Object) -> Object:
+        self._configuration(request).activate(text_of(request, "set"))
+        return {}
+
+    def _configuration(self, request: Object) -> Configuration:
+        return self._manager.find(text_of(request, "name")).configuration
+
+    def _seen(self, request: Object) -> Object:
+        since = whole(request.get("since", 0), "since")
+        seen, latest = self._probes.seen(text_of(request, "port"), since)
+        values = [{"number": one.number, "value": literal(one.value)} for one in seen]
+        return {"values": values, "latest": latest}
+
+    def _inject(self, request: Object) -> Object:
+        if "value" not in request:
+            raise ValueError("inject needs a value")
+        return {"value": literal(self._probes.inject(text_of(request, "port"), request["value"]))}
+
+    def _save(self, request: Object) -> Object:
+        return {"text": self.saved(text_of({"format": "toml", **request}, "format"))}
+
+    def _status(self, request: Object) -> Object:
+        return {
+            "components": len(self._manager.components),
+            "now_us": self._manager.now_us,
+            "late_ticks": self._runner.late_ticks,
+            "late_us": self._runner.late_us,
+        }
+
+    def _stop(self, request: Object) -> Object:
+        self._runner.stop()
+        return {}
+
+
+def _texts(request: Object, key: str, count: int) -> list[str]:
+    """Return a list of strings, of a length unless that is 0."""
+    value = request.get(key)
+    texts = [text for text in value if isinstance(text, str)] if isinstance(value, list) else None
+    if texts is None or texts != value or (count and len(texts) != count):
+        raise ValueError(f"{key} is a list of {count or 'some'} names, not {short(value)}")
+    return texts

@@ -1,0 +1,101 @@
+"""Run a system of RT components in real time, as a command line asks."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import click
+
+from tickrig.emulators.control_server import ControlServer
+from tickrig.emulators.rtc.console import Console
+from tickrig.emulators.rtc.control import SystemControl
+from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
+from tickrig.emulators.run import say
+from tickrig.emulators.serving_clock import ServingClock
+from tickrig.emulators.signals import stopped_by_signals
+from tickrig.emulators.user_file import find_class, told
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.components import EXAMPLES
+from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.rtc.system import System, restore
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SystemOptions:
+    """The command line of `tickrig rtc run`."""
+
+    system: Path
+    control: Path
+    components: tuple[str, ...] = ()
+    rate_hz: float | None = None
+    save: Path | None = None
+    console: bool = False
+
+
+def run_system(options: SystemOptions) -> None:
+    """Run until somebody stops it.
+
+    Raises:
+        Refused: the command line asks for something that cannot be done.
+    """
+    system = read_system(options.system)
+    if options.save is not None:
+        file_format(options.save)
+    manager = Manager()
+    for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
+        manager.register(kind)
+    _restore(manager, system, options)
+    clock = ServingClock()
+    runner = RealTime(manager, clock)
+    control = SystemControl(manager, runner)
+    with ExitStack() as stack:
+        stack.enter_context(stopped_by_signals(runner.stop))
+        clock.serve = _serve(stack, options.control, control).serve
+        _run(manager, runner, options)
+    if options.save is not None:
+        write_system(control.saved(file_format(options.save)), options.save)
+
+
+def find_rt_component(spec: str) -> type[RtComponent]:
+    """Return the class that `FILE.py:Class` stands for; Refused if no component can be of it."""
+    try:
+        kind: type[RtComponent] = find_class(spec, RtComponent)
+        kind(f"{kind.spec.type_name}0")
+    except Exception as error:  # a user's constructor may raise anything
+        raise Refused(f"--component {spec}: {told(error, spec.rpartition(':')[0])}") from None
+    return kind
+
+
+def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
+    if (rate_hz := options.rate_hz) is not None:
+        entries = tuple(replace(entry, rate_hz=rate_hz) for entry in system.components)
+        system = replace(system, components=entries)
+    try:
+        restore(manager, system)
+    except ValueError as error:
+        raise Refused(f"system {options.system}: {error}") from None
+
+
+def _serve(stack: ExitStack, path: Path, control: SystemControl) -> ControlServer:
+    try:
+        server = ControlServer(path, control)
+    except OSError as error:
+        refuse_path("control", error)
+    stack.callback(server.close)
+    return server
+
+
+def _run(manager: Manager, runner: RealTime, options: SystemOptions) -> None:
+    console = Console(manager, click.echo, say)
+    if options.console:
+        runner.after_tick.append(lambda now_us: console.read(sys.stdin.fileno()))
+    names = ", ".join(component.instance_name for component in manager.components) or "Nothing"
+    say(f"{names}. Ctrl-C ends.\n  tickrig rtc ls -l --at {options.control}")
+    runner.run()
+    worst = f" (up to {runner.late_us / 1_000:.1f} ms)" if runner.late_ticks else ""
+    say(f"ran {manager.now_us / 1e6:.3f} s; late ticks: {runner.late_ticks}{worst}")

@@ -1,0 +1,86 @@
+"""Descriptions of components as people read them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from tickrig.host.cli.duration import format_time
+
+
+def component_row(component: Any) -> str:
+    """Write a line of `ls -l`: state, ports with those that are connected, rate, type, name."""
+    ports = component["ports"]
+    connected = sum(1 for port in ports if port["connectors"])
+    rate = f"{component['contexts'][0]['rate_hz']:g}Hz"
+    state = component["state"].capitalize()
+    return (
+        f"{state:<9} {len(ports):>3}/{connected:<3} {rate:>9}  "
+        f"{component['type']:<16} {component['name']}"
+    )
+
+
+def component_lines(component: Any, *, long: bool) -> Iterator[str]:
+    """Write what `cat` shows.
+
+    Args:
+        component: its description.
+        long: connectors with their properties, and all configuration sets.
+    """
+    yield f"{component['name']}  {component['state'].capitalize()}"
+    yield f"  {'Path':<14}{component['path']}"
+    for key in ("type", "description", "version", "vendor", "category"):
+        yield f"  {key.capitalize():<14}{component[key]}".rstrip()
+    for context in component["contexts"]:
+        runs = "" if context["running"] else ", stopped"
+        yield f"  {'Runs at':<14}{context['rate_hz']:g} Hz{runs}"
+    for port in component["ports"]:
+        yield from _port_lines(port, long=long)
+    yield from configuration_lines(component["configuration"], long=long)
+
+
+def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
+    yield f"  {port['kind']:<14}{port['name']}  {_short_type(port['data_type'])}".rstrip()
+    for interface in port["interfaces"]:
+        yield f"    {interface['polarity'].lower()} {interface['name']} ({interface['type']})"
+    for connector in port["connectors"]:
+        (other,) = [name for name in connector["ports"] if name != port["name"]]
+        yield f"    connected to {other}"
+        if long:
+            properties = {"name": connector["name"], **connector["properties"]}
+            yield from (f"      {key} = {value}" for key, value in properties.items())
+
+
+def configuration_lines(configuration: Any, *, long: bool) -> Iterator[str]:
+    """Write the parameters with the values that hold, and with `long` those of each set."""
+    for parameter in configuration["parameters"]:
+        value = f"{parameter['name']} = {parameter['value']} {parameter['unit']}".rstrip()
+        allowed = f"  [{parameter['constraint']}]" if parameter["constraint"] else ""
+        yield f"  {'Parameter':<14}{value}{allowed}"
+    if not configuration["parameters"]:
+        return
+    for set_id, values in configuration["sets"].items():
+        star = " *" if set_id == configuration["active"] else ""
+        yield f"  {'Set':<14}{set_id}{star}"
+        if long:
+            yield from (f"    {name} = {value}" for name, value in values.items())
+
+
+def value_line(value: Any) -> str:
+    """Write a value of a port: its time in seconds if it has one, and its data.
+
+    >>> value_line({"tm": {"sec": 1, "nsec": 500000000}, "data": -5})
+    '1.500000 -5'
+    >>> value_line({"x": 1.0})
+    '{"x": 1.0}'
+    """
+    if set(value) == {"tm", "data"}:
+        time_us = value["tm"]["sec"] * 1_000_000 + value["tm"]["nsec"] // 1_000
+        return f"{format_time(time_us)} {json.dumps(value['data'])}"
+    return json.dumps(value)
+
+
+def _short_type(idl_id: str) -> str:
+    """Write `IDL:RTC/TimedLong:1.0` as `TimedLong`."""
+    return idl_id.removeprefix("IDL:").removesuffix(":1.0").removeprefix("RTC/")

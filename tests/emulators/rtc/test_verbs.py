@@ -1,0 +1,244 @@
+"""The verbs of `tickrig rtc` on a running system."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tests.emulators.rtc.served import Served
+from tickrig.emulators.cli import main
+from tickrig.host.rtc import ExecutionContext, ReturnCode
+from tickrig.host.rtc.rts_profile import parse_rts_profile
+from tickrig.host.rtc.system import describe
+from tickrig.host.rtc.system_toml import parse_toml
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> Iterator[Served]:
+    with Served(tmp_path / "ctl") as served:
+        yield served
+
+
+def test_ls_lists_the_components(system: Served) -> None:
+    names = ["ConsoleIn0", "ConsoleOut0", "ConfigSample0", "SeqOut0"]
+    assert system.rtc("ls").split() == names
+    assert system.rtc("ls", "localhost/SeqOut0.rtc").split() == ["SeqOut0"]
+
+
+def test_ls_l_shows_state_ports_rate_and_type(system: Served) -> None:
+    lines = system.rtc("ls", "-l").splitlines()
+    assert lines[0].split() == ["Active", "1/1", "1000Hz", "ConsoleIn", "ConsoleIn0"]
+    assert lines[-1].split() == ["Inactive", "10/0", "1000Hz", "SeqOut", "SeqOut0"]
+
+
+def test_cat_shows_ports_with_their_types_and_connectors(system: Served) -> None:
+    text = system.rtc("cat", "ConsoleOut0")
+    assert text.startswith("ConsoleOut0  Active\n  Path          localhost/ConsoleOut0.rtc\n")
+    assert "  DataInPort    ConsoleOut0.in  TimedLong\n    connected to ConsoleIn0.out\n" in text
+    assert "dataport" not in text
+    assert "      dataport.subscription_type = flush\n" in system.rtc("cat", "-l", "ConsoleOut0")
+
+
+def test_cat_shows_the_configuration(system: Served) -> None:
+    system.manager.find("ConfigSample0").configuration.add_set("fast", {"int_param0": "9"})
+    text = system.rtc("cat", "-l", "ConfigSample0")
+    assert "  Parameter     int_param0 = 0  [0<=x<=150]\n" in text
+    assert "  Set           default *\n    int_param0 = 0\n" in text
+    assert text.endswith("  Set           fast\n    int_param0 = 9\n")
+
+
+@pytest.mark.parametrize("verb", ["ls", "cat"])
+def test_json_has_all_that_there_is_to_know(system: Served, verb: str) -> None:
+    (component,) = json.loads(system.rtc(verb, "--json", "ConsoleIn0"))
+    assert (component["type"], component["state"]) == ("ConsoleIn", "ACTIVE")
+    assert component["ports"][0]["connectors"][0]["ports"] == ["ConsoleIn0.out", "ConsoleOut0.in"]
+
+
+def test_dis_and_con_end_and_make_a_connector(system: Served) -> None:
+    system.rtc("dis", "ConsoleIn0.out", "ConsoleOut0.in")
+    assert not system.manager.connectors
+    words = ["-p", "subscription_type=new", "-p", "dataport.buffer.length=3", "-n", "main"]
+    system.rtc("con", "ConsoleIn0.out", "localhost/ConsoleOut0.rtc:in", *words)
+    (connector,) = system.manager.connectors
+    assert connector.name == "main"
+    assert connector.properties["dataport.subscription_type"] == "new"
+    assert connector.properties["dataport.buffer.length"] == "3"
+
+
+@pytest.mark.parametrize("name", ["ConsoleIn0.out", "ConsoleOut0", "localhost/ConsoleIn0.rtc"])
+def test_dis_ends_all_connectors_of_a_port_or_a_component(system: Served, name: str) -> None:
+    system.rtc("dis", name)
+    assert system.manager.connectors == ()
+
+
+def test_deact_and_act_return_when_the_components_are_there(system: Served) -> None:
+    both = ("ConsoleIn0", "ConsoleOut0")
+    system.rtc("deact", *both)
+    assert [system.manager.state_of(name).name for name in both] == ["INACTIVE"] * 2
+    system.rtc("act", *both)
+    assert [system.manager.state_of(name).name for name in both] == ["ACTIVE"] * 2
+
+
+def test_reset_brings_a_component_out_of_error(system: Served) -> None:
+    component = system.manager.find("ConsoleIn0")
+    system.manager.context_of("ConsoleIn0").abort_component(component)
+    while system.manager.state_of("ConsoleIn0").name != "ERROR":
+        pass
+    system.rtc("reset", "ConsoleIn0")
+    assert system.manager.state_of("ConsoleIn0").name == "INACTIVE"
+
+
+def test_act_of_a_component_that_fails_says_where_it_went(
+    system: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(ec: ExecutionContext) -> ReturnCode:
+        return ReturnCode.RTC_ERROR
+
+    monkeypatch.setattr(system.manager.find("SeqOut0"), "on_activated", fails)
+    assert system.rtc("act", "SeqOut0", exit_code=1) == "Error: SeqOut0 is ERROR, not ACTIVE\n"
+
+
+def test_exit_ends_a_component(system: Served) -> None:
+    system.rtc("exit", "ConsoleIn0", "SeqOut0")
+    assert system.rtc("ls").split() == ["ConsoleOut0", "ConfigSample0"]
+
+
+def test_conf_lists_gets_sets_and_activates(system: Served) -> None:
+    system.rtc("conf", "set", "ConfigSample0", "int_param0", "5")
+    system.rtc("conf", "set", "ConfigSample0", "vector_param0", "-1,2.5")
+    system.manager.find("ConfigSample0").configuration.add_set("fast", {"int_param0": "9"})
+    system.rtc("conf", "act", "ConfigSample0", "fast")
+    system.rtc("conf", "set", "ConfigSample0", "int_param1", "7", "--set", "fast")
+    system.rtc("status")
+    assert system.rtc("conf", "get", "ConfigSample0", "int_param0") == "9\n"
+    text = system.rtc("conf", "list", "-l", "ConfigSample0")
+    assert "Parameter     int_param1 = 7  [0<=x<=1000]\n" in text
+    assert "Set           fast *\n" in text
+    assert "  vector_param0 = -1,2.5\n" in text
+
+
+def test_inject_writes_into_an_inport(system: Served) -> None:
+    system.rtc("inject", "ConsoleOut0.in", "-5")
+    system.rtc("inject", "ConsoleOut0.in", '{"tm": {"sec": 3, "nsec": 0}, "data": 2147483647}')
+    system.rtc("deact", "ConsoleOut0")
+    assert system.numbers == [-5, 2_147_483_647]
+    assert system.sink.received[1].tm.us == 3_000_000
+
+
+def test_print_shows_what_an_outport_writes(system: Served) -> None:
+    system.manager.activate("SeqOut0")
+    lines = system.rtc("print", "SeqOut0.Long", "-n", "3").splitlines()
+    stamps, numbers = zip(*[line.split() for line in lines], strict=True)
+    assert [int(number) - int(numbers[0]) for number in numbers] == [0, 1, 2]
+    assert [round(1e6 * (float(stamp) - float(stamps[0]))) for stamp in stamps] == [0, 1_000, 2_000]
+
+
+def test_print_shows_values_as_json(system: Served) -> None:
+    system.manager.activate("SeqOut0")
+    (line,) = system.rtc("print", "SeqOut0.OctetSeq", "-n", "1", "--json").splitlines()
+    value = json.loads(line)
+    assert set(value) == {"tm", "data"}
+    assert len(value["data"]) == 10
+
+
+def test_print_ends_after_a_time(system: Served) -> None:
+    assert system.rtc("print", "ConsoleIn0.out", "--for", "1ms") == ""
+
+
+def test_save_writes_the_system_as_it_is(system: Served, tmp_path: Path) -> None:
+    system.rtc("exit", "SeqOut0")
+    expected = describe(system.manager)
+    assert parse_toml(system.rtc("save")) == expected
+    system.rtc("save", str(tmp_path / "system.toml"))
+    assert parse_toml((tmp_path / "system.toml").read_text("utf-8")) == expected
+    system.rtc("save", str(tmp_path / "system.XML"))
+    read = parse_rts_profile((tmp_path / "system.XML").read_text("utf-8"))
+    assert [entry.name for entry in read.components] == [
+        "ConsoleIn0",
+        "ConsoleOut0",
+        "ConfigSample0",
+    ]
+
+
+def test_status_and_stop(system: Served) -> None:
+    assert system.rtc("status").splitlines()[0] == "components 4"
+    assert json.loads(system.rtc("status", "--json"))["late_ticks"] == 0
+    system.rtc("stop")
+    assert not system.runner.running
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["cat", "Nobody0"], "no component 'Nobody0'; known: ConsoleIn0, ConsoleOut0, "),
+        (["con", "ConsoleIn0.out", "SeqOut0.Long"], "DataOutPort ConsoleIn0.out, DataOutPort Seq"),
+        (["con", "ConsoleIn0.out", "ConsoleOut0.in"], "and ConsoleOut0.in are connected"),
+        (["con", "ConsoleIn0.out", "ConsoleOut0.in", "-p", "x"], "-p 'x' is not KEY=VALUE"),
+        (["dis", "ConsoleIn0.out", "SeqOut0.Long"], "SeqOut0.Long are not connected"),
+        (["dis", "a", "b", "c"], "ports are one or two names, not 3"),
+        (["act", "ConsoleIn0"], "activate ConsoleIn0: PRECONDITION_NOT_MET, it is ACTIVE"),
+        (["act", "SeqOut0", "--wait", "x"], "'x' is not a time: write 1.5s, 200ms or 250us"),
+        (["conf", "set", "ConfigSample0", "int_param0", "151"], "151 is not in 0<=x<=150"),
+        (["conf", "set", "ConfigSample0", "x", "1"], "no parameter 'x'; known: int_param0, "),
+        (["conf", "get", "SeqOut0", "x"], "no parameter 'x'; known: none"),
+        (["conf", "act", "SeqOut0", "x"], "no configuration set 'x'; known: default"),
+        (["print", "ConsoleOut0.in"], "is a DataInPort; values are shown of a DataOutPort"),
+        (["print", "SeqOut0.Long", "--for", "x"], "'x' is not a time"),
+        (
+            ["inject", "ConsoleOut0.in", "1+1"],
+            "'1+1' is not JSON, as 5, [1, 2], true or ",
+        ),
+        (["inject", "ConsoleOut0.in", "2147483648"], "is no IDL:RTC/TimedLong:1.0"),
+        (["save", "system.yaml"], "system system.yaml: the name ends in .toml or .xml"),
+        (["save", "no/dir/x.toml"], "system no/dir/x.toml: No such file or directory"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(system: Served, words: list[str], error: str) -> None:
+    before = describe(system.manager)
+    output = system.rtc(*words, exit_code=2)
+    assert error in output
+    assert len(output.splitlines()) == 1
+    assert describe(system.manager) == before
+
+
+def test_a_system_that_does_not_run_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "none"
+    result = CliRunner().invoke(main, ["rtc", "ls", "--at", str(path)])
+    assert result.exit_code == 2
+    assert (
+        result.output
+        == f"Error: socket {path}: No such file or directory, is the system running?\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("tickrig rtc act Con", "ConsoleIn0 ConsoleOut0 ConfigSample0"),
+        ("tickrig rtc con ConsoleI", "ConsoleIn0.out"),
+        ("tickrig rtc inject SeqOut0.Do", "SeqOut0.Double SeqOut0.DoubleSeq"),
+    ],
+)
+def test_the_shell_completes_names(system: Served, words: str, found: str) -> None:
+    env = {
+        "TICKRIG_RTC": str(system.path),
+        "_TICKRIG_COMPLETE": "bash_complete",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }
+    result = CliRunner().invoke(main, [], env=env, prog_name="tickrig")
+    assert result.output.split() == [f"plain,{name}" for name in found.split()]
+
+
+def test_without_a_system_the_shell_completes_nothing(tmp_path: Path) -> None:
+    env = {
+        "XDG_RUNTIME_DIR": str(tmp_path),
+        "_TICKRIG_COMPLETE": "bash_complete",
+        "COMP_WORDS": "tickrig rtc act Con",
+        "COMP_CWORD": "3",
+    }
+    assert CliRunner().invoke(main, [], env=env, prog_name="tickrig").output.strip() == ""
