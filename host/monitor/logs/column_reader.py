@@ -48,18 +48,25 @@ def _batches(reader: LogReader, channels: ChannelNames) -> Iterator[Rows]:
 
 
 def _blocks(file: BinaryIO, path: Path, channels: ChannelNames, tally: Tally) -> Iterator[Rows]:
-    rest, number, more = b"", 0, True
-    while more:
-        try:
-            data = file.read(BLOCK_BYTES)
-        except (EOFError, zlib.error) as error:
-            raise LogError(f"{path}: {error}") from error
-        more = bool(data)
-        whole, _, rest = (rest + data).rpartition(b"\n") if more else (rest, b"", b"")
-        if whole:
-            rows = _take_apart(whole + b"\n", number, channels, tally)
-            number += len(rows.known)
-            yield rows
+    number = 0
+    for text in _whole_lines(file, path):
+        rows = _take_apart(text, number, channels, tally)
+        number += len(rows.known)
+        yield rows
+
+
+def _whole_lines(file: BinaryIO, path: Path) -> Iterator[bytes]:
+    """Cut a file into blocks that end with LF."""
+    rest = b""
+    try:
+        while data := file.read(BLOCK_BYTES):
+            lines, end, rest = (rest + data).rpartition(b"\n")
+            if end:
+                yield lines + end
+    except (EOFError, zlib.error) as error:
+        raise LogError(f"{path}: {error}") from error
+    if rest:
+        yield rest + b"\n"
 
 
 def _take_apart(text: bytes, number: int, channels: ChannelNames, tally: Tally) -> Rows:
