@@ -9,7 +9,9 @@ import click
 
 from tickrig import __version__
 
-VERBS: Final[dict[str, str]] = {}
+VERBS: Final[dict[str, str]] = {
+    "top": "top",
+}
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 
 

@@ -1,0 +1,55 @@
+"""How a verb ends: what it says of its source, and its exit status."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final, NoReturn
+
+import click
+
+from tickrig.host.canmon.failure import SourceFailed
+from tickrig.host.canmon.source import Source
+
+ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
+
+
+class FramesLost(click.ClickException):
+    """One line on standard error, and exit status 4."""
+
+    exit_code = 4
+
+
+def report(source: Source, strict: bool) -> None:
+    """Say what was lost or no frame, then close the source.
+
+    Raises:
+        SourceFailed: it ended before its time.
+        FramesLost: frames were lost, and the caller is strict.
+    """
+    source.close()
+    for word in source.words():
+        click.echo(word, err=True)
+    if source.failed:
+        raise SourceFailed(source.failed)
+    if strict and source.lost:
+        raise FramesLost(f"{source.lost} frames were lost")
+
+
+@contextmanager
+def until_interrupted() -> Iterator[None]:
+    """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
+
+    def received(number: int, frame: FrameType | None) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, received) for number in ENDING}
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

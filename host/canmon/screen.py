@@ -1,0 +1,98 @@
+"""A terminal that is painted line by line: only lines that changed are written."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import termios
+import tty
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Final, Self
+
+ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
+"""Alternate screen, no cursor, no wrapping, all clear."""
+
+LEAVE: Final = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
+CLEAR: Final = "\x1b[2J"
+
+ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
+"""Keys that are more than a character, and what is pressed instead."""
+
+_KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
+TERMINAL: Final = "/dev/tty"
+
+
+class Screen:
+    """The controlling terminal, also where standard input is a pipe.
+
+    On leaving, however that comes about, the terminal is as it was before.
+
+    Raises:
+        OSError: there is no terminal.
+    """
+
+    def __init__(self) -> None:
+        self._terminal = os.open(TERMINAL, os.O_RDWR)
+        self._before = termios.tcgetattr(self._terminal)
+        self._painted: list[str] = []
+        self._size = (0, 0)
+
+    def __enter__(self) -> Self:
+        """Take the terminal."""
+        tty.setcbreak(self._terminal)
+        self._write(ENTER)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give it back."""
+        try:
+            self._write(LEAVE)
+            termios.tcsetattr(self._terminal, termios.TCSAFLUSH, self._before)
+        except (OSError, termios.error):
+            pass  # it is gone
+        os.close(self._terminal)
+
+    def size(self) -> tuple[int, int]:
+        """Return its columns and lines."""
+        return os.get_terminal_size(self._terminal)
+
+    def keys(self) -> list[str]:
+        """Return the keys that were pressed."""
+        if not select.select([self._terminal], [], [], 0)[0]:
+            return []
+        text = os.read(self._terminal, 1_024).decode("utf-8", "replace")
+        return [ARROWS.get(key, key) for key in _KEY.findall(text)]
+
+    def paint(self, lines: Sequence[str]) -> None:
+        """Show lines."""
+        size = self.size()
+        before = self._painted if size == self._size else []
+        text = difference(before, lines)
+        self._write(text if size == self._size else CLEAR + text)
+        self._painted, self._size = list(lines), size
+
+    def _write(self, text: str) -> None:
+        data = text.encode()
+        while data:
+            data = data[os.write(self._terminal, data) :]
+
+
+def difference(before: Sequence[str], lines: Sequence[str]) -> str:
+    r"""Return what to write so that lines are shown where others are.
+
+    >>> difference(["a", "b", "c"], ["a", "x"])
+    '\x1b[2;1Hx\x1b[K\x1b[3;1H\x1b[K'
+    """
+    shown = [*lines, *[""] * (len(before) - len(lines))]
+    return "".join(
+        f"\x1b[{place};1H{line}\x1b[K"
+        for place, line in enumerate(shown, 1)
+        if place > len(before) or line != before[place - 1]
+    )

@@ -1,0 +1,86 @@
+"""What `canmon top` shows, driven by frames, keys and the time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Final
+
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.top_table import UNBOUNDED, Order, View, render
+from tickrig.host.monitor.traffic import Snapshot, Traffic
+
+PAGE: Final = 10
+"""Rows that a key for a page goes."""
+
+ORDERS: Final = tuple(Order)
+
+
+class TopModel:
+    """Traffic and the view of it.
+
+    Args:
+        bit_rate: of the buses, None if it is not known.
+
+    Attributes:
+        traffic: what was heard.
+        view: how it is shown.
+        quit: the key to leave was pressed.
+    """
+
+    def __init__(self, bit_rate: int | None = None) -> None:
+        self.traffic, self.quit = Traffic(), False
+        self.view = View(styled=True, bit_rate=bit_rate, keys=True)
+        self._held: Snapshot | None = None
+        self._now_us = 0
+        self._acts: dict[str, Callable[[], None]] = {
+            "q": self._quit,
+            " ": self._hold,
+            "b": lambda: self._show(bits=not self.view.bits),
+            "n": self.traffic.notch,
+            "s": lambda: self._show(order=_next(self.view.order)),
+            "c": self.traffic.clear,
+            "j": lambda: self._scroll(1),
+            "k": lambda: self._scroll(-1),
+            "f": lambda: self._scroll(PAGE),
+            "p": lambda: self._scroll(-PAGE),
+        }
+
+    def take(self, heards: Iterable[Heard]) -> None:
+        """Count frames, whatever is shown."""
+        for heard in heards:
+            self.traffic.take(heard)
+
+    def press(self, key: str) -> None:
+        """Act on a key; one without a meaning does nothing."""
+        if key in self._acts:
+            self._acts[key]()
+
+    def lines(self, now_us: int, lost: int, width: int, height: int) -> list[str]:
+        """Return what a screen shows at a time."""
+        self._now_us = now_us
+        snapshot = self._held or self.traffic.snapshot(now_us)
+        return render(snapshot, self.view, lost, width, height)
+
+    def final(self, lost: int) -> list[str]:
+        """Return the whole table of all that came, as plain text."""
+        view = View(self.view.order, self.view.bits, bit_rate=self.view.bit_rate)
+        return render(self.traffic.snapshot(), view, lost, UNBOUNDED, UNBOUNDED)
+
+    def _quit(self) -> None:
+        self.quit = True
+
+    def _hold(self) -> None:
+        self._held = None if self._held else self.traffic.snapshot(self._now_us)
+        self._show(held=self._held is not None)
+
+    def _scroll(self, rows: int) -> None:
+        last = max(0, len(self.traffic.snapshot(self._now_us).rows) - 1)
+        self._show(top=min(last, max(0, self.view.top + rows)))
+
+    def _show(self, **changes: object) -> None:
+        self.view = replace(self.view, **changes)  # type: ignore[arg-type]  # fields of View
+
+
+def _next(order: Order) -> Order:
+    return ORDERS[(ORDERS.index(order) + 1) % len(ORDERS)]
