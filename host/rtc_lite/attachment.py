@@ -15,7 +15,6 @@ from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import Frame
 
 RATE_HZ: Final = 10.0
 """A period that two round trips at 57600 bit/s do not fill."""
@@ -112,7 +111,7 @@ class Attachment:
         if talk.state is not None:
             self.manager.put_off(self._return)
         elif self.link.now_us >= self._look_us:
-            talk.post(Frame(Command.STATE))
+            talk.post(Command.STATE)
             self._look_us += self.settings.look_period_us
 
     def _return(self) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import logging
 from typing import Final
 
-from tickrig.host.errors import LinkError
 from tickrig.host.link import Link
+from tickrig.host.rtc_lite.frame_link import FrameLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, State
-from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame
-from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
+from tickrig.wire.rtc_lite.layout import WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     PortData,
     PortProfile,
@@ -24,9 +23,6 @@ from tickrig.wire.rtc_lite.messages import (
 
 POLL_US: Final = 1_000
 """How often the answer to a PING is looked for."""
-
-SILENCE_US: Final = 20_000
-"""Silence after which the rest of a broken frame is not waited for."""
 
 PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
@@ -59,8 +55,7 @@ class Conversation:
     """
 
     def __init__(self, link: Link[bytes], settings: Settings) -> None:
-        self._link, self._settings = link, settings
-        self._decoder = Decoder(REPLIES, settings.checksum)
+        self._line, self._settings = FrameLink(link, settings.checksum), settings
         self.watch = Watch(settings.ping_period_us, settings.reply_us, settings.pings, link.now_us)
         self.state: State | None = None
         self.pushed: list[tuple[int, PortData]] = []
@@ -68,12 +63,12 @@ class Conversation:
         self.out_ports: list[PortProfile] = []
         self._reply: Reply | None = None
         self._awaited: Command | None = None
-        self._byte_us = self._looked_us = self._deadline_us = link.now_us
+        self._looked_us = self._deadline_us = link.now_us
 
     @property
     def now_us(self) -> int:
         """Time on the clock of the link."""
-        return self._link.now_us
+        return self._line.now_us
 
     @property
     def due_us(self) -> int:
@@ -91,7 +86,7 @@ class Conversation:
         """Send a request and wait for its reply; None without one, or if nothing may be sent."""
         if not self._free():
             return None
-        reply = self._exchange(Frame(command, data))
+        reply = self._exchange(command, data)
         if reply is None:
             _LOG.info("no reply to %s", command.value.decode())
             self._ping(self.watch.doubt(self.now_us))
@@ -100,19 +95,13 @@ class Conversation:
     def insist(self, command: Command) -> Reply | None:
         """Send a request until it is answered, 4 times at most; a missing reply has no effect."""
         for _ in range(1 + RETRIES):
-            if (reply := self._exchange(Frame(command))) is not None:
+            if (reply := self._exchange(command)) is not None:
                 return reply
         return None
 
-    def post(self, frame: Frame) -> None:
-        """Send a frame and wait for nothing."""
-        if self.now_us - self._byte_us >= SILENCE_US:
-            self._decoder.clear()
-        _LOG.debug("> %s", frame.body)
-        try:
-            self._link.send(frame.encode(self._settings.checksum))
-        except LinkError as error:
-            _LOG.debug("not sent: %s", error)
+    def post(self, command: Command, data: bytes = b"") -> None:
+        """Send a request and wait for nothing."""
+        self._line.send(Frame(command, data))
 
     def poll(self) -> None:
         """Take what has arrived."""
@@ -133,14 +122,14 @@ class Conversation:
                 break
         return not (watch.asked or watch.doubted or watch.lost)
 
-    def _exchange(self, request: Frame) -> Reply | None:
+    def _exchange(self, command: Command, data: bytes = b"") -> Reply | None:
         """Send a request and wait for its reply."""
         self.poll()  # what nobody waits for any more
-        self._awaited, self._reply = request.command, None
+        self._awaited, self._reply = command, None
         self.in_ports, self.out_ports = [], []
-        if request.command in WITH_STATE:
+        if command in WITH_STATE:
             self.state = None
-        self.post(request)
+        self.post(command, data)
         reply = self._await_reply()
         self._awaited = None
         return reply
@@ -154,27 +143,17 @@ class Conversation:
         return self._reply
 
     def _ping(self, number: int) -> None:
-        self.post(Frame(Command.PING, bytes([number])))
+        self.post(Command.PING, bytes([number]))
 
     def _hear(self, timeout_us: int) -> bool:
         """Wait for bytes and take them; False if the line is gone."""
-        try:
-            data = self._link.receive(timeout_us)
-        except LinkError as error:
-            _LOG.debug("not heard: %s", error)
-            return False
-        if self._decoder.lost:
-            self._decoder.clear()
-        if data:
-            self._byte_us = self.now_us
-        for found in self._decoder.push(data):
-            if isinstance(found, Frame):
-                self._take(found)
-        return True
+        frames = self._line.receive(timeout_us)
+        for frame in frames or ():
+            self._take(frame)
+        return frames is not None
 
     def _take(self, frame: Frame) -> None:
         """Note what a frame says."""
-        _LOG.debug("< %s", frame.body)
         self.watch.heard_us = self.now_us
         match frame.command:
             case Command.DATA:

@@ -14,10 +14,10 @@ from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc_lite.conversation import Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
-from tickrig.host.rtc_lite.relays import InRelay, OutRelay, in_relay, out_relay
+from tickrig.host.rtc_lite.relays import Relays
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.start_up import DeviceProfile, start_up
-from tickrig.wire.errors import FieldError, WireError
+from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
 from tickrig.wire.rtc_lite.messages import Reply
 
@@ -65,8 +65,8 @@ class RtcLiteProxy(RtComponent):
 
     Attributes:
         device: what the device says of itself; None before `on_initialize`.
+        relays: its ports; there are none before `on_initialize`.
         fatal_us: when the device was found to be lost; None as long as it is there.
-        refused_values: how many values did not fit the device, and were dropped.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec(
@@ -82,12 +82,10 @@ class RtcLiteProxy(RtComponent):
     ) -> None:
         super().__init__(instance_name)
         self._settings, self._listener = settings or Settings(), listener
-        self._talk = Conversation(link, self._settings)
+        self._link, self._talk = link, Conversation(link, self._settings)
         self.device: DeviceProfile | None = None
+        self.relays = Relays()
         self.fatal_us: int | None = None
-        self.refused_values = 0
-        self._ins: list[InRelay] = []
-        self._outs: dict[bytes, OutRelay] = {}
         self._failed = False  # a callback failed, so that Error comes next
         self._untold = False  # an error of which nobody knows whether it is a fatal one
         self._mirrored_us = 0
@@ -129,9 +127,12 @@ class RtcLiteProxy(RtComponent):
         """Bring the device to Inactive, and make a port of each of its ports."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
+        self._talk = Conversation(self._link, self._settings)
         try:
             self.device = start_up(self._talk, self._settings.boot_us)
-            self._make_ports(self.device)
+            self.relays = Relays(self.device.in_ports, self.device.out_ports)
+            for port in self.relays.ports:
+                self.add_port(port)
         except (LinkError, DeviceRefused, WireError, RtcRefused) as error:
             _LOG.warning("%s: no start-up: %s", self.instance_name, error)
             return ReturnCode.RTC_ERROR
@@ -192,26 +193,16 @@ class RtcLiteProxy(RtComponent):
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Bring the device to Inactive, from whatever state it is in."""
-        for _ in _TO_INACTIVE:
+        for _ in _TO_INACTIVE:  # from Active it takes two steps
             state = self._known_state()
-            if state is None or state is State.INACTIVE:
+            step = None if state is None else _TO_INACTIVE.get(state)
+            if step is None or self._command(step) is ReturnCode.RTC_ERROR:
                 break
-            code = self._command(_TO_INACTIVE[state]) if state in _TO_INACTIVE else None
-            if code not in {_OK, ReturnCode.PRECONDITION_NOT_MET}:
-                return ReturnCode.RTC_ERROR
         return _OK if self._talk.state is State.INACTIVE else ReturnCode.RTC_ERROR
 
     @property
     def _by_timer(self) -> bool:
         return self.device is not None and self.device.context is ContextType.TIMER
-
-    def _make_ports(self, device: DeviceProfile) -> None:
-        self._ins = [in_relay(profile) for profile in device.in_ports]
-        self._outs = {profile.name: out_relay(profile) for profile in device.out_ports}
-        for inlet in self._ins:
-            self.add_port(inlet.port)
-        for outlet in self._outs.values():
-            self.add_port(outlet.port)
 
     def _command(self, command: Command, data: bytes = b"") -> ReturnCode:
         return _code_of(self._talk.ask(command, data))
@@ -243,16 +234,8 @@ class RtcLiteProxy(RtComponent):
         return code if self._talk.state is State.ACTIVE else ReturnCode.RTC_ERROR
 
     def _hand_in(self) -> ReturnCode:
-        """Write one new value to each in-port of the device."""
-        for relay in self._ins:
-            try:
-                data = relay.take()
-            except FieldError as error:
-                self.refused_values += 1
-                _LOG.warning("%s: value dropped: %s", relay.port.full_name, error)
-                continue
-            if data is None:
-                continue
+        """Write one new value to each in-port of the device that has one."""
+        for data in self.relays.fresh():
             if (code := self._command(Command.WRITE, data.encode())) is not _OK:
                 return code
         return _OK
@@ -261,11 +244,7 @@ class RtcLiteProxy(RtComponent):
         """Write to the OutPorts what has arrived."""
         pushed, self._talk.pushed = self._talk.pushed, []
         for at_us, data in pushed:
-            try:
-                self._outs[data.name].give(data.data, at_us)
-            except (KeyError, FieldError) as error:
-                self.refused_values += 1
-                _LOG.warning("%s: data dropped: %s", self.instance_name, error)
+            self.relays.give(at_us, data)
 
     def _tell_passive(self) -> None:
         """Tell of an error once it is known that the device is there."""

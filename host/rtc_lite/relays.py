@@ -1,93 +1,68 @@
-"""Ports of a proxy, made from the profile of its device (DECISION L10).
-
-The time of a value is not on the wire: it is stamped when it arrives.
-"""
+"""All ports of a proxy, and what passes through them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Final
+import logging
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from typing import Final
 
-from tickrig.host.errors import DeviceRefused
-from tickrig.host.rtc.data_port import InPort, OutPort
+from tickrig.host.rtc.port import AnyPort
+from tickrig.host.rtc_lite.relay import InRelay, OutRelay
+from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.messages import PortData, PortProfile
-from tickrig.wire.rtc_lite.values import PORT_TYPES, PortType
-from tickrig.wire.rtc_types import basic
-from tickrig.wire.rtc_types.basic import Time
 
-_KINDS: Final[dict[str, type[Any]]] = {
-    kind.__name__: kind
-    for kind in (
-        *(basic.TimedBoolean, basic.TimedChar, basic.TimedOctet, basic.TimedShort),
-        *(basic.TimedLong, basic.TimedFloat, basic.TimedDouble),
-        *(basic.TimedBooleanSeq, basic.TimedCharSeq, basic.TimedOctetSeq, basic.TimedShortSeq),
-        *(basic.TimedLongSeq, basic.TimedFloatSeq, basic.TimedDoubleSeq),
-    )
-}
+_LOG: Final = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class InRelay:
-    """An InPort of the proxy, and the in-port of the device behind it."""
+class Relays:
+    """The ports of a proxy, made from the profile of its device.
 
-    port: InPort[Any]
-    name: bytes
-    port_type: PortType[Any]
+    A value that does not fit the device, and data that fit no port, are logged
+    and dropped: they are no reason to stop.
 
-    def take(self) -> PortData | None:
-        """Return the oldest value that was not read, if there is one.
+    Args:
+        ins: the in-ports of the device.
+        outs: its out-ports.
 
-        Raises:
-            FieldError: its type does not have it, or it does not fit into a frame.
-        """
-        value = self.port.read() if self.port.is_new else None
-        if value is None:
-            return None
-        return PortData(self.name, self.port_type.encode(_bare(value.data)))
+    Attributes:
+        dropped: how many values were dropped.
 
+    Raises:
+        DeviceRefused: a port of a type that nobody knows.
+    """
 
-@dataclass(frozen=True, slots=True)
-class OutRelay:
-    """An OutPort of the proxy, and the out-port of the device behind it."""
+    def __init__(self, ins: Iterable[PortProfile] = (), outs: Iterable[PortProfile] = ()) -> None:
+        self._ins = [InRelay.of(profile) for profile in ins]
+        self._outs = {profile.name: OutRelay.of(profile) for profile in outs}
+        self.dropped = 0
 
-    port: OutPort[Any]
-    port_type: PortType[Any]
+    @property
+    def ports(self) -> Iterator[AnyPort]:
+        """The InPorts, then the OutPorts."""
+        return chain((relay.port for relay in self._ins), (r.port for r in self._outs.values()))
 
-    def give(self, data: bytes, now_us: int) -> None:
-        """Write a value that arrived; FieldError if it is not of the port's type."""
-        kind = self.port.data_type
-        value = self.port_type.decode(data)
-        if kind is basic.TimedOctetSeq:
-            value = bytes(value)
-        elif kind is basic.TimedCharSeq:
-            value = tuple(value)
-        self.port.write(kind(Time.from_us(now_us), value))
+    def fresh(self) -> Iterator[PortData]:
+        """Take one new value from each InPort that has one."""
+        for relay in self._ins:
+            try:
+                data = relay.take()
+            except FieldError as error:
+                self._drop(relay.port.full_name, error)
+            else:
+                if data is not None:
+                    yield data
 
+    def give(self, at_us: int, data: PortData) -> None:
+        """Write to an OutPort what arrived from the device."""
+        if (relay := self._outs.get(data.name)) is None:
+            self._drop("an out-port that was not described", repr(data.name))
+            return
+        try:
+            relay.give(data.data, at_us)
+        except FieldError as error:
+            self._drop(relay.port.full_name, error)
 
-def in_relay(profile: PortProfile) -> InRelay:
-    """Make the InPort of an in-port; DeviceRefused if its type is not known."""
-    name, port_type = _read(profile)
-    return InRelay(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
-
-
-def out_relay(profile: PortProfile) -> OutRelay:
-    """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
-    name, port_type = _read(profile)
-    return OutRelay(OutPort(name, _KINDS[port_type.name]), port_type)
-
-
-def _read(profile: PortProfile) -> tuple[str, PortType[Any]]:
-    name = profile.name.decode("latin-1")
-    if (port_type := PORT_TYPES.get(profile.code)) is None:
-        known = " ".join(PORT_TYPES)
-        raise DeviceRefused(f"port {name!r} has type {profile.code!r}; known: {known}", "CZ")
-    return name, port_type
-
-
-def _bare(value: Any) -> Any:
-    """Return a value as `wire.rtc_lite.values` has it."""
-    if isinstance(value, bytes):
-        return tuple(value)
-    if isinstance(value, tuple) and value and isinstance(value[0], str):
-        return "".join(value)
-    return value
+    def _drop(self, where: str, why: FieldError | str) -> None:
+        self.dropped += 1
+        _LOG.warning("dropped at %s: %s", where, why)

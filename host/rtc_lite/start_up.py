@@ -47,6 +47,7 @@ def start_up(talk: Conversation, boot_us: int) -> DeviceProfile:
     if talk.state is not State.INACTIVE:
         state = "unknown" if talk.state is None else talk.state.name
         raise DeviceRefused(f"the state of the device is {state}, not INACTIVE", state)
+    talk.pushed.clear()
     return profile
 
 

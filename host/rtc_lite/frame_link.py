@@ -1,0 +1,66 @@
+"""Frames over a byte link."""
+
+from __future__ import annotations
+
+import logging
+from typing import Final
+
+from tickrig.host.errors import LinkError
+from tickrig.host.link import Link
+from tickrig.wire.rtc_lite.decoder import Decoder
+from tickrig.wire.rtc_lite.frame import Checksum, Frame
+from tickrig.wire.rtc_lite.layout import REPLIES
+
+SILENCE_US: Final = 20_000
+"""Silence after which the rest of a broken frame is not waited for."""
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class FrameLink:
+    """A `Link[Frame]`, one way requests, the other way replies.
+
+    A line that is gone is as silent as a device without power. What is no
+    frame is left out; after an unknown command the next header is looked for
+    at once, as the checksum tells what is a frame.
+
+    Args:
+        link: the line.
+        checksum: how frames are summed up.
+    """
+
+    def __init__(self, link: Link[bytes], checksum: Checksum) -> None:
+        self._link, self._checksum = link, checksum
+        self._decoder = Decoder(REPLIES, checksum)
+        self._byte_us = link.now_us
+
+    @property
+    def now_us(self) -> int:
+        """Time on the clock of the link."""
+        return self._link.now_us
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame; a broken one that came long before is not waited for any more."""
+        if self.now_us - self._byte_us >= SILENCE_US:
+            self._decoder.clear()
+        _LOG.debug("> %s", frame.body)
+        try:
+            self._link.send(frame.encode(self._checksum))
+        except LinkError as error:
+            _LOG.debug("not sent: %s", error)
+
+    def receive(self, timeout_us: int) -> list[Frame] | None:
+        """Wait for bytes, and return the frames that they complete; None if the line is gone."""
+        try:
+            data = self._link.receive(timeout_us)
+        except LinkError as error:
+            _LOG.debug("not heard: %s", error)
+            return None
+        if data:
+            self._byte_us = self.now_us
+        if self._decoder.lost:
+            self._decoder.clear()
+        frames = [found for found in self._decoder.push(data) if isinstance(found, Frame)]
+        for frame in frames:
+            _LOG.debug("< %s", frame.body)
+        return frames
