@@ -1,0 +1,171 @@
+"""Runs the scripts of one node, one after the other."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from tickrig.host.link import NEVER
+from tickrig.host.rtc_canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
+from tickrig.host.rtc_canopen.script import (
+    SDO_TIMEOUT_US,
+    Ask,
+    Await,
+    Command,
+    Pause,
+    Script,
+    Step,
+    Tell,
+)
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
+from tickrig.wire.canopen.sdo import Abort, parse_response
+from tickrig.wire.errors import WireError
+
+SDO_REQUEST: Final = 0x600
+SDO_RESPONSE: Final = 0x580
+
+Failure = SdoFailed | StateTimeout | WrongIdentity
+Send = Callable[[int, bytes], None]
+
+
+def _nothing() -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A script, and who is told how it ended.
+
+    Attributes:
+        what: for people.
+        done: told its result.
+        failed: told what it raised.
+        dropped: told if it is forgotten before its end.
+    """
+
+    what: str
+    script: Script[Any]
+    done: Callable[[Any], None]
+    failed: Callable[[Failure], None]
+    dropped: Callable[[], None] = _nothing
+
+
+class Dialogue:
+    """What is said with one node; it sends, and never waits.
+
+    Args:
+        node_id: the node.
+        send: takes CAN-ID and data.
+
+    Attributes:
+        due_us: when a time-out or a pause ends, `NEVER` if there is none.
+        job: what is under way.
+    """
+
+    def __init__(self, node_id: int, send: Send) -> None:
+        self._node_id, self._send = node_id, send
+        self._now_us, self.due_us = 0, NEVER
+        self.job: Job | None = None
+        self._step: Step | None = None
+        self._jobs: deque[Job] = deque()
+
+    def start(self, now_us: int, job: Job) -> None:
+        """Run a job when those before it have ended."""
+        self._now_us = now_us
+        self._jobs.append(job)
+        if self.job is None:
+            self._next()
+
+    def clear(self) -> None:
+        """Forget all jobs."""
+        dropped = [self.job, *self._jobs] if self.job is not None else []
+        self._jobs.clear()
+        self.job, self._step, self.due_us = None, None, NEVER
+        for job in dropped:
+            job.script.close()
+            job.dropped()
+
+    def hear_sdo(self, now_us: int, data: bytes) -> None:
+        """Take a response; one that nobody asked for is passed over."""
+        self._now_us = now_us
+        if isinstance(self._step, Ask):
+            try:
+                answer = parse_response(data)
+            except WireError:
+                return
+            self._go_on(answer)
+
+    def hear_state(self, now_us: int, state: NmtState) -> None:
+        """Take what a heartbeat or a boot-up says."""
+        self._now_us = now_us
+        if isinstance(self._step, Await) and self._step.state is state:
+            self._go_on(None)
+
+    def tick(self, now_us: int) -> None:
+        """End what lasts too long."""
+        self._now_us = now_us
+        if now_us < self.due_us:
+            return
+        match self._step:
+            case Ask() as ask:
+                self._say(Abort(ask.index, ask.sub, AbortCode.TIMEOUT).encode())
+                self._go_on(SdoTimeout(ask.index, ask.sub))
+            case Await() as wait:
+                self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
+            case _:
+                self._go_on(None)
+
+    def _next(self) -> None:
+        self.job, self._step, self.due_us = None, None, NEVER
+        if self._jobs:
+            self.job = self._jobs.popleft()
+            self._go_on(None)
+
+    def _go_on(self, value: object) -> None:
+        """Give a script what came of its step, and take the steps up to one that waits."""
+        job = self.job
+        assert job is not None
+        self._step, self.due_us = None, NEVER
+        try:
+            step = _resume(job.script, value)
+            while not self._take(step):
+                step = job.script.send(None)
+        except StopIteration as end:
+            self._end(job.done, end.value)
+        except (SdoFailed, StateTimeout, WrongIdentity) as error:
+            self._end(job.failed, error)
+
+    def _end(self, tell: Callable[[Any], None], what: object) -> None:
+        """End a job, tell how, and go on with the next unless that began one."""
+        self.job = None
+        tell(what)
+        if self.job is None:
+            self._next()
+
+    def _take(self, step: Step) -> bool:
+        """Take a step; True if it waits."""
+        match step:
+            case Ask():
+                self._say(step.request)
+                self._step, self.due_us = step, self._now_us + SDO_TIMEOUT_US
+            case Await():
+                self._step, self.due_us = step, self._now_us + step.timeout_us
+            case Pause():
+                self._step, self.due_us = step, self._now_us + step.duration_us
+            case Tell():
+                self._say(step.request)
+            case Command():
+                self._send(NMT_COB_ID, bytes((step.command, self._node_id)))
+        return self._step is not None
+
+    def _say(self, data: bytes) -> None:
+        self._send(SDO_REQUEST + self._node_id, data)
+
+
+def _resume(script: Script[Any], value: object) -> Step:
+    if isinstance(value, Exception):
+        return script.throw(value)
+    return script.send(value)

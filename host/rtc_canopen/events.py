@@ -1,0 +1,93 @@
+"""What happens to the nodes of a server, by name."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+KEPT: Final = 10_000
+"""Events that a log keeps; older ones are dropped."""
+
+
+class EventKind(StrEnum):
+    """Names of events."""
+
+    BOOT_UP = "BootUp"
+    PROXY_MADE = "ProxyMade"
+    PROXY_REMOVED = "ProxyRemoved"
+    STATE_CHANGED = "StateChanged"
+    HEARTBEAT_LOST = "HeartbeatLost"
+    FOREIGN_TRANSITION = "ForeignTransition"
+    FOREIGN_COMMAND = "ForeignCommand"
+    FOREIGN_MASTER = "ForeignMaster"
+    WRONG_IDENTITY = "WrongIdentity"
+    DUPLICATE_NODE = "DuplicateNode"
+    SDO_ABORTED = "SdoAborted"
+    SDO_TIMEOUT = "SdoTimeout"
+    NOT_CONFIRMED = "NotConfirmed"
+    EMERGENCY = "Emergency"
+    BUS_OFF = "BusOff"
+    BUS_ON = "BusOn"
+    PDO_LINKED = "PdoLinked"
+    LINK_REFUSED = "LinkRefused"
+    CONNECTED = "Connected"
+    CONNECTION_REFUSED = "ConnectionRefused"
+    PORT_REFUSED = "PortRefused"
+    VALUE_REFUSED = "ValueRefused"
+    PDO_TOO_SHORT = "PdoTooShort"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened.
+
+    Attributes:
+        at_us: on the clock of the server.
+        node: node-ID, 0 if it is of no node.
+        text: more, for people.
+    """
+
+    at_us: int
+    kind: EventKind
+    node: int = 0
+    text: str = ""
+
+    def __str__(self) -> str:
+        """Write it for people."""
+        node = f" node {self.node}" if self.node else ""
+        more = f": {self.text}" if self.text else ""
+        return f"{self.at_us / 1e6:.6f} {self.kind}{node}{more}"
+
+    def to_json(self) -> str:
+        """Write it as one line of JSON."""
+        return json.dumps(
+            {"at_us": self.at_us, "event": self.kind, "node": self.node, "text": self.text}
+        )
+
+
+class EventLog:
+    """The events of a server, the latest last.
+
+    Attributes:
+        listeners: told each event as it happens.
+    """
+
+    def __init__(self) -> None:
+        self._events: deque[Event] = deque(maxlen=KEPT)
+        self.listeners: list[Callable[[Event], None]] = []
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Those that are kept."""
+        return tuple(self._events)
+
+    def note(self, at_us: int, kind: EventKind, node: int = 0, text: str = "") -> None:
+        """Take an event."""
+        event = Event(at_us, kind, node, text)
+        self._events.append(event)
+        for listener in self.listeners:
+            listener(event)

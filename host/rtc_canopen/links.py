@@ -1,0 +1,89 @@
+"""PDO links: a TPDO of one node received by an RPDO of another (NEDO report, Fig. 120)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from tickrig.host.rtc_canopen.boot import set_pdo
+from tickrig.host.rtc_canopen.definition import PdoEntry, PdoLink, PdoName
+from tickrig.host.rtc_canopen.dialogue import Failure, Job
+from tickrig.host.rtc_canopen.errors import ServerRefused
+from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.pdo_layout import PdoLayout
+from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
+
+Note = Callable[[EventKind, int, str], None]
+
+
+class Links:
+    """Makes PDO links when both nodes are ready.
+
+    Args:
+        nodes: by node-ID.
+        links: those of the System Definition.
+        note: told what became of each.
+
+    Attributes:
+        links: all that are wanted.
+    """
+
+    def __init__(
+        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], note: Note
+    ) -> None:
+        self._nodes, self._note = nodes, note
+        self.links = list(links)
+
+    def add(self, now_us: int, link: PdoLink) -> None:
+        """Want a link, and make it; ServerRefused if it cannot be now."""
+        if link in self.links:
+            raise ServerRefused(f"{link.source} and {link.target} are linked")
+        self._check(link)
+        self.links.append(link)
+        self._make(now_us, link)
+
+    def make(self, now_us: int, node_id: int) -> None:
+        """Make those of a node that has become ready."""
+        for link in self.links:
+            ends = (link.source.node, link.target.node)
+            if node_id in ends and all(self._ready(end) for end in ends):
+                try:
+                    self._check(link)
+                except ServerRefused as error:
+                    self._note(EventKind.LINK_REFUSED, link.target.node, str(error))
+                else:
+                    self._make(now_us, link)
+
+    def layout(self, name: PdoName) -> PdoLayout:
+        """Return a PDO of a node that is ready; ServerRefused if it has none."""
+        if name.node not in self._nodes or not self._ready(name.node):
+            raise ServerRefused(f"node {name.node} is not ready")
+        for layout in self._nodes[name.node].layouts:
+            if layout.index == name.index:
+                return layout
+        raise ServerRefused(f"{name} is off, or not there")
+
+    def _ready(self, node_id: int) -> bool:
+        return self._nodes[node_id].phase is Phase.READY
+
+    def _check(self, link: PdoLink) -> None:
+        source, target = self.layout(link.source), self.layout(link.target)
+        if source.bits != target.bits:
+            raise ServerRefused(
+                f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
+            )
+
+    def _make(self, now_us: int, link: PdoLink) -> None:
+        """Give the RPDO the COB-ID of the TPDO."""
+        cob_id, node_id = self.layout(link.source).cob_id, link.target.node
+        node, text = self._nodes[node_id], f"{link.source} to {link.target}"
+
+        def done(_: None) -> None:
+            for sink in node.proxy.sinks if node.proxy else ():
+                sink.linked = sink.linked or sink.layout.index == link.target.index
+            self._note(EventKind.PDO_LINKED, node_id, f"{text} by {cob_id:03X}h")
+
+        def failed(failure: Failure) -> None:
+            self._note(EventKind.LINK_REFUSED, node_id, f"{text}: {failure}")
+
+        script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
+        node.run(now_us, Job("link", script, done, failed))

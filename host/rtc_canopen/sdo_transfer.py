@@ -1,0 +1,98 @@
+"""SDO transfers as scripts: expedited and segmented (CiA 301, SDO protocols).
+
+The client of the canopen library blocks in a thread of its own until the answer is
+there; the server may not block, and runs in virtual time. So this one is ours.
+Not emulated: block transfer, which a server of a device must not insist on.
+"""
+
+from __future__ import annotations
+
+from tickrig.host.rtc_canopen.errors import SdoAborted
+from tickrig.host.rtc_canopen.script import Answer, Ask, Script, Tell
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo import (
+    Abort,
+    DownloadInitiateRequest,
+    DownloadInitiateResponse,
+    DownloadSegmentResponse,
+    Segment,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+    UploadSegmentRequest,
+)
+from tickrig.wire.canopen.sdo_command import EXPEDITED_BYTES, SEGMENT_BYTES
+
+
+def upload(index: int, sub: int) -> Script[bytes]:
+    """Read an object.
+
+    Raises:
+        SdoAborted: the device refuses, or answers something else.
+        SdoTimeout: it does not answer.
+    """
+    answer = yield Ask(UploadInitiateRequest(index, sub).encode(), index, sub)
+    match answer:
+        case UploadInitiateResponse() if (answer.index, answer.sub) == (index, sub):
+            if answer.data is not None:
+                return answer.data
+            return (yield from _upload_segments(index, sub))
+    return (yield from _fail(index, sub, answer))
+
+
+def download(index: int, sub: int, data: bytes) -> Script[None]:
+    """Write an object; raises as `upload`."""
+    if 1 <= len(data) <= EXPEDITED_BYTES:
+        request = DownloadInitiateRequest(index, sub, data, len(data))
+    else:
+        request = DownloadInitiateRequest(index, sub, None, len(data))
+    answer = yield Ask(request.encode(), index, sub)
+    match answer:
+        case DownloadInitiateResponse() if (answer.index, answer.sub) == (index, sub):
+            if request.data is None:
+                yield from _download_segments(index, sub, data)
+        case _:
+            yield from _fail(index, sub, answer)
+
+
+def upload_number(index: int, sub: int) -> Script[int]:
+    """Read an unsigned number."""
+    return int.from_bytes((yield from upload(index, sub)), "little")
+
+
+def download_number(index: int, sub: int, value: int, size: int) -> Script[None]:
+    """Write an unsigned number of so many bytes."""
+    yield from download(index, sub, value.to_bytes(size, "little"))
+
+
+def _upload_segments(index: int, sub: int) -> Script[bytes]:
+    data, toggle = b"", False
+    while True:
+        answer = yield Ask(UploadSegmentRequest(toggle).encode(), index, sub)
+        match answer:
+            case Segment() if answer.toggle == toggle:
+                data += answer.data
+            case _:
+                yield from _fail(index, sub, answer)
+        if answer.last:
+            return data
+        toggle = not toggle
+
+
+def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
+    toggle = False
+    for start in range(0, max(1, len(data)), SEGMENT_BYTES):
+        part, last = data[start : start + SEGMENT_BYTES], start + SEGMENT_BYTES >= len(data)
+        answer = yield Ask(Segment(toggle, part, last).encode(), index, sub)
+        if not isinstance(answer, DownloadSegmentResponse) or answer.toggle != toggle:
+            yield from _fail(index, sub, answer)
+        toggle = not toggle
+
+
+def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
+    """Raise what an answer means that is not the one awaited; abort unless the device did."""
+    if isinstance(answer, Abort):
+        raise SdoAborted(index, sub, answer.code)
+    toggled = isinstance(answer, Segment | DownloadSegmentResponse)
+    code = AbortCode.TOGGLE_BIT if toggled else AbortCode.COMMAND_SPECIFIER
+    yield Tell(Abort(index, sub, code).encode())
+    raise SdoAborted(index, sub, code)

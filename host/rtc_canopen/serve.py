@@ -1,0 +1,35 @@
+"""Run a server on a link: a rig in virtual time, or a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tickrig.host.link import NEVER, Link
+from tickrig.host.rtc_canopen.definition import SystemDefinition
+from tickrig.host.rtc_canopen.device_file import DeviceFile, read_device_file
+from tickrig.host.rtc_canopen.server import Server
+from tickrig.wire.can import Frames
+
+
+def serve(
+    server: Server,
+    link: Link[Frames],
+    until_us: int = NEVER,
+    done: Callable[[], bool] = lambda: False,
+) -> None:
+    """Let a server work until a time on the link's clock, or until `done()`.
+
+    Raises:
+        LinkClosed: the bus is gone.
+    """
+    while link.now_us < until_us and not done():
+        received = link.receive(max(0, min(server.due_us, until_us) - link.now_us))
+        if sent := server.tick(link.now_us, received):
+            link.send(sent)
+
+
+def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
+    """Read the EDS files of a definition, each once; DefinitionError if one cannot be used."""
+    names = dict.fromkeys(node.eds for node in definition.nodes)
+    return {name: read_device_file(folder / name) for name in names}
