@@ -14,10 +14,14 @@ from tickrig.emulators.fig120.plot import FORMATS, write_plot
 from tickrig.emulators.fig120.samples import Sample
 from tickrig.emulators.fig120.stage import VirtualStage, bus_stage
 from tickrig.emulators.rrc.demo import run_demo
+from tickrig.emulators.rtc_lite.demo import play as rtc_lite_demo
+from tickrig.emulators.rtc_lite.demo.stage import VirtualStage as VirtualLines
+from tickrig.emulators.rtc_lite.demo.stage import pty_stage
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.errors import DeviceRefused, LinkError
+from tickrig.host.rtc.errors import RtcRefused
 
 PLOTTER = "matplotlib"
 
@@ -33,6 +37,24 @@ def rrc() -> None:
     try:
         run_demo(click.echo)
     except (RuntimeError, OSError, LinkError, DeviceRefused) as error:
+        raise click.ClickException(str(error)) from error
+
+
+@demo.command("rtc-lite")
+@click.option("--virtual", is_flag=True, help="In virtual time: the same lines each time, at once.")
+def rtc_lite(virtual: bool) -> None:
+    """Send numbers through two emulated PICs, cut the power of one, and see it come back.
+
+    ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
+    RTComponent-Lite. The devices are processes on two ptys, in real time.
+    """
+    try:
+        if virtual:
+            rtc_lite_demo.run_demo(VirtualLines(), click.echo)
+            return
+        with pty_stage() as stage:
+            rtc_lite_demo.run_demo(stage, click.echo)
+    except (RuntimeError, OSError, LinkError, RtcRefused) as error:
         raise click.ClickException(str(error)) from error
 
 

@@ -1,0 +1,115 @@
+"""Where the demonstration is played: two devices on ptys in real time, or a rig in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from typing import Final, Protocol
+
+from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.emulators.child import running
+from tickrig.emulators.clock import RealClock
+from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.rtc_lite.components import COMPONENTS
+from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.sim_link import SimLink
+from tickrig.host.link import Link
+from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.serial_link import SerialLink
+
+CAST: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
+"""Which node plays which part."""
+
+BAUD: Final = 57_600
+EMULATOR: Final = "tickrig.emulators.rtc_lite.cli"
+POWER_CUT: Final = "power_cut"
+
+
+class Stage(Protocol):
+    """Two devices, and a system that is not yet there.
+
+    Attributes:
+        manager: of the system.
+        links: the lines to the devices.
+        places: where the devices are, for people.
+    """
+
+    manager: Manager
+    links: Mapping[str, Link[bytes]]
+    places: Mapping[str, str]
+
+    def step(self) -> None:
+        """Let time pass until the system has done something."""
+
+    def power(self, name: str, *, on: bool) -> None:
+        """Cut a device's power, or give it back."""
+
+
+class VirtualStage:
+    """Serial lines in a rig; time passes as fast as it can be computed."""
+
+    def __init__(self) -> None:
+        lines = {name: SerialLine(BAUD) for name in CAST}
+        self._nodes = {
+            name: RtcLiteNode(COMPONENTS[node], NodeConfig()) for name, node in CAST.items()
+        }
+        self._rig = Rig(*(Station(self._nodes[name], line.a) for name, line in lines.items()))
+        self.manager = Manager()
+        self.links: Mapping[str, Link[bytes]] = {
+            name: SimLink(self._rig, line.b) for name, line in lines.items()
+        }
+        self.places: Mapping[str, str] = dict.fromkeys(CAST, "a serial line in virtual time")
+
+    def step(self) -> None:
+        """Run the rig until the system is due, and tick it."""
+        self._rig.run_to(max(self.manager.due_us, self._rig.now_us))
+        self.manager.tick(self._rig.now_us)
+
+    def power(self, name: str, *, on: bool) -> None:
+        """Touch the node."""
+        self._nodes[name].inputs.set(POWER_CUT, 0 if on else 1)
+
+
+class PtyStage:
+    """Emulators in processes of their own, each on a pseudo-terminal, in real time."""
+
+    def __init__(
+        self,
+        links: Mapping[str, Link[bytes]],
+        hands: Mapping[str, ControlClient],
+        places: Mapping[str, str],
+    ) -> None:
+        self.manager, self.links, self.places, self._hands = Manager(), links, places, hands
+        self._runner = RealTime(self.manager, RealClock())
+
+    def step(self) -> None:
+        """Wait until the system is due, and tick it."""
+        self._runner.step()
+
+    def power(self, name: str, *, on: bool) -> None:
+        """Tell the emulator."""
+        if on:
+            self._hands[name].ask("clear", name=POWER_CUT)
+        else:
+            self._hands[name].ask("fault", spec=POWER_CUT)
+
+
+@contextmanager
+def pty_stage() -> Iterator[PtyStage]:
+    """Start both emulators, and open their terminals.
+
+    Raises:
+        RuntimeError: an emulator does not start.
+        LinkClosed: its terminal cannot be opened.
+    """
+    with ExitStack() as stack:
+        links, hands, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
+        for name, node in CAST.items():
+            child = stack.enter_context(running(EMULATOR, f"--node={node}", f"--baud={BAUD}"))
+            hands[name] = stack.enter_context(ControlClient(child.control))
+            links[name] = stack.enter_context(closing(SerialLink(str(child.link), BAUD)))
+            places[name] = str(child.link.resolve())
+        yield PtyStage(links, hands, places)
