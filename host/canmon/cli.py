@@ -11,6 +11,7 @@ from tickrig import __version__
 
 VERBS: Final[dict[str, str]] = {
     "top": "top",
+    "nodes": "nodes",
 }
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 

@@ -17,7 +17,8 @@ class Signal(NamedTuple):
     """A value of a frame.
 
     Attributes:
-        name: in lower case, a member of a record behind a dot; `6041h:00` where nobody named it.
+        name: of an object in lower case, a member of a record behind a dot; `6041h:00` where
+            nobody named it; as the DBC file has it.
         value: what it is.
         unit: as the EDS or DBC file gives it, else empty.
         text: how people read it where that is not the value itself.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
 from tickrig.host.monitor.decode.bus_decoder import BusDecoder
+from tickrig.host.monitor.decode.dbc_file import DbcFile
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.eds_objects import EdsObjects, read_eds
 from tickrig.host.monitor.decode.error_frame_text import decode_error
@@ -24,17 +25,22 @@ class Decoder:
 
     Args:
         eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus.
+        dbc: DBC files; the CAN-IDs that they name mean nothing else.
 
     Raises:
         OSError: a file cannot be read.
-        EdsError: it is malformed.
+        EdsError: an EDS is malformed.
+        DbcError: a DBC file is malformed, or cantools is not there.
     """
 
-    def __init__(self, eds: Mapping[int, Path | EdsObjects] = NO_EDS) -> None:
+    def __init__(
+        self, eds: Mapping[int, Path | EdsObjects] = NO_EDS, dbc: Sequence[Path] = ()
+    ) -> None:
         self._eds = {
             node: read_eds(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
+        self._dbc = tuple(DbcFile(path) for path in dbc)
         self._buses: dict[str, BusDecoder] = {}
 
     def take(self, heard: Heard) -> Decoded:
@@ -42,6 +48,10 @@ class Decoder:
         frame = heard.frame
         if isinstance(frame, ErrorFrame):
             return decode_error(frame)
+        for file in self._dbc:
+            decoded = file.decode(frame)
+            if decoded is not None:
+                return decoded
         if frame.extended:
             return Decoded("raw")
         bus = self._buses.get(heard.channel)

@@ -16,6 +16,7 @@ DEVICE_TYPE: Final = (0x1000, 0)
 STATUSWORD: Final = (0x6041, 0)
 STATUSWORD_BYTES: Final = 2
 DRIVE_PROFILE: Final = 402
+DRIVE_WORDS: Final = (0x6040, 0x6041)
 COMMUNICATION: Final = range(0x1000, 0x2000)
 """Objects that say how the others travel."""
 
@@ -95,8 +96,9 @@ class NodeMemory:
         return device_type & 0xFFFF == DRIVE_PROFILE
 
     def describe(self, index: int, sub: int) -> ObjectText:
-        """Return what is known of an object."""
-        text = self.eds.texts.get((index, sub)) or describe_standard(index, sub)
-        if text is None and self.is_drive:
-            text = describe_drive(index, sub)
-        return text or ObjectText()
+        """Return what is known of an object; the words of a drive have the names of CiA 402."""
+        told = self.eds.texts.get((index, sub)) or describe_standard(index, sub)
+        if self.is_drive and (told is None or index in DRIVE_WORDS):
+            text = describe_drive(index, sub) or ObjectText()
+            return text if told is None else text._replace(source=told.source)
+        return told or ObjectText()

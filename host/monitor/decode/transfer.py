@@ -32,6 +32,11 @@ class Outcome(StrEnum):
     UNANSWERED = "unanswered"  # the server sent nothing
     BROKEN = "broken off"  # the client began another one
 
+    @property
+    def answered(self) -> bool:
+        """Whether the server was heard."""
+        return self is not Outcome.UNANSWERED
+
 
 @dataclass(frozen=True, slots=True)
 class Transfer:

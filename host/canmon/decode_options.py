@@ -1,0 +1,82 @@
+"""The options of verbs that decode: EDS, DBC and filter."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.cli.options import PATH, add_options
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.decode.dbc_file import DbcError
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.eds_objects import EdsError, EdsObjects, read_eds
+from tickrig.host.monitor.decode.filter import Filter, parse_filter
+from tickrig.host.monitor.decode.filter_error import FilterError
+
+_EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
+
+eds_option: Final = click.option(
+    "--eds",
+    multiple=True,
+    metavar="NODE=FILE",
+    help="An EDS or DCF of a node, as 3=drive.eds; once for each node.",
+)
+dbc_option: Final = click.option(
+    "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."
+)
+decode_options: Final = add_options(eds_option, dbc_option)
+"""Add `--eds` and `--dbc`; `make_decoder` takes what they give."""
+
+filter_option: Final = click.option(
+    "-F",
+    "--filter",
+    "wanted",
+    metavar="FILTER",
+    help="Only these: 'node=3 and (pdo or emcy)', 181-18F, 123:7FF,#FF, 'sdo[6040h]',"
+    " 'statusword.fault'.",
+)
+"""Add `-F`, as `wanted`; `read_filter` takes what it gives."""
+
+
+def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
+    """Read what `--eds` names; Refused if there is no such node or file, or it is no EDS."""
+    return {node: _read(node, path) for node, path in map(_split, words)}
+
+
+def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
+    """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
+    objects = read_eds_files(eds)
+    try:
+        return Decoder(objects, dbc)
+    except OSError as error:
+        refuse_path("--dbc", error)
+    except DbcError as error:
+        raise Refused(f"--dbc {error}") from None
+
+
+def read_filter(text: str | None) -> Filter | None:
+    """Read what `-F` says; Refused with the column if it is no filter."""
+    try:
+        return None if text is None else parse_filter(text)
+    except FilterError as error:
+        raise Refused(str(error)) from None
+
+
+def _split(word: str) -> tuple[int, Path]:
+    match = _EDS.fullmatch(word)
+    if match is None or not 1 <= int(match[1], 0) <= 127:
+        raise Refused(f"--eds {word!r} is not NODE=FILE with a node-ID 1..127, as 3=drive.eds")
+    return int(match[1], 0), Path(match[2])
+
+
+def _read(node: int, path: Path) -> EdsObjects:
+    try:
+        return read_eds(path, node)
+    except OSError as error:
+        refuse_path("--eds", error)
+    except EdsError as error:
+        raise Refused(f"--eds {error}") from None

@@ -1,0 +1,73 @@
+"""Signals by a DBC file, through cantools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tickrig.host.monitor.decode.decoded import DBC, Decoded, Signal
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.datatypes import Value
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message
+    from cantools.database.namedsignalvalue import NamedSignalValue
+
+
+class DbcError(ValueError):
+    """A file that is no DBC, or cantools is not there."""
+
+
+class DbcFile:
+    """Decodes the CAN-IDs that a DBC file names; for these it counts more than anything else.
+
+    Args:
+        path: the file.
+
+    Raises:
+        OSError: the file cannot be read.
+        DbcError: it is malformed, or the extra `dbc` is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            from cantools import Error  # noqa: PLC0415 - slow, and an extra
+            from cantools.database import load_file  # noqa: PLC0415
+            from cantools.database.can import Database  # noqa: PLC0415
+        except ImportError as error:
+            raise DbcError("DBC files need cantools: pip install 'tickrig[dbc]'") from error
+        try:
+            database = load_file(path, database_format="dbc", strict=False)
+        except (Error, ValueError, KeyError) as error:
+            raise DbcError(f"{path} is no DBC: {' '.join(str(error).split())}") from error
+        self._failures = (Error, ValueError, KeyError)
+        assert isinstance(database, Database)  # as the format says
+        self._messages: dict[tuple[int, bool], Message] = {
+            (message.frame_id, message.is_extended_frame): message for message in database.messages
+        }
+        self._units = {
+            message.name: {signal.name: signal.unit or "" for signal in message.signals}
+            for message in self._messages.values()
+        }
+
+    def decode(self, frame: CanFrame) -> Decoded | None:
+        """Return the signals of a frame; None where the file does not name its CAN-ID."""
+        message = self._messages.get((frame.can_id, frame.extended))
+        if message is None:
+            return None
+        if frame.remote:
+            return Decoded("dbc", None, f"{message.name} asked for by RTR", (), DBC)
+        try:
+            found = message.decode_simple(frame.data, allow_truncated=True)
+        except self._failures as error:
+            return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
+        units = self._units[message.name]
+        signals = tuple(_signal(name, value, units[name]) for name, value in found.items())
+        return Decoded("dbc", None, " ".join([message.name, *map(str, signals)]), signals, DBC)
+
+
+def _signal(name: str, value: Value | NamedSignalValue, unit: str) -> Signal:
+    """Return a signal; an enumerated one has its name as text."""
+    if isinstance(value, bool | int | float | str | bytes):
+        return Signal(name, value, unit)
+    return Signal(name, value.value, unit, value.name)
