@@ -88,7 +88,7 @@ class RtcLiteProxy(RtComponent):
         self.fatal_us: int | None = None
         self._failed = False  # a callback failed, so that Error comes next
         self._untold = False  # an error of which nobody knows whether it is a fatal one
-        self._mirrored_us = 0
+        self._mirrored = -1  # in which ten ticks its state was asked
 
     @property
     def due_us(self) -> int:
@@ -171,7 +171,7 @@ class RtcLiteProxy(RtComponent):
         """Hand data in, let the device execute, and hand data out."""
         code = self._hand_in()
         if code is _OK:
-            code = self._mirror() if self._by_timer else self._command(Command.EXECUTE)
+            code = self._mirror(ec.now_us) if self._by_timer else self._command(Command.EXECUTE)
         self._hand_out()
         self._failed = code is not _OK
         return code
@@ -223,15 +223,16 @@ class RtcLiteProxy(RtComponent):
             return self._command(Command.ABORT)
         return _OK
 
-    def _mirror(self) -> ReturnCode:
-        """Ask each 10th tick whether the device is still Active."""
-        now_us = self._talk.now_us
-        if now_us - self._mirrored_us < MIRROR_US:
+    def _mirror(self, now_us: int) -> ReturnCode:
+        """Ask once in 10 ticks whether the device is still Active."""
+        if now_us // MIRROR_US == self._mirrored:
             self._talk.poll()
             return _OK
-        self._mirrored_us = now_us
+        self._mirrored = now_us // MIRROR_US
         code = self._command(Command.STATE)
-        return code if self._talk.state is State.ACTIVE else ReturnCode.RTC_ERROR
+        if code is _OK and self._talk.state is not State.ACTIVE:
+            return ReturnCode.RTC_ERROR
+        return code
 
     def _hand_in(self) -> ReturnCode:
         """Write one new value to each in-port of the device that has one."""

@@ -49,7 +49,12 @@ class InRelay:
         value = self.port.read() if self.port.is_new else None
         if value is None:
             return None
-        return PortData(self.name, self.port_type.encode(_bare(value.data)))
+        bare = value.data
+        if self.port.data_type is basic.TimedOctetSeq:
+            bare = tuple(bare)
+        elif self.port.data_type is basic.TimedCharSeq:
+            bare = "".join(bare)
+        return PortData(self.name, self.port_type.encode(bare))
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +87,3 @@ def _read(profile: PortProfile) -> tuple[str, PortType[Any]]:
         known = " ".join(PORT_TYPES)
         raise DeviceRefused(f"port {name!r} has type {profile.code!r}; known: {known}", "CZ")
     return name, port_type
-
-
-def _bare(value: Any) -> Any:
-    """Return a value as `wire.rtc_lite.values` has it."""
-    if isinstance(value, bytes):
-        return tuple(value)
-    if isinstance(value, tuple) and value and isinstance(value[0], str):
-        return "".join(value)
-    return value
