@@ -7,10 +7,11 @@ import numpy as np
 from tickrig.host.monitor.column_bits import column_bits
 from tickrig.host.monitor.column_changes import column_changes
 from tickrig.host.monitor.column_gaps import column_gaps
+from tickrig.host.monitor.column_rows import by_channel, frame_at, select
 from tickrig.host.monitor.controller import Controller
-from tickrig.host.monitor.frame_columns import FrameColumns, Frames, frame_of
 from tickrig.host.monitor.ident import ERROR
 from tickrig.host.monitor.load import WINDOW_US, Load, Window
+from tickrig.host.monitor.logs.columns import Columns
 from tickrig.host.monitor.runs import Ints, Runs
 from tickrig.host.monitor.tally import IdRow
 from tickrig.host.monitor.traffic import BusRow, Snapshot
@@ -18,31 +19,20 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
 
-def snapshot_of(columns: FrameColumns) -> Snapshot:
+def snapshot_of(columns: Columns) -> Snapshot:
     """Return what a log holds."""
-    if not len(columns.at_us):
+    if not len(columns):
         return Snapshot()
     now_us = int(columns.at_us[-1])
     buses, rows = [], []
-    for channel, frames in sorted(by_channel(columns)):
+    for channel, frames in by_channel(columns):
         bus, of_bus = _bus(channel, frames, now_us)
         buses.append(bus)
         rows += of_bus
     return Snapshot(now_us, tuple(buses), tuple(rows))
 
 
-def by_channel(columns: FrameColumns) -> list[tuple[str, Frames]]:
-    """Return the frames of each bus that has any."""
-    present = np.flatnonzero(np.bincount(columns.channel)).tolist()
-    if len(present) == 1:
-        return [(columns.channels[present[0]], Frames.of(columns, slice(None)))]
-    return [
-        (columns.channels[place], Frames.of(columns, np.flatnonzero(columns.channel == place)))
-        for place in present
-    ]
-
-
-def _bus(channel: str, frames: Frames, now_us: int) -> tuple[BusRow, list[IdRow]]:
+def _bus(channel: str, frames: Columns, now_us: int) -> tuple[BusRow, list[IdRow]]:
     first_us, last_us = int(frames.at_us[0]), int(frames.at_us[-1])
     went_back = int(np.count_nonzero(np.diff(frames.at_us) < 0))
     errors, frames = _take_errors(frames)
@@ -62,16 +52,16 @@ def _bus(channel: str, frames: Frames, now_us: int) -> tuple[BusRow, list[IdRow]
     return row, _id_rows(channel, frames, bits)
 
 
-def _take_errors(frames: Frames) -> tuple[Controller, Frames]:
+def _take_errors(frames: Columns) -> tuple[Controller, Columns]:
     errors = Controller()
     is_error = frames.ident & ERROR != 0
     if not is_error.any():
         return errors, frames
     for row in np.flatnonzero(is_error):
-        frame = frames.heard(row).frame
+        frame = frame_at(frames, row)
         assert isinstance(frame, ErrorFrame)
         errors.take(frame)
-    return errors, Frames.of(frames, np.flatnonzero(~is_error))
+    return errors, select(frames, np.flatnonzero(~is_error))
 
 
 def windows_of(first_us: int, at_us: Ints, bits: Ints) -> list[Window]:
@@ -85,7 +75,7 @@ def windows_of(first_us: int, at_us: Ints, bits: Ints) -> list[Window]:
     return [Window(*window) for window in zip(starts.tolist(), sums.tolist(), strict=True)]
 
 
-def _id_rows(channel: str, frames: Frames, bits: Ints) -> list[IdRow]:
+def _id_rows(channel: str, frames: Columns, bits: Ints) -> list[IdRow]:
     if not len(frames.at_us):
         return []
     runs = Runs.of(frames.ident)
@@ -96,7 +86,7 @@ def _id_rows(channel: str, frames: Frames, bits: Ints) -> list[IdRow]:
     for run, gaps in enumerate(column_gaps(runs, gaps_us)):
         first, last = runs.order[runs.begins[run]], runs.order[runs.ends[run] - 1]
         ident = int(runs.idents[run])
-        frame = frame_of(ident, int(frames.dlc[last]), int(frames.payload[last]))
+        frame = frame_at(frames, last)
         assert isinstance(frame, CanFrame)
         rows.append(
             IdRow(
