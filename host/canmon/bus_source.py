@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, Protocol
 
+import can
+
 from tickrig.host.canmon.bus_reader import BusReader, open_bus
 from tickrig.host.canmon.socket_reader import SocketReader
 from tickrig.host.canmon.source_word import BusWord
@@ -58,7 +60,7 @@ def open_buses(words: Sequence[BusWord], options: BusOptions) -> BusSource:
     readers: list[Reader] = []
     try:
         for word in words:
-            readers.append(_opened(_merged(word, options)))
+            readers.append(reader_of(*open_bus(merged(word, options))))
     except BaseException:
         for reader in readers:
             reader.close()
@@ -66,12 +68,12 @@ def open_buses(words: Sequence[BusWord], options: BusOptions) -> BusSource:
     return BusSource(readers, [word.chosen for word in words])
 
 
-def _opened(options: BusOptions) -> Reader:
-    bus, interface, name = open_bus(options)
+def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader:
+    """Return what reads an open bus."""
     return SocketReader(bus, name) if interface == "socketcan" else BusReader(bus, interface, name)
 
 
-def _merged(word: BusWord, options: BusOptions) -> BusOptions:
+def merged(word: BusWord, options: BusOptions) -> BusOptions:
     """Return the options of a bus: what its word says goes before them."""
     return replace(
         options,

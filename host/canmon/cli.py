@@ -12,6 +12,9 @@ from tickrig import __version__
 VERBS: Final[dict[str, str]] = {
     "top": "top",
     "nodes": "nodes",
+    "send": "send",
+    "seq": "seq",
+    "play": "play",
 }
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -36,7 +36,7 @@ class ReplayPlan:
 
     Args:
         log: the frames; read again for each loop.
-        channels: where each bus of the log goes; frames of other buses are left out.
+        route: tells where the frames of a bus of the log go, None if nowhere.
         speed: how many times faster, 0 without any pause.
         from_us: what is earlier than this after the first frame is left out,
         to_us: what is later likewise; None for the end.
@@ -51,7 +51,7 @@ class ReplayPlan:
     """
 
     log: Iterable[Heard]
-    channels: Mapping[str, str]
+    route: Callable[[str], str | None]
     speed: float = 1.0
     from_us: int = 0
     to_us: int | None = None
@@ -72,11 +72,12 @@ class ReplayPlan:
             end_us, sent = begin_us, False
             for at_us, heard in self._span():
                 end_us = begin_us + at_us
-                if isinstance(heard.frame, ErrorFrame) or heard.channel not in self.channels:
+                channel = self.route(heard.channel)
+                if channel is None or isinstance(heard.frame, ErrorFrame):
                     self.left_out += 1
                     continue
                 sent = True
-                yield Due(self._scaled(end_us), self.channels[heard.channel], heard.frame)
+                yield Due(self._scaled(end_us), channel, heard.frame)
             if not sent:
                 return
             loop += 1

@@ -1,9 +1,9 @@
-"""Variables in the text of a sequence: `{id}`, `{0x600+id:3}`, `{speed:i16}`.
+"""Variables in the text of a sequence: `{id}`, `{0x600+id:3}`, `{speed:i16}`, `{n:d}`.
 
 >>> fill_in("{0x600+id:3}#2B{index:u16}00", {"id": 3, "index": 0x6040})
 '603#2B406000'
->>> fill_in("{-2:i16}{id}", {"id": 16})
-'FEFF10'
+>>> fill_in("123#{-2:i16}{id}", {"id": 16}), fill_in("{id}.rpdo1", {"id": 16})
+('123#FEFF10', '16.rpdo1')
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 _FIELD: Final = re.compile(r"\{([^{}:]*)(?::([^{}]*))?\}")
-_FORM: Final = re.compile(r"([1-8])|([ui])(8|16|24|32|40|48|56|64)")
+_FORM: Final = re.compile(r"([1-8])|([ui])(8|16|24|32|40|48|56|64)|d")
 _BINARY: Final[dict[type[ast.operator], Callable[[int, int], int]]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -32,12 +32,16 @@ MOST_BITS: Final = 64
 
 
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
-    """Replace each field by its number: two hex digits; `:3` three; `:i16` two bytes, lowest first.
+    """Replace each field by its number.
+
+    In a frame, which has a `#`, that is two hex digits, else a decimal number. `:3` is three hex
+    digits, `:i16` two bytes, the lowest first, `:d` a decimal number.
 
     Raises:
         ValueError: an unknown variable, no whole number, or one that does not fit.
     """
-    return _FIELD.sub(lambda match: _written(match[1], match[2] or "2", variables), text)
+    usual = "2" if "#" in text else "d"
+    return _FIELD.sub(lambda match: _written(match[1], match[2] or usual, variables), text)
 
 
 def parse_variable(text: str) -> tuple[str, int]:
@@ -95,8 +99,10 @@ def _written(text: str, form: str, variables: Mapping[str, int]) -> str:
     number = evaluate(text, variables)
     match = _FORM.fullmatch(form)
     if match is None:
-        raise ValueError(f"{{{text}:{form}}}: 1 to 8 hex digits, or u8 to u64 or i8 to i64")
+        raise ValueError(f"{{{text}:{form}}}: 1 to 8 hex digits, u8 to u64, i8 to i64, or d")
     digits, sign, bits = match.groups()
+    if form == "d":
+        return str(number)
     try:
         if digits:
             return _digits(number, int(digits))

@@ -15,7 +15,7 @@ from tickrig.wire.can_error import NO_ACK
 
 SYNC = CanFrame(0x080)
 LOG = [Heard(5_000_000 + n * 10_000, "can0", CanFrame(0x100 + n)) for n in range(5)]
-BACK = {"can0": "vcan2"}
+BACK = {"can0": "vcan2"}.get
 
 
 def planned(**options: Any) -> list[tuple[int, int]]:
@@ -53,7 +53,7 @@ def test_an_endless_replay_of_one_frame_takes_time() -> None:
 
 def test_an_endless_replay_of_nothing_ends() -> None:
     assert list(ReplayPlan([], BACK, loops=0)) == []
-    assert list(ReplayPlan(LOG, {"can7": "can0"}, loops=0)) == []
+    assert list(ReplayPlan(LOG, {"can7": "can0"}.get, loops=0)) == []
 
 
 def test_error_frames_and_other_buses_are_left_out_and_counted() -> None:

@@ -105,7 +105,7 @@ def test_names_are_resolved_by_whoever_knows_them() -> None:
         return CanFrame(0x205)
 
     TomlSequence(text, "a.toml", resolve=resolve).parse()
-    assert said == ["5.rpdo1 target=64"]
+    assert said == ["5.rpdo1 target=100"]
 
 
 @pytest.mark.parametrize(
@@ -118,10 +118,11 @@ def test_names_are_resolved_by_whoever_knows_them() -> None:
         ("{n<<4|1:u24}", "A10000"),
         ("{n//3%2^1&3}", "00"),
         ("{n>>1}", "05"),
+        ("{-n:d}", "-10"),
     ],
 )
 def test_a_field_is_written_as_it_says(text: str, filled: str) -> None:
-    assert fill_in(text, {"n": 10}) == filled
+    assert fill_in(f"#{text}", {"n": 10}) == f"#{filled}"
 
 
 @pytest.mark.parametrize(
@@ -144,7 +145,7 @@ def test_a_field_is_written_as_it_says(text: str, filled: str) -> None:
 )
 def test_a_field_that_is_no_number_is_refused(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=re.escape(said)):
-        fill_in(text, {"n": 10})
+        fill_in(f"#{text}", {"n": 10})
 
 
 @given(st.text(max_size=20))

@@ -1,0 +1,278 @@
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.host.canmon.terminal import PROGRAM
+from tests.host.canmon.wire import Wire, new_wire
+from tickrig.host.canmon.cli import main
+
+EDS = str(Path(__file__).parents[3] / "examples/eds/epos.eds")
+LOG = """\
+(1600000000.000000) can0 080#
+(1600000000.001000) can1 705#05
+(1600000000.002000) can0 181#0102
+(1600000000.003000) can0 20000020#0000000000000000
+(1600000000.004000) can0 182#R
+"""
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with new_wire() as made:
+        yield made
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> str:
+    path = tmp_path / "run.log"
+    path.write_text(LOG)
+    return str(path)
+
+
+def canmon(*words: str, stdin: str = "") -> Result:
+    return CliRunner().invoke(main, words, input=stdin)
+
+
+def test_frames_are_sent_in_their_order_and_printed(wire: Wire) -> None:
+    result = canmon("send", wire.word, "123#DEADBEEF", "00000605#40", "705#R")
+    assert wire.all() == ["123#DEADBEEF", "00000605#40", "705#R"]
+    assert re.sub(r"\(\d+\.\d{6}\)", "T", result.stdout).splitlines() == [
+        f"T {wire.name} 123#DEADBEEF",
+        f"T {wire.name} 00000605#40",
+        f"T {wire.name} 705#R",
+    ]
+
+
+def test_a_pdo_is_sent_by_the_names_of_its_objects(wire: Wire) -> None:
+    canmon("send", wire.word, "5.rpdo1", "target=-1", "080#", "--eds", f"5={EDS}", "-q")
+    assert wire.all() == ["205#0000FFFFFFFF", "080#"]
+
+
+@pytest.mark.realtime
+def test_a_frame_is_sent_again_with_counter_and_checksum(wire: Wire) -> None:
+    fields = ("--counter", "0:7..8", "--checksum", "1:sum8")
+    result = canmon("send", wire.word, "100#000001", "--every", "1ms", "--count", "3", *fields)
+    assert wire.all() == ["100#070801", "100#080901", "100#070801"]
+    assert len(result.stdout.splitlines()) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["123"], "'123' is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1"),
+        (["123#1"], "'123#1' is not a frame like 705#7F"),
+        (["5.rpdo1"], "nobody described node 5; give --eds 5=FILE"),
+        (["5.rpdo1", "speed=1", "--eds", f"5={EDS}"], "it has controlword, target_velocity"),
+        (["080#", "--eds", "5"], "--eds '5' is not NODE=FILE with a node-ID of 1 to 127"),
+        (["080#", "--eds", "200=a"], "--eds '200=a' is not NODE=FILE"),
+        (["080#", "--eds", "5=nowhere.eds"], "EDS nowhere.eds: No such file or directory"),
+        (["080#", "--eds", f"5={__file__}"], "is no EDS"),
+        (["080#", "--count", "3"], "--count says how often --every sends; give --every TIME"),
+        (["080#", "--every", "soon"], "--every 'soon' is not a time"),
+        (["080#", "--every", "0s"], "a period of 0 us; 1 us is the least"),
+        (["080#", "--counter", "0:0..9"], "no byte 0 for a counter or checksum: 0 bytes are sent"),
+        (["080#", "--checksum", "0:md5"], "no checksum 'md5'; known: xor"),
+    ],
+)
+def test_a_mistake_sends_nothing_and_is_told_in_a_line(
+    wire: Wire, words: list[str], said: str
+) -> None:
+    result = canmon("send", wire.word, *words)
+    assert (result.exit_code, result.stdout, wire.all()) == (2, "", [])
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_frames_are_not_sent_into_a_log(log: str) -> None:
+    result = canmon("send", log, "080#")
+    assert result.exit_code == 2
+    assert "is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k" in result.stderr
+
+
+class Unplugged(can.BusABC):
+    """A bus whose adapter is pulled."""
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise can.CanOperationError("Network is down")
+
+
+def test_a_bus_that_is_gone_ends_with_status_3(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("can.interfaces.virtual.VirtualBus.send", Unplugged.send)
+    result = canmon("send", wire.word, "080#")
+    assert result.exit_code == 3
+    assert result.stderr == f"Error: cannot send on {wire.name}: Network is down\n"
+
+
+def test_a_log_is_played_onto_a_bus(wire: Wire, log: str) -> None:
+    result = canmon("play", log, wire.word, "--speed", "max")
+    assert wire.all() == ["080#", "705#05", "181#0102", "182#R"]
+    assert re.fullmatch(r"4 frames in \d+\.\d{3} s; 1 left out\n", result.stderr)
+
+
+@pytest.mark.realtime
+def test_what_was_recorded_on_one_bus_goes_where_it_is_told(wire: Wire, log: str) -> None:
+    result = canmon("play", log, f"{wire.word}=can0", "--loop", "2", "--from", "2ms")
+    assert wire.all() == ["181#0102", "182#R"] * 2
+    assert "late p50" in result.stderr
+
+
+def test_frames_are_played_one_by_one(wire: Wire, log: str) -> None:
+    result = canmon("play", log, wire.word, "--step", stdin="\n\n")
+    assert wire.all() == ["080#", "705#05"]
+    assert result.stdout.splitlines() == [
+        f"{wire.name} {text}" for text in ("080#", "705#05", "181#0102")
+    ]
+
+
+@pytest.mark.realtime
+def test_a_replay_begins_when_a_frame_is_received(wire: Wire, log: str) -> None:
+    with wire.calling("581#"):
+        result = canmon("play", log, wire.word, "--speed", "max", "--wait-rx", "581")
+    assert result.exit_code == 0
+    assert wire.all() == ["080#", "705#05", "181#0102", "182#R"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--speed", "0"], "--speed '0' is neither a factor above 0, as 2 or 0.5, nor max"),
+        (["--speed", "fast"], "--speed 'fast' is neither"),
+        (["--loop", "0"], "--loop '0' is neither 1 or more nor forever"),
+        (["--from", "9s", "--to", "3s"], "from 9000000 us to 3000000 us there is nothing"),
+        (["--to", "x"], "'x' is not a time"),
+        (["--wait-rx", "5"], "--wait-rx '5' is no CAN-ID of 3 or 8 hex digits"),
+        (["can9"], "both take all of it; write can9=RECORDED"),
+        (["=can0"], "'=can0' is not BUS=RECORDED, once for each recorded bus"),
+    ],
+)
+def test_a_replay_that_cannot_be_is_refused(
+    wire: Wire, log: str, words: list[str], said: str
+) -> None:
+    result = canmon("play", log, wire.word, *words)
+    assert (result.exit_code, wire.all()) == (2, [])
+    assert said in result.stderr
+
+
+def test_a_log_that_is_not_there_ends_with_status_3(wire: Wire) -> None:
+    result = canmon("play", "/nowhere/run.log", wire.word)
+    assert (result.exit_code, result.stderr) == (
+        3,
+        "Error: /nowhere/run.log: No such file or directory\n",
+    )
+
+
+START = """
+[vars]
+id = 3
+
+[[step]]
+send = ["000#01{id}", "{id}.rpdo1 target={2*4}"]
+
+[[step]]
+expect = ["{0x700+id:3}#05", "node={id} and emcy"]
+within = "5s"
+"""
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> str:
+    path = tmp_path / "start.toml"
+    path.write_text(START)
+    return str(path)
+
+
+@pytest.mark.realtime
+def test_a_sequence_that_is_answered_ends_well(wire: Wire, start: str) -> None:
+    answers = {"000#0105": "705#05", "205#000008000000": "085#1023010000000000"}
+    with wire.answering(lambda text: answers.get(text, "")):
+        result = canmon("seq", wire.word, start, "--var", "id=5", "--eds", f"5={EDS}")
+    assert result.exit_code == 0, result.output
+    assert [line.split(" ", 1)[1] for line in result.stdout.splitlines()] == [
+        "> 000#0105",
+        "> 205#000008000000",
+        "ok 705#05 and node=5 and emcy",
+        ". 1 met, 0 missed",
+    ]
+
+
+@pytest.mark.realtime
+def test_a_sequence_that_is_not_answered_ends_with_status_1(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text('[[step]]\nexpect = "705#05"\nwithin = "2ms"\n')
+    result = canmon("seq", wire.word, str(path), "-q")
+    assert result.exit_code == 1
+    assert result.stdout.endswith(f" ? {path}:2: no 705#05 within 2 ms\n")
+
+
+def test_a_dry_run_opens_no_bus(start: str) -> None:
+    result = canmon("seq", "socketcan:nowhere", start, "--dry-run", "--eds", f"3={EDS}")
+    assert result.stdout.splitlines() == [
+        "send 000#0103 203#000008000000",
+        "expect 703#05 and node=3 and emcy within 5000 ms, else stop",
+    ]
+
+
+@pytest.mark.realtime
+def test_lines_are_sent_too(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "two.seq"
+    path.write_text("loop 2\n+0 000#0105\n+1.5 080#\n")
+    assert canmon("seq", wire.word, str(path)).exit_code == 0
+    assert wire.all() == ["000#0105", "080#"] * 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--var", "id"], "'id' is not NAME=NUMBER, as id=3"),
+        (["--var", "node_number=5"], "does not name it"),
+        ([], "start.toml:6: 3.rpdo1: nobody described node 3; give --eds 3=FILE"),
+    ],
+)
+def test_a_sequence_that_cannot_be_is_refused(
+    wire: Wire, start: str, words: list[str], said: str
+) -> None:
+    result = canmon("seq", wire.word, start, *words)
+    assert (result.exit_code, wire.all()) == (2, [])
+    assert said in result.stderr
+
+
+def test_a_sequence_that_is_no_text_is_refused(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"\xff\xfe")
+    assert canmon("seq", wire.word, str(path)).stderr == f"Error: {path} is no text\n"
+    missing = canmon("seq", wire.word, str(tmp_path / "b.toml"))
+    assert (missing.exit_code, "No such file or directory" in missing.stderr) == (2, True)
+
+
+def test_a_condition_that_is_none_is_refused_with_its_line(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text('[[step]]\nexpect = "node=="\n')
+    result = canmon("seq", wire.word, str(path))
+    assert (result.exit_code, result.stderr.startswith(f"Error: {path}:2: filter")) == (2, True)
+
+
+@pytest.mark.realtime
+def test_ctrl_c_ends_what_is_sent_for_ever() -> None:
+    words = ["canmon", "send", "virtual:alone", "080#", "--every", "1ms"]
+    program = f"import sys; sys.argv = {words}; {PROGRAM}"
+    with subprocess.Popen(
+        [sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        for _ in range(10):
+            assert b" alone 080#" in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        process.stdout.read()
+        said = process.stderr.read()
+        assert process.wait(10) == 0
+    assert b"Traceback" not in said
