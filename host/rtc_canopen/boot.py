@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.host.rtc_canopen.definition import NodeEntry, PdoEntry, PdoName, SdoEntry
 from tickrig.host.rtc_canopen.device_file import DeviceFile
-from tickrig.host.rtc_canopen.errors import SdoTimeout, WrongIdentity
+from tickrig.host.rtc_canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.rtc_canopen.pdo_layout import PARAMETERS, PdoLayout, lay_out
 from tickrig.host.rtc_canopen.script import Pause, Script
 from tickrig.host.rtc_canopen.sdo_transfer import download, download_number, upload_number
@@ -28,12 +28,14 @@ PROBE_US: Final = 1_000_000
 
 
 def probe() -> Script[None]:
-    """Ask for the device type until there is an answer."""
+    """Ask for the device type until there is an answer, be it an abort."""
     while True:
         try:
             yield from upload_number(DEVICE_TYPE, 0)
         except SdoTimeout:
             yield Pause(PROBE_US)
+        except SdoAborted:
+            return
         else:
             return
 

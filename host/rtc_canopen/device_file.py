@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,9 @@ def read_device_file(path: Path) -> DeviceFile:
     if path.suffix.lower() not in (".eds", ".dcf"):
         raise DefinitionError(f"{path}: the name does not end in .eds or .dcf")
     try:
-        dictionary = canopen.import_od(str(path))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # its own
+            dictionary = canopen.import_od(str(path))
     except OSError as error:
         raise DefinitionError(f"{path}: {error.strerror}") from error
     except (configparser.Error, ValueError, KeyError, TypeError, AttributeError) as error:

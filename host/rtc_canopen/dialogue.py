@@ -21,7 +21,13 @@ from tickrig.host.rtc_canopen.script import (
 )
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
-from tickrig.wire.canopen.sdo import Abort, parse_response
+from tickrig.wire.canopen.sdo import (
+    Abort,
+    DownloadInitiateResponse,
+    Response,
+    UploadInitiateResponse,
+    parse_response,
+)
 from tickrig.wire.errors import WireError
 
 SDO_REQUEST: Final = 0x600
@@ -89,14 +95,15 @@ class Dialogue:
             job.dropped()
 
     def hear_sdo(self, now_us: int, data: bytes) -> None:
-        """Take a response; one that nobody asked for is passed over."""
+        """Take a response; one that nobody asked for, or too late, is passed over."""
         self._now_us = now_us
         if isinstance(self._step, Ask):
             try:
                 answer = parse_response(data)
             except WireError:
                 return
-            self._go_on(answer)
+            if _answers(self._step, answer):
+                self._go_on(answer)
 
     def hear_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
@@ -163,6 +170,13 @@ class Dialogue:
 
     def _say(self, data: bytes) -> None:
         self._send(SDO_REQUEST + self._node_id, data)
+
+
+def _answers(ask: Ask, answer: Response) -> bool:
+    """Say whether a response is of the object that was asked for, as far as it says so."""
+    if isinstance(answer, DownloadInitiateResponse | UploadInitiateResponse):
+        return (answer.index, answer.sub) == (ask.index, ask.sub)
+    return True
 
 
 def _resume(script: Script[Any], value: object) -> Step:

@@ -32,7 +32,7 @@ def upload(index: int, sub: int) -> Script[bytes]:
     """
     answer = yield Ask(UploadInitiateRequest(index, sub).encode(), index, sub)
     match answer:
-        case UploadInitiateResponse() if (answer.index, answer.sub) == (index, sub):
+        case UploadInitiateResponse():
             if answer.data is not None:
                 return answer.data
             return (yield from _upload_segments(index, sub))
@@ -47,7 +47,7 @@ def download(index: int, sub: int, data: bytes) -> Script[None]:
         request = DownloadInitiateRequest(index, sub, None, len(data))
     answer = yield Ask(request.encode(), index, sub)
     match answer:
-        case DownloadInitiateResponse() if (answer.index, answer.sub) == (index, sub):
+        case DownloadInitiateResponse():
             if request.data is None:
                 yield from _download_segments(index, sub, data)
         case _:
