@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.emulators.port import Port
-from tickrig.emulators.serial_line import LineEnd
+from tickrig.emulators.port import ByteEnd, Port
 
 
 class Bridge:
@@ -14,7 +13,7 @@ class Bridge:
     the outside's until it does.
     """
 
-    def __init__(self, end: LineEnd, outside: Port[bytes]) -> None:
+    def __init__(self, end: ByteEnd, outside: Port[bytes]) -> None:
         self._end, self._outside = end, outside
         self._pending = b""
         self._looked_us = 0

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.emulators.emulated import Emulated
+from tickrig.emulators.rh3.build import NAME as RH3
+from tickrig.emulators.rh3.build import build_rh3
 from tickrig.emulators.rrc.build import NAME as RRC
 from tickrig.emulators.rrc.build import build_rrc
 from tickrig.emulators.rtc_lite.build import NAME as RTC_LITE
@@ -15,4 +17,5 @@ from tickrig.emulators.trace import Config
 DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {
     RRC: build_rrc,
     RTC_LITE: build_rtc_lite,
+    RH3: build_rh3,
 }

@@ -12,7 +12,7 @@ from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.clock import Clock
 from tickrig.emulators.emulated import Emulated
 from tickrig.emulators.faults import FaultKind, FaultyPort
-from tickrig.emulators.port import Port
+from tickrig.emulators.port import ByteLine, Port
 from tickrig.emulators.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
@@ -36,11 +36,13 @@ class LineKind:
         baud: bit rate in bit/s.
         faults: the wire faults that can be armed.
         splitter: makes what cuts one direction for the log, into lines unless given.
+        wire: makes the line of a baud rate.
     """
 
     baud: int = 115_200
     faults: Mapping[str, FaultKind[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
     splitter: Callable[[Mark], Splitter] | None = None
+    wire: Callable[[int], ByteLine] = SerialLine
 
 
 class Emulator(Workbench):
@@ -71,7 +73,7 @@ class Emulator(Workbench):
     ) -> None:
         self._trace, self._outside = trace, outside
         line = line or LineKind()
-        self._line = SerialLine(line.baud)
+        self._line = line.wire(line.baud)
         port = FaultyPort(self._line.a, line.faults, seed)
         super().__init__(name, device, port, link)
         if line.splitter is not None:

@@ -24,6 +24,38 @@ class Port(Protocol[W]):
         """Put one tick's traffic on the wire at `now_us`."""
 
 
+class ByteEnd(Port[bytes], Protocol):
+    """One end of an emulated serial line."""
+
+    @property
+    def idle_us(self) -> int:
+        """When the last byte that is on its way here will have arrived."""
+        ...
+
+    @property
+    def lost(self) -> int:
+        """Bytes that found a buffer full."""
+        ...
+
+    def room(self, now_us: int) -> int:
+        """Return how many bytes `send` takes at `now_us` without loss."""
+        ...
+
+
+class ByteLine(Protocol):
+    """An emulated serial line with two ends or more; the device is at the first."""
+
+    @property
+    def a(self) -> ByteEnd:
+        """The device's end."""
+        ...
+
+    @property
+    def b(self) -> ByteEnd:
+        """The host's end."""
+        ...
+
+
 class Wire(Protocol):
     """A wire that many stations share; it is moved on by the rig."""
 

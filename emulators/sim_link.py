@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tickrig.device.core import NEVER
+from tickrig.emulators.port import ByteEnd
 from tickrig.emulators.rig import Rig
-from tickrig.emulators.serial_line import LineEnd
 from tickrig.host.errors import LinkClosed
 
 
@@ -16,7 +16,7 @@ class SimLink:
         end: the host's end of a serial line of that rig.
     """
 
-    def __init__(self, rig: Rig, end: LineEnd) -> None:
+    def __init__(self, rig: Rig, end: ByteEnd) -> None:
         self._rig, self._end = rig, end
         self._closed = False
 

@@ -27,7 +27,7 @@ from tickrig.host.cli.duration import format_time
 VERSION: Final = 1
 RESET: Final = "reset"
 
-Config = Mapping[str, str | int]
+Config = Mapping[str, str | int | float | None]
 """Configuration of a device, as the header of its trace carries it."""
 
 _HEADER: Final = re.compile(r"# tickrig-trace v([0-9]+) ([\w-]+) (\{.*\})")

@@ -94,9 +94,8 @@ class Rh3Base:
             self._touched()
         sent = b""
         if self._on:
-            served = self.slave.served
+            self._unseen |= bool(rx) or self.slave.due_us <= now_us
             sent = self.slave.tick(now_us, rx)
-            self._unseen |= bool(rx) or self.slave.served != served
         self._step()
         if now_us % LOOK_US == 0:
             self._seen = {name: read(self) for name, read in _READ.items()}

@@ -9,7 +9,7 @@ from tickrig.device.physical import Input, Kind, Output
 SIDES: Final = ("left", "right")
 
 INPUTS: Final = (
-    Input("emergency_stop", "the red button is pressed", Kind.BUTTON),
+    Input("emergency_stop", "the red button is down", Kind.FAULT),
     Input("bumper", "the bumper touches something", Kind.BUTTON),
     *(
         Input(
