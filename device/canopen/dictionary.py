@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from enum import IntEnum
 from itertools import pairwise
-from typing import NamedTuple
 
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.entry import Entry
 from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.object_table import ObjectCode, ObjectInfo
 
-
-class ObjectCode(IntEnum):
-    """Kind of an object, as an EDS gives it."""
-
-    DOMAIN = 0x2
-    DEFTYPE = 0x5
-    DEFSTRUCT = 0x6
-    VAR = 0x7
-    ARRAY = 0x8
-    RECORD = 0x9
-
-
-class ObjectInfo(NamedTuple):
-    """What an object is called, beside its entries."""
-
-    name: str
-    code: ObjectCode = ObjectCode.VAR
+__all__ = ["Dictionary", "ObjectCode", "ObjectInfo"]
 
 
 class Dictionary:

@@ -3,53 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Flag
-from typing import Final
 
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access
 
-MAX_VARIABLE_BYTES: Final = 65_536
-"""What a string or domain holds unless its description says less."""
-
-
-class Access(Flag):
-    """What the bus may do with an entry."""
-
-    NONE = 0
-    READ = 1
-    WRITE = 2
-    CONST = 4  # read, and never changed from the inside either
-    TPDO = 8  # may be mapped into a TPDO
-    RPDO = 16  # may be mapped into an RPDO
-
-    @classmethod
-    def from_eds(cls, access_type: str, *, mappable: bool = False) -> Access:
-        """Return the access of an EDS: ro, wo, rw, rwr, rww, const; ValueError if unknown."""
-        access = _ACCESS_TYPES.get(access_type.lower())
-        if access is None:
-            raise ValueError(f"access type {access_type!r} is none of {', '.join(_ACCESS_TYPES)}")
-        if not mappable:
-            return access
-        return access | _MAPPABLE.get(access_type.lower(), cls.TPDO | cls.RPDO)
-
-
-_ACCESS_TYPES: Final = {
-    "ro": Access.READ,
-    "wo": Access.WRITE,
-    "rw": Access.READ | Access.WRITE,
-    "rwr": Access.READ | Access.WRITE,
-    "rww": Access.READ | Access.WRITE,
-    "const": Access.READ | Access.CONST,
-}
-_MAPPABLE: Final = {
-    "ro": Access.TPDO,
-    "const": Access.TPDO,
-    "wo": Access.RPDO,
-    "rwr": Access.TPDO,
-    "rww": Access.RPDO,
-}
+__all__ = ["MAX_VARIABLE_BYTES", "Access", "Entry"]
 
 
 class Entry:

@@ -61,6 +61,6 @@ def make_slave(
         application: what the device does with its objects: a device profile, or nothing.
         nmt: how it follows the NMT master.
     """
-    own = {Application: application, NmtSlave: nmt}
+    own: dict[ServiceMaker, ServiceMaker] = {Application: application, NmtSlave: nmt}
     services = tuple(own.get(make, make) for make in SERVICES)
     return CanopenSlave(dictionary, node_id, services, nonvolatile)

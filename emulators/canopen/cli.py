@@ -10,7 +10,6 @@ import click
 from click.shell_completion import CompletionItem
 
 from tickrig.emulators.canopen.build import describe_device
-from tickrig.emulators.canopen.eds_writer import write_eds as format_eds
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.profiles import AUTO, CHOICES
@@ -21,6 +20,7 @@ from tickrig.emulators.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.wire.canopen.eds_writer import write_eds as format_eds
 
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
 STANDARD_OUTPUT: Final = Path("-")

@@ -8,23 +8,7 @@ from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.slave import ServiceMaker
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceInfo:
-    """Who made it, and what it can do.
-
-    Attributes:
-        vendor_name: empty if unknown.
-        product_name: empty if unknown.
-        order_code: empty if unknown.
-        bit_rates: bit/s that it supports.
-    """
-
-    vendor_name: str = ""
-    product_name: str = ""
-    order_code: str = ""
-    bit_rates: frozenset[int] = frozenset()
+from tickrig.wire.canopen.device_info import DeviceInfo
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from canopen.objectdictionary import ODArray, ODRecord, ODVariable
 
 from tickrig.device.canopen.dictionary import Dictionary, ObjectInfo
 from tickrig.device.canopen.entry import MAX_VARIABLE_BYTES, Access, Entry
-from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
+from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds_file import EdsFile
 from tickrig.emulators.canopen.eds_objects import (
     Kinds,
@@ -18,11 +18,11 @@ from tickrig.emulators.canopen.eds_objects import (
     is_visible_char,
     object_kinds,
 )
-from tickrig.emulators.canopen.eds_value import parse_limit, parse_value
 from tickrig.emulators.canopen.predefined import COUNTS, predefined
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.device_info import BIT_RATES_KBIT, DeviceInfo
+from tickrig.wire.canopen.eds_value import parse_limit, parse_value
 
-BIT_RATES_KBIT: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 COMMISSIONING: Final = "DeviceComissioning"
 UNSET_NODE_IDS: Final = (0, 0xFF)
 HIGHEST_SUB: Final = 254

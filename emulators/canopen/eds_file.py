@@ -8,6 +8,8 @@ from configparser import DuplicateOptionError, DuplicateSectionError, ParsingErr
 from pathlib import Path
 from typing import Final
 
+from tickrig.wire.canopen.eds_value import parse_number
+
 Section = dict[str, str]
 
 KEYWORDS: Final = (
@@ -123,15 +125,6 @@ def canonical_section(title: str) -> str:
         return _KNOWN_SECTIONS.get(title.lower(), title)
     index, sub, number, other = match.groups()
     return f"{index}sub{int(number, 16):X}" if sub else f"{index}{(other or '').capitalize()}"
-
-
-def parse_number(text: str) -> int:
-    """Read a number: decimal, hexadecimal with 0x, octal with a leading 0 (CiA 306).
-
-    >>> parse_number("0x1F"), parse_number("31"), parse_number("037"), parse_number("-1")
-    (31, 31, 31, -1)
-    """
-    return int(text, 8) if re.fullmatch(r"0[0-7]+", text) else int(text, 0)
 
 
 def _first_bad_line(error: ParsingError) -> int:

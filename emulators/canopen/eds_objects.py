@@ -10,13 +10,13 @@ from typing import Final
 from canopen.objectdictionary import ObjectDictionary
 from canopen.objectdictionary.eds import import_eds
 
-from tickrig.device.canopen.dictionary import ObjectCode
 from tickrig.emulators.canopen.eds_file import EdsFile, Section
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds_writer import VARIABLES
+from tickrig.wire.canopen.object_table import ObjectCode
 
 NULL_OBJECT: Final = 0
 DESCRIBED: Final = (ObjectCode.VAR, ObjectCode.DOMAIN, ObjectCode.ARRAY, ObjectCode.RECORD)
-VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
 NUMBERS: Final = ("ObjectType", "DataType", "PDOMapping", "SubNumber", "ObjFlags")
 
 _DERIVED_TYPE: Final = re.compile(r"[0-9A-F]{1,3}sub1")

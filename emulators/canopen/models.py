@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
-from tickrig.device.canopen.device_rtc.make import application_of
+from tickrig.device.canopen.device_rtc.make import application_of, make_dictionary
 from tickrig.device.canopen.device_rtc.nmt import RtcNmt
-from tickrig.device.canopen.device_rtc.objects import dictionary_of
 from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.slave import ServiceMaker
-from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
-from tickrig.emulators.canopen.eds import BIT_RATES_KBIT
+from tickrig.emulators.canopen.device_description import DeviceDescription
+from tickrig.wire.canopen.device_info import BIT_RATES, DeviceInfo
 
 VENDOR: Final = "tickrig"
 PRODUCT: Final = 0x1008
-BIT_RATES: Final = frozenset(1_000 * kbit for kbit in BIT_RATES_KBIT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +80,7 @@ _MODELS: Final = (
         "rtc-echo",
         "DeviceRTC whose out-port says what its in-port heard, both Long",
         48,
-        lambda: dictionary_of(Echo.profile()),
+        partial(make_dictionary, Echo),
         application_of(Echo),
         RtcNmt,
     ),

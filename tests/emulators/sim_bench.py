@@ -16,10 +16,10 @@ from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.entry import Access, Entry
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.canopen.eds_writer import write_eds
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.sim_network import SimNetwork
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds_writer import write_eds
 
 NODE_ID = 5
 

@@ -20,9 +20,6 @@ MOST_PORTS: Final = 4
 """In-ports, and out-ports: the pre-defined connection set has so many COB-IDs each way."""
 
 RATE_HZ: Final = range(1, 1001)
-HEARTBEAT_MS: Final = 100
-"""Producer heartbeat time of a DeviceRTC (DECISION K14)."""
-
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 _VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
 

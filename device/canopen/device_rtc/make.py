@@ -7,10 +7,17 @@ from functools import partial
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.device import DeviceRtc
 from tickrig.device.canopen.device_rtc.nmt import RtcNmt
-from tickrig.device.canopen.device_rtc.objects import dictionary_of
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tickrig.device.canopen.objects import dictionary_of
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.rtc_canopen.objects import object_table
+
+
+def make_dictionary(kind: type[Component]) -> Dictionary:
+    """Make the objects of a component; ValueError if its profile cannot be."""
+    return dictionary_of(object_table(kind.profile()))
 
 
 def application_of(kind: type[Component]) -> ServiceMaker:
@@ -31,5 +38,4 @@ def make_device_rtc(
     Raises:
         ValueError: a component or a node-ID that cannot be.
     """
-    dictionary = dictionary_of(kind.profile())
-    return make_slave(dictionary, node_id, nonvolatile, application_of(kind), RtcNmt)
+    return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind), RtcNmt)

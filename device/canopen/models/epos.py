@@ -9,15 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from tickrig.device.canopen.communication_profile import (
-    OFF,
-    U8,
-    U16,
-    U32,
-    CommunicationProfile,
-    Pdo,
-    add_communication,
-)
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import maxon, modes
 from tickrig.device.canopen.ds402.drive import Ds402
@@ -30,6 +21,15 @@ from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Element, Obj
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
+from tickrig.wire.canopen.communication_profile import (
+    OFF,
+    U8,
+    U16,
+    U32,
+    CommunicationProfile,
+    Pdo,
+    add_communication,
+)
 from tickrig.wire.canopen.datatypes import DataType
 
 NODE_ID: Final = 1

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.communication_profile import (
-    CommunicationProfile,
-    Pdo,
-    add_communication,
-)
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Converter, Ds401
 from tickrig.device.canopen.objects import RO, ROT, RW, RWW, Objects
 from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.wire.canopen.communication_profile import (
+    CommunicationProfile,
+    Pdo,
+    add_communication,
+)
 from tickrig.wire.canopen.datatypes import DataType
 
 NODE_ID: Final = 16

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.communication_profile import (
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig.device.canopen.objects import ROT, RW, RWW, Element, Objects
+from tickrig.wire.canopen.communication_profile import (
     OFF,
     U8,
     U16,
@@ -13,9 +16,6 @@ from tickrig.device.canopen.communication_profile import (
     Pdo,
     add_communication,
 )
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
-from tickrig.device.canopen.objects import ROT, RW, RWW, Element, Objects
 from tickrig.wire.canopen.datatypes import DataType
 
 NODE_ID: Final = 32

@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.communication_profile import (
+from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
+from tickrig.device.canopen.objects import ROT, RWW, Objects
+from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.communication_profile import (
     OFF,
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.objects import ROT, RWW, Objects
-from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 
 PROFILE = CommunicationProfile(

@@ -8,10 +8,11 @@ from tests.device.canopen.bus import Bus
 from tickrig.device.canopen.dictionary import ObjectCode, ObjectInfo
 from tickrig.device.canopen.entry import Access
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.canopen.device_description import DeviceDescription, DeviceInfo
+from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.emulators.canopen.eds_file import EdsFile
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.device_info import DeviceInfo
 
 SAMPLE = Path(__file__).parent / "sample.dcf"
 NODE_ID = 5

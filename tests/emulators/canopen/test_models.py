@@ -14,10 +14,10 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.eds_writer import write_eds
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node import NODE_OUTPUTS
 from tickrig.emulators.canopen.node_spec import NodeSpec
+from tickrig.wire.canopen.eds_writer import write_eds
 
 SHIPPED = Path(__file__).parents[3] / "examples" / "eds"
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

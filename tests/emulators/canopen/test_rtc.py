@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 from examples.device_rtc_gripper import Gripper
 
-from tickrig.device.canopen.device_rtc.objects import dictionary_of
+from tickrig.device.canopen.device_rtc.make import make_dictionary
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.canopen.eds import read_eds
@@ -101,7 +101,7 @@ def test_two_components_hear_each_other_on_one_bus() -> None:
 def test_the_eds_of_a_component_gives_the_same_dictionary(tmp_path: Path) -> None:
     file = tmp_path / "gripper.eds"
     assert run("--rtc", GRIPPER, "--write-eds", file).exit_code == 0
-    assert rows(read_eds(file).template) == rows(dictionary_of(Gripper.profile()))
+    assert rows(read_eds(file).template) == rows(make_dictionary(Gripper))
 
 
 def test_a_character_port_survives_its_eds(tmp_path: Path, mine: Path) -> None:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.communication_profile import (
-    CommunicationProfile,
-    Pdo,
-    add_communication,
-)
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.objects import RWRW, Objects
 from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.communication_profile import (
+    CommunicationProfile,
+    Pdo,
+    add_communication,
+)
 from tickrig.wire.canopen.datatypes import DataType, Value
 
 Row = tuple[int, int, DataType, Value]

@@ -1,4 +1,4 @@
-"""EDS and DCF files out of a slave's dictionary (CiA 306)."""
+"""EDS and DCF files out of the objects of a device (CiA 306)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.entry import MAX_VARIABLE_BYTES, Access, Entry
-from tickrig.emulators.canopen.device_description import DeviceInfo
-from tickrig.emulators.canopen.eds import BIT_RATES_KBIT
-from tickrig.emulators.canopen.eds_objects import VARIABLES
-from tickrig.emulators.canopen.eds_value import format_value, parse_value
+from tickrig.wire.canopen.described import Described, Table
+from tickrig.wire.canopen.device_info import BIT_RATES_KBIT, DeviceInfo
+from tickrig.wire.canopen.eds_value import format_value, parse_value
+from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode, ObjectInfo
 
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER: Final = range(0x2000, 0x6000)
 IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 DUMMY_TYPES: Final = range(1, 8)
+VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
 MAPPABLE: Final = Access.TPDO | Access.RPDO
 ACCESS_TYPES: Final = {
     Access.READ: "ro",
@@ -30,7 +29,7 @@ ACCESS_TYPES: Final = {
 NO_INFO: Final = DeviceInfo()
 
 
-def write_eds(dictionary: Dictionary, info: DeviceInfo = NO_INFO) -> str:
+def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     """Write the objects with their default values.
 
     Two keywords are ours, since CiA 306 has none for them, and only where they
@@ -41,16 +40,15 @@ def write_eds(dictionary: Dictionary, info: DeviceInfo = NO_INFO) -> str:
     Raises:
         ValueError: a name or an access that an EDS cannot hold.
 
-    >>> text = write_eds(Dictionary([]))
+    >>> from tickrig.wire.canopen.object_table import ObjectTable
+    >>> text = write_eds(ObjectTable())
     >>> text.splitlines()[:2]
     ['[FileInfo]', 'EDSVersion=4.0']
     """
-    return "\n".join([*_head(dictionary, info), *_objects(dictionary, present=False)])
+    return "\n".join([*_head(table, info), *_objects(table, present=False)])
 
 
-def write_dcf(
-    dictionary: Dictionary, node_id: int, bit_rate: int, info: DeviceInfo = NO_INFO
-) -> str:
+def write_dcf(table: Table, node_id: int, bit_rate: int, info: DeviceInfo = NO_INFO) -> str:
     """Write the objects with default and present values, for one node-ID; bit rate in bit/s."""
     commissioning = [
         "[DeviceComissioning]",
@@ -58,11 +56,11 @@ def write_dcf(
         f"Baudrate={bit_rate // 1_000}",
         "",
     ]
-    objects = _objects(dictionary, present=True)
-    return "\n".join([*_head(dictionary, info), *commissioning, *objects])
+    objects = _objects(table, present=True)
+    return "\n".join([*_head(table, info), *commissioning, *objects])
 
 
-def _head(dictionary: Dictionary, info: DeviceInfo) -> Iterator[str]:
+def _head(table: Table, info: DeviceInfo) -> Iterator[str]:
     yield from ("[FileInfo]", "EDSVersion=4.0", "", "[DeviceInfo]")
     for key, text in (
         ("VendorName", info.vendor_name),
@@ -70,22 +68,22 @@ def _head(dictionary: Dictionary, info: DeviceInfo) -> Iterator[str]:
         ("OrderCode", info.order_code),
     ):
         yield f"{key}={_name(text)}"
+    numbers = {row.sub: int.from_bytes(row.data, "little") for row in table if row.index == 0x1018}
     for sub, key in IDENTITY:
-        entry = dictionary.find(0x1018, sub)
-        yield f"{key}=0x{entry.number if entry else 0:08X}"
+        yield f"{key}=0x{numbers.get(sub, 0):08X}"
     for kbit in BIT_RATES_KBIT:
         yield f"BaudRate_{kbit}={int(1_000 * kbit in info.bit_rates)}"
     for key, area in (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00))):
-        yield f"{key}={sum(index in area for index in dictionary.objects)}"
+        yield f"{key}={sum(index in area for index in table.objects)}"
     yield from ("Granularity=1", "SimpleBootUpSlave=1", "LSS_Supported=1", "", "[DummyUsage]")
     yield from (f"Dummy{kind:04d}=1" for kind in DUMMY_TYPES)
     yield ""
 
 
-def _objects(dictionary: Dictionary, *, present: bool) -> Iterator[str]:
-    mandatory = [index for index in dictionary.objects if index in MANDATORY]
-    manufacturer = [index for index in dictionary.objects if index in MANUFACTURER]
-    optional = [index for index in dictionary.objects if index not in {*mandatory, *manufacturer}]
+def _objects(table: Table, *, present: bool) -> Iterator[str]:
+    mandatory = [index for index in table.objects if index in MANDATORY]
+    manufacturer = [index for index in table.objects if index in MANUFACTURER]
+    optional = [index for index in table.objects if index not in {*mandatory, *manufacturer}]
     for title, indices in (
         ("MandatoryObjects", mandatory),
         ("OptionalObjects", optional),
@@ -94,11 +92,11 @@ def _objects(dictionary: Dictionary, *, present: bool) -> Iterator[str]:
         yield from (f"[{title}]", f"SupportedObjects={len(indices)}")
         yield from (f"{number}=0x{index:04X}" for number, index in enumerate(indices, 1))
         yield ""
-    for index, entries in groupby(dictionary, attrgetter("index")):
-        yield from _object(dictionary.objects[index], list(entries), present=present)
+    for index, entries in groupby(table, attrgetter("index")):
+        yield from _object(table.objects[index], list(entries), present=present)
 
 
-def _object(info: ObjectInfo, entries: list[Entry], *, present: bool) -> Iterator[str]:
+def _object(info: ObjectInfo, entries: list[Described], *, present: bool) -> Iterator[str]:
     index, single = entries[0].index, len(entries) == 1 and entries[0].sub == 0
     if single and info.code in VARIABLES:
         yield from _variable(f"{index:04X}", info.code, entries[0], present=present)
@@ -111,7 +109,7 @@ def _object(info: ObjectInfo, entries: list[Entry], *, present: bool) -> Iterato
         yield from _variable(title, ObjectCode.VAR, entry, present=present)
 
 
-def _variable(title: str, code: ObjectCode, entry: Entry, *, present: bool) -> Iterator[str]:
+def _variable(title: str, code: ObjectCode, entry: Described, *, present: bool) -> Iterator[str]:
     kind = entry.data_type
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
     yield from (f"DataType=0x{kind:04X}", f"AccessType={_access_type(entry)}")
@@ -133,20 +131,21 @@ def _variable(title: str, code: ObjectCode, entry: Entry, *, present: bool) -> I
     yield ""
 
 
-def _access_type(entry: Entry) -> str:
+def _access_type(entry: Described) -> str:
     mappable = entry.access & MAPPABLE
     name = ACCESS_TYPES.get(entry.access & ~MAPPABLE, "")
     if name == "rw" and mappable in (Access.TPDO, Access.RPDO):
         name = "rwr" if mappable is Access.TPDO else "rww"
     if not name or Access.from_eds(name, mappable=bool(mappable)) != entry.access:
-        raise ValueError(f"an EDS cannot express the access of {entry!r}: {entry.access}")
+        what = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
+        raise ValueError(f"an EDS cannot express the access of {what}: {entry.access}")
     return name
 
 
-def _reads_as(entry: Entry, text: str) -> bool:
+def _reads_as(entry: Described, text: str) -> bool:
     """Say whether a default comes back exactly."""
     if not text:
-        return not any(entry.default) and len(entry.default) == entry.size
+        return not any(entry.default) and len(entry.default) == entry.data_type.size
     if _fits_a_line(text):
         with suppress(ValueError):
             value, relative = parse_value(entry.data_type, text)

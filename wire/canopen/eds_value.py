@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from typing import Final
 
-from tickrig.emulators.canopen.eds_file import parse_number
 from tickrig.wire.canopen.datatypes import DataType, Value
 
 NODE_ID: Final = "$NODEID"
@@ -52,6 +52,15 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
     if kind.signed and 1 << kind.bits - 1 <= number < 1 << kind.bits:
         number -= 1 << kind.bits
     return number, relative
+
+
+def parse_number(text: str) -> int:
+    """Read a number: decimal, hexadecimal with 0x, octal with a leading 0 (CiA 306).
+
+    >>> parse_number("0x1F"), parse_number("31"), parse_number("037"), parse_number("-1")
+    (31, 31, 31, -1)
+    """
+    return int(text, 8) if re.fullmatch(r"0[0-7]+", text) else int(text, 0)
 
 
 def parse_limit(kind: DataType, text: str) -> float | None:

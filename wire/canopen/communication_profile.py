@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.device.canopen.objects import CONST, RO, ROT, RW, Element, Objects
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.object_table import CONST, RO, ROT, RW, Element, ObjectTable
 
 U8: Final = DataType.UNSIGNED8
 U16: Final = DataType.UNSIGNED16
@@ -67,7 +67,7 @@ class CommunicationProfile:
     heartbeat_ms: int = 0
 
 
-def add_communication(objects: Objects, profile: CommunicationProfile) -> None:
+def add_communication(objects: ObjectTable, profile: CommunicationProfile) -> None:
     """Add the objects of CiA 301: errors, heartbeat, SYNC, TIME, store, SDO server, PDOs."""
     _add_identity(objects, profile)
     _add_errors(objects)
@@ -78,7 +78,7 @@ def add_communication(objects: Objects, profile: CommunicationProfile) -> None:
         _add_pdo(objects, "TPDO", 0x1800 + number, pdo, _tpdo_timing(pdo))
 
 
-def _add_identity(objects: Objects, profile: CommunicationProfile) -> None:
+def _add_identity(objects: ObjectTable, profile: CommunicationProfile) -> None:
     objects.variable(0x1000, "Device type", U32, RO, profile.device_type)
     objects.variable(0x1008, "Manufacturer device name", TEXT, CONST, profile.name)
     objects.variable(0x1009, "Manufacturer hardware version", TEXT, CONST, profile.hardware)
@@ -93,7 +93,7 @@ def _add_identity(objects: Objects, profile: CommunicationProfile) -> None:
     objects.record(0x1018, "Identity object", rows)
 
 
-def _add_errors(objects: Objects) -> None:
+def _add_errors(objects: ObjectTable) -> None:
     objects.variable(0x1001, "Error register", U8, ROT)
     rows = [Element(sub, f"Error {sub}", U32, RO) for sub in range(1, ERRORS_KEPT + 1)]
     objects.record(0x1003, "Pre-defined error field", rows, count_access=RW, count=0)
@@ -102,7 +102,7 @@ def _add_errors(objects: Objects) -> None:
     objects.array(0x1029, "Error behaviour", 1, U8, RW)
 
 
-def _add_supervision(objects: Objects, profile: CommunicationProfile) -> None:
+def _add_supervision(objects: ObjectTable, profile: CommunicationProfile) -> None:
     objects.variable(0x1005, "COB-ID SYNC", U32, RW, 0x80)
     objects.variable(0x1006, "Communication cycle period", U32, RW)
     objects.variable(0x1007, "Synchronous window length", U32, RW)
@@ -119,7 +119,7 @@ def _add_supervision(objects: Objects, profile: CommunicationProfile) -> None:
     objects.record(0x1200, "SDO server parameter", rows)
 
 
-def _add_pdo(objects: Objects, kind: str, index: int, pdo: Pdo, timing: list[Element]) -> None:
+def _add_pdo(objects: ObjectTable, kind: str, index: int, pdo: Pdo, timing: list[Element]) -> None:
     number = index % 0x200 + 1
     head = [
         Element(1, "COB-ID", U32, RW, pdo.cob_id, relative=True),

@@ -1,0 +1,216 @@
+"""Objects of a device, written down as its manual lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import Flag, IntEnum
+from typing import Final, NamedTuple
+
+from tickrig.wire.canopen.datatypes import DataType, Value
+
+MAX_VARIABLE_BYTES: Final = 65_536
+"""What a string or domain holds unless its description says less."""
+
+
+class Access(Flag):
+    """What the bus may do with an entry."""
+
+    NONE = 0
+    READ = 1
+    WRITE = 2
+    CONST = 4  # read, and never changed from the inside either
+    TPDO = 8  # may be mapped into a TPDO
+    RPDO = 16  # may be mapped into an RPDO
+
+    @classmethod
+    def from_eds(cls, access_type: str, *, mappable: bool = False) -> Access:
+        """Return the access of an EDS: ro, wo, rw, rwr, rww, const; ValueError if unknown."""
+        access = _ACCESS_TYPES.get(access_type.lower())
+        if access is None:
+            raise ValueError(f"access type {access_type!r} is none of {', '.join(_ACCESS_TYPES)}")
+        if not mappable:
+            return access
+        return access | _MAPPABLE.get(access_type.lower(), cls.TPDO | cls.RPDO)
+
+
+RO: Final = Access.READ
+RW: Final = Access.READ | Access.WRITE
+WO: Final = Access.WRITE
+CONST: Final = Access.READ | Access.CONST
+ROT: Final = RO | Access.TPDO
+"""Read only, may be mapped into a TPDO."""
+RWW: Final = RW | Access.RPDO
+"""Read and written, may be mapped into an RPDO."""
+RWRW: Final = RWW | Access.TPDO
+"""Read and written, may be mapped both ways."""
+
+_ACCESS_TYPES: Final = {"ro": RO, "wo": WO, "rw": RW, "rwr": RW, "rww": RW, "const": CONST}
+_MAPPABLE: Final = {
+    "ro": Access.TPDO,
+    "const": Access.TPDO,
+    "wo": Access.RPDO,
+    "rwr": Access.TPDO,
+    "rww": Access.RPDO,
+}
+
+
+class ObjectCode(IntEnum):
+    """Kind of an object, as an EDS gives it."""
+
+    DOMAIN = 0x2
+    DEFTYPE = 0x5
+    DEFSTRUCT = 0x6
+    VAR = 0x7
+    ARRAY = 0x8
+    RECORD = 0x9
+
+
+class ObjectInfo(NamedTuple):
+    """What an object is called, beside its entries."""
+
+    name: str
+    code: ObjectCode = ObjectCode.VAR
+
+
+class Element(NamedTuple):
+    """One sub-index of a record.
+
+    Attributes:
+        sub: 1..254.
+        name: as in the EDS.
+        kind: data type.
+        access: what the bus may do.
+        default: power-on value.
+        relative: the node-ID is added to it.
+    """
+
+    sub: int
+    name: str
+    kind: DataType
+    access: Access
+    default: Value = 0
+    relative: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectRow:
+    """A variable, or one element of an array or record, as an EDS has it.
+
+    Attributes:
+        index: 0x1000..0xFFFF.
+        sub: 0..254.
+        name: as in the EDS.
+        data_type: of its value.
+        access: what the bus may do.
+        default: bytes of the power-on value.
+        low: smallest value, None for that of the data type.
+        high: largest value.
+        relative: the node-ID is added to the default.
+        max_bytes: what a string or domain holds.
+    """
+
+    index: int
+    sub: int
+    name: str
+    data_type: DataType
+    access: Access
+    default: bytes
+    low: float | None = None
+    high: float | None = None
+    relative: bool = False
+    max_bytes: int = MAX_VARIABLE_BYTES
+
+    @property
+    def data(self) -> bytes:
+        """The present value is the default."""
+        return self.default
+
+
+class ObjectTable:
+    """Collects objects, sorted by index and sub-index when they are given out.
+
+    Attributes:
+        objects: names and kinds.
+
+    >>> table = ObjectTable()
+    >>> table.variable(0x1000, "Device type", DataType.UNSIGNED32, RO, 0x191)
+    >>> table.array(0x6000, "Read input 8-bit", 2, DataType.UNSIGNED8, ROT)
+    >>> [f"{row.index:04X}h:{row.sub:02X} {row.name}" for row in table][:2]
+    ['1000h:00 Device type', '6000h:00 Number of entries']
+    """
+
+    def __init__(self) -> None:
+        self._rows: list[ObjectRow] = []
+        self._infos: dict[int, ObjectInfo] = {}
+
+    def __iter__(self) -> Iterator[ObjectRow]:
+        """Give all rows."""
+        return iter(sorted(self._rows, key=lambda row: (row.index, row.sub)))
+
+    @property
+    def objects(self) -> dict[int, ObjectInfo]:
+        """Names and kinds by index, sorted."""
+        return dict(sorted(self._infos.items()))
+
+    def variable(  # noqa: PLR0913 - a row of an object table
+        self,
+        index: int,
+        name: str,
+        kind: DataType,
+        access: Access,
+        default: Value | None = None,
+        *,
+        low: float | None = None,
+        high: float | None = None,
+        relative: bool = False,
+    ) -> None:
+        """Add a variable."""
+        self._infos[index] = ObjectInfo(name)
+        data = _encoded(kind, default)
+        self._rows.append(ObjectRow(index, 0, name, kind, access, data, low, high, relative))
+
+    def array(  # noqa: PLR0913, PLR0917 - a row of an object table
+        self,
+        index: int,
+        name: str,
+        count: int,
+        kind: DataType,
+        access: Access,
+        default: Value | None = None,
+    ) -> None:
+        """Add an array of elements that are alike; sub-index 0 counts them."""
+        self._head(index, name, ObjectCode.ARRAY, RO, count)
+        data = _encoded(kind, default)
+        self._rows += (
+            ObjectRow(index, sub, f"{name} {sub}", kind, access, data)
+            for sub in range(1, count + 1)
+        )
+
+    def record(
+        self,
+        index: int,
+        name: str,
+        elements: Iterable[Element],
+        *,
+        count_access: Access = RO,
+        count: int | None = None,
+    ) -> None:
+        """Add a record; sub-index 0 holds `count`, or else the highest sub-index."""
+        rows = list(elements)
+        highest = max(row.sub for row in rows) if count is None else count
+        self._head(index, name, ObjectCode.RECORD, count_access, highest)
+        self._rows += (
+            ObjectRow(*(index, sub, what, kind, access, _encoded(kind, default)), relative=relative)
+            for sub, what, kind, access, default, relative in rows
+        )
+
+    def _head(self, index: int, name: str, code: ObjectCode, access: Access, count: int) -> None:
+        self._infos[index] = ObjectInfo(name, code)
+        u8 = DataType.UNSIGNED8
+        row = ObjectRow(index, 0, "Number of entries", u8, access, u8.encode(count))
+        self._rows.append(row)
+
+
+def _encoded(kind: DataType, value: Value | None) -> bytes:
+    return bytes(kind.size) if value is None else kind.encode(value)
