@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.rtc.at import VARIABLE, default_path
+from tickrig.emulators.rtc.at import VARIABLE, default_path, time_us
 from tickrig.emulators.rtc.conf_cli import conf
 from tickrig.emulators.rtc.print_cli import print_
 from tickrig.emulators.rtc.run import SystemOptions, run_system
@@ -51,10 +51,20 @@ def rtc() -> None:
     metavar="FILE.py:Class",
     help="Another type of components; may be repeated.",
 )
+@click.option(
+    "--lite",
+    "lites",
+    multiple=True,
+    metavar="NAME=URL[@BAUD]",
+    help="A device of RTC-Lite at a pyserial URL; its proxy is NAME0. May be repeated.",
+)
+@click.option(
+    "--lite-boot", default="0s", metavar="TIME", help="Silence before it is asked, as 3s."
+)
 @click.option("--rate", "rate_hz", type=float, metavar="HZ", help="Rate of all components.")
 @click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
 @click.option("--console", is_flag=True, help="Numbers typed here go to each ConsoleIn.")
-def run(**options: Any) -> None:
+def run(lite_boot: str, **options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
     SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
@@ -65,8 +75,9 @@ def run(**options: Any) -> None:
     tickrig rtc run system.toml
     tickrig rtc run system.xml --component my_rtc.py:Scale --save after.toml
     seq 1 5 | tickrig rtc run chain.toml --console
+    tickrig rtc run lite.toml --lite LiteA=/dev/ttyUSB0@57600 --lite LiteB=/tmp/lite-b
     """  # noqa: D301 - click wants the backspace
-    run_system(SystemOptions(**options))
+    run_system(SystemOptions(lite_boot_us=time_us(lite_boot), **options))
 
 
 for _command in (*VERBS, conf, print_):

@@ -12,10 +12,8 @@ import click
 
 from tickrig.emulators.ask import refused_by
 from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.rtc.at import SYSTEM, at, complete_port
+from tickrig.emulators.rtc.at import SYSTEM, at, complete_port, time_us
 from tickrig.emulators.rtc.texts import value_line
-from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.refused import Refused
 
 POLL_S: Final = 0.02
 
@@ -35,10 +33,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
     tickrig rtc print ConsoleIn0.out
     tickrig rtc print SeqOut0.Long -n 10 --json
     """  # noqa: D301 - click wants the backspace
-    try:
-        until_s = time.monotonic() + parse_time_us(duration) / 1e6 if duration else None
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    until_s = time.monotonic() + time_us(duration) / 1e6 if duration else None
     try:
         for value in _values(at, port, count, until_s):
             click.echo(json.dumps(value) if as_json else value_line(value))

@@ -12,6 +12,7 @@ import click
 from tickrig.emulators.control_server import ControlServer
 from tickrig.emulators.rtc.console import Console
 from tickrig.emulators.rtc.control import SystemControl
+from tickrig.emulators.rtc.lite import attach_lite
 from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
 from tickrig.emulators.run import say
 from tickrig.emulators.serving_clock import ServingClock
@@ -32,6 +33,8 @@ class SystemOptions:
     system: Path
     control: Path
     components: tuple[str, ...] = ()
+    lites: tuple[str, ...] = ()
+    lite_boot_us: int = 0
     rate_hz: float | None = None
     save: Path | None = None
     console: bool = False
@@ -49,16 +52,12 @@ def run_system(options: SystemOptions) -> None:
     manager = Manager()
     for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
         manager.register(kind)
-    _restore(manager, system, options)
-    clock = ServingClock()
-    runner = RealTime(manager, clock)
-    control = SystemControl(manager, runner)
     with ExitStack() as stack:
-        stack.enter_context(stopped_by_signals(runner.stop))
-        clock.serve = _serve(stack, options.control, control).serve
-        _run(manager, runner, options)
-    if options.save is not None:
-        write_system(control.saved(file_format(options.save)), options.save)
+        for word in options.lites:
+            attach_lite(manager, word, stack, options.lite_boot_us, options.rate_hz)
+        _restore(manager, system, options)
+        stack.callback(_close, manager)
+        _serve(stack, manager, options)
 
 
 def find_rt_component(spec: str) -> type[RtComponent]:
@@ -72,22 +71,35 @@ def find_rt_component(spec: str) -> type[RtComponent]:
 
 
 def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
+    """Make the system; proxies are there already."""
     if (rate_hz := options.rate_hz) is not None:
         entries = tuple(replace(entry, rate_hz=rate_hz) for entry in system.components)
         system = replace(system, components=entries)
+    there = {component.instance_name for component in manager.components}
+    made = tuple(entry for entry in system.components if entry.name not in there)
     try:
-        restore(manager, system)
+        restore(manager, replace(system, components=made))
+        proxies = there.intersection(entry.name for entry in system.components if entry.active)
+        manager.activate(*sorted(proxies))
     except ValueError as error:
         raise Refused(f"system {options.system}: {error}") from None
 
 
-def _serve(stack: ExitStack, path: Path, control: SystemControl) -> ControlServer:
+def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
+    """Run until somebody stops it, then save."""
+    clock = ServingClock()
+    runner = RealTime(manager, clock)
+    control = SystemControl(manager, runner)
+    stack.enter_context(stopped_by_signals(runner.stop))
     try:
-        server = ControlServer(path, control)
+        server = ControlServer(options.control, control)
     except OSError as error:
         refuse_path("control", error)
     stack.callback(server.close)
-    return server
+    clock.serve = server.serve
+    _run(manager, runner, options)
+    if options.save is not None:
+        write_system(control.saved(file_format(options.save)), options.save)
 
 
 def _run(manager: Manager, runner: RealTime, options: SystemOptions) -> None:
@@ -99,3 +111,10 @@ def _run(manager: Manager, runner: RealTime, options: SystemOptions) -> None:
     runner.run()
     worst = f" (up to {runner.late_us / 1_000:.1f} ms)" if runner.late_ticks else ""
     say(f"ran {manager.now_us / 1e6:.3f} s; late ticks: {runner.late_ticks}{worst}")
+
+
+def _close(manager: Manager) -> None:
+    """Let no component be Active any more, and no device behind it."""
+    for component in manager.components:
+        for context in tuple(component.contexts):
+            context.close()

@@ -8,11 +8,17 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, complete_component, complete_port, components
+from tickrig.emulators.rtc.at import (
+    ask_system,
+    at,
+    complete_component,
+    complete_port,
+    components,
+    time_us,
+)
 from tickrig.emulators.rtc.settle import settle
 from tickrig.emulators.rtc.system_file import file_format, write_system
 from tickrig.emulators.rtc.texts import component_lines, component_row
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
 
@@ -175,10 +181,7 @@ def stop(at: Path) -> None:
 
 
 def _move(socket: Path, verb: str, names: tuple[str, ...], wanted: str, wait: str) -> None:
-    try:
-        wait_us = parse_time_us(wait)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    wait_us = time_us(wait)
     for name in names:
         ask_system(socket, verb, name=name)
     for name in names:

@@ -1,0 +1,59 @@
+"""Devices of RTC-Lite as a command line names them: `NAME=URL[@BAUD]`."""
+
+from __future__ import annotations
+
+import re
+from contextlib import ExitStack, closing
+from typing import Final
+
+from tickrig.emulators.run import say
+from tickrig.host.cli.refused import Refused
+from tickrig.host.errors import LinkClosed
+from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
+from tickrig.host.rtc_lite.attachment import RATE_HZ
+from tickrig.host.serial_link import SerialLink
+
+BAUD: Final = 57_600
+
+_WORD: Final = re.compile(r"([A-Za-z]\w*)=(.+?)(?:@(\d{1,8}))?", re.ASCII)
+
+
+def attach_lite(
+    manager: Manager, word: str, stack: ExitStack, boot_us: int, rate_hz: float | None
+) -> None:
+    """Open a device's line and add its proxy, which comes back when the device does.
+
+    Args:
+        manager: of the system.
+        word: `NAME=URL[@BAUD]`; the proxy is `NAME0`.
+        stack: closes the line.
+        boot_us: silence after the line was opened.
+        rate_hz: of the proxy; 10 Hz if None.
+
+    Raises:
+        Refused: no such word, no such line, or nobody answers there.
+    """
+    name, url, baud = parse_lite(word)
+    settings = Settings(boot_us=boot_us, rediscover=True)
+    try:
+        link = stack.enter_context(closing(SerialLink(url, baud)))
+        attach(manager, link, name, settings, listener=_tell, rate_hz=rate_hz or RATE_HZ)
+    except (LinkClosed, ValueError) as error:
+        raise Refused(f"--lite {word}: {error}") from None
+
+
+def parse_lite(word: str) -> tuple[str, str, int]:
+    """Read name, URL and bit rate; Refused if it is not so written.
+
+    >>> parse_lite("LiteA=/dev/ttyUSB0"), parse_lite("B=socket://localhost:7000@9600")
+    (('LiteA', '/dev/ttyUSB0', 57600), ('B', 'socket://localhost:7000', 9600))
+    """
+    match = _WORD.fullmatch(word)
+    if match is None:
+        raise Refused(f"--lite {word!r} is not NAME=URL[@BAUD], as LiteA=/dev/ttyUSB0@57600")
+    return match[1], match[2], int(match[3] or BAUD)
+
+
+def _tell(event: ProxyEvent) -> None:
+    say(f"{event.instance_name}: {event.kind}")
