@@ -1,0 +1,94 @@
+"""Data between PDOs and ports."""
+
+from __future__ import annotations
+
+from tests.emulators.can_bench import frames
+from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
+from tests.host.rtc_canopen.components import add_knob, add_logger
+from tickrig.host.rtc import ReturnCode
+from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.wire.rtc_types.basic import Time, TimedOctet, TimedShortSeq
+
+
+def running(more: str = "") -> Bench:
+    bench = Bench(PALETTE_AND_MOTOR + more)
+    bench.boot()
+    bench.activate()
+    return bench
+
+
+def test_a_frame_is_written_to_the_port_with_the_time_of_its_reception() -> None:
+    bench = running()
+    logger = add_logger(bench.server.manager, TimedOctet)
+    bench.server.manager.connect("Palette0.tpdo1", "Logger0.in")
+    bench.run_ms(5)
+    bench.devices[16].physical["di1"].write(1)
+    bench.run_ms(20)
+    (at,) = [at for at, heard in bench.log.heard if str(heard) == "190#01"]
+    ((_, value),) = logger.heard
+    assert (value.data, value.tm.us) == (1, at)
+
+
+def test_a_value_at_an_in_port_is_one_frame() -> None:
+    bench = running()
+    knob = add_knob(bench.server.manager, TimedOctet)
+    bench.server.manager.connect("Knob0.out", "Palette0.rpdo1")
+    knob.out.write(TimedOctet(Time(), 0x55))
+    bench.run_ms(10)
+    assert bench.log.text.count("210#55") == 1
+    assert bench.devices[16].read("do") == 0x55
+
+
+def test_a_sequence_of_the_wrong_length_is_refused_and_nothing_is_sent() -> None:
+    bench = running()
+    knob = add_knob(bench.server.manager, TimedShortSeq)
+    bench.server.manager.connect("Knob0.out", "Motor0.rpdo2")
+    knob.out.write(TimedShortSeq(Time(), (1, 2)))
+    bench.run_ms(20)
+    assert "320#" not in bench.log.text
+    assert len(bench.events(EventKind.VALUE_REFUSED)) == 1
+    put = bench.server.put
+    assert put("Motor0.rpdo2", TimedShortSeq(Time(), (1, 2))) is ReturnCode.BAD_PARAMETER
+    assert put("Motor0.rpdo2", TimedShortSeq(Time(), (1, 2, 3, 4))) is ReturnCode.RTC_OK
+    assert put("Motor0.x", TimedShortSeq()) is ReturnCode.BAD_PARAMETER
+    bench.run_ms(20)
+    assert "320#0100020003000400" in bench.log.text
+
+
+def test_a_proxy_that_is_not_active_passes_nothing() -> None:
+    bench = Bench()
+    bench.boot()
+    knob = add_knob(bench.server.manager, TimedOctet)
+    logger = add_logger(bench.server.manager, TimedOctet)
+    bench.server.manager.connect("Knob0.out", "Palette0.rpdo1")
+    bench.server.manager.connect("Palette0.tpdo1", "Logger0.in")
+    bench.run_ms(20)
+    knob.out.write(TimedOctet(Time(), 0x55))
+    bench.server.tick(bench.now_us, ())
+    bench.other.send(frames("190#01"))
+    bench.run_ms(20)
+    code = bench.server.put("Palette0.rpdo1", TimedOctet())
+    assert code is ReturnCode.PRECONDITION_NOT_MET
+    bench.activate(16)
+    assert "210#" not in bench.log.text
+    assert all(value.data == 0 for _, value in logger.heard)
+
+
+def test_a_pdo_that_is_too_short_is_dropped() -> None:
+    bench = running()
+    bench.other.send(frames("290#00"))
+    bench.run_ms(5)
+    assert bench.events(EventKind.PDO_TOO_SHORT) == ["PdoTooShort 16 tpdo2: 1 of 8 bytes"]
+
+
+def test_ports_that_do_not_fit_are_not_connected() -> None:
+    bench = Bench(PALETTE_AND_MOTOR + "rt_connections: [{from: Palette0.ai, to: Motor0.rpdo2}]\n")
+    bench.boot()
+    bench.run_ms(50)
+    assert bench.server.connections.wanted  # there is no such port
+    text = "rt_connections: [{from: Palette0.tpdo1, to: Motor0.rpdo2}]\n"
+    bench = Bench(PALETTE_AND_MOTOR + text)
+    bench.boot()
+    bench.run_ms(50)
+    (event,) = bench.events(EventKind.CONNECTION_REFUSED)
+    assert "carries IDL:RTC/TimedOctet:1.0" in event
