@@ -37,6 +37,10 @@ class ProxyEvent:
     kind: EventKind
     instance_name: str
 
+    def __str__(self) -> str:
+        """Write it in a line for people."""
+        return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}"
+
 
 Listener = Callable[[ProxyEvent], None]
 """Told of events; what it raises is logged, and nothing else comes of it."""
@@ -44,7 +48,7 @@ Listener = Callable[[ProxyEvent], None]
 
 def tell(listener: Listener | None, event: ProxyEvent) -> None:
     """Log an event, and tell whoever listens."""
-    _LOG.info("%s: %s at %.3f s", event.instance_name, event.kind, event.at_us / 1e6)
+    _LOG.info("%s", event)
 
     def listen() -> ReturnCode:
         if listener is not None:
