@@ -21,6 +21,8 @@ from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.rtc.at import default_path
 from tickrig.host.rtc.system_toml import parse_toml
 
+EXAMPLE = Path(__file__).parents[3] / "examples" / "rtc_chain.toml"
+
 CHAIN = """
 [[component]]
 name = "ConsoleIn0"
@@ -233,6 +235,26 @@ def test_a_system_runs_with_a_users_component_and_is_saved(folder: Path) -> None
     assert [connection.ports for connection in system.connections] == [
         ("ConsoleIn0.out", "Twice0.in")
     ]
+
+
+@pytest.mark.realtime
+def test_the_example_runs_and_print_ends_with_ctrl_c(folder: Path) -> None:
+    with run(folder, str(EXAMPLE)) as child:
+        child.type(5)
+        assert child.lines(1) == ["ConsoleOut0 5"]
+        program = "from tickrig.emulators.cli import main; main()"
+        words = ["rtc", "print", "ConsoleIn0.out", "--at", str(child.path)]
+        printing = subprocess.Popen(
+            [sys.executable, "-c", program, *words], stdout=subprocess.PIPE, text=True
+        )
+        await_(lambda: "print" in child.rtc("cat", "ConsoleIn0"))
+        child.type(6)
+        assert printing.stdout is not None
+        assert printing.stdout.readline().endswith(" 6\n")
+        printing.send_signal(signal.SIGINT)
+        rest, _ = printing.communicate(timeout=DEADLINE_S)
+        assert (printing.returncode, rest) == (0, "")
+        assert "ran " in child.end(signal.SIGHUP)
 
 
 @pytest.mark.realtime
