@@ -1,21 +1,24 @@
-"""The options of verbs that decode: EDS, DBC and filter."""
+"""The options of verbs that decode: EDS, DBC and filter.
+
+The decoder is imported when it is wanted: a verb that does without starts faster.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.decode.dbc_file import DbcError
-from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.eds_objects import EdsError, EdsObjects, read_eds
-from tickrig.host.monitor.decode.filter import Filter, parse_filter
-from tickrig.host.monitor.decode.filter_error import FilterError
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoder import Decoder
+    from tickrig.host.monitor.decode.eds_objects import EdsObjects
+    from tickrig.host.monitor.decode.filter import Filter
 
 _EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
 
@@ -49,6 +52,9 @@ def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
 
 def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
     """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
+    from tickrig.host.monitor.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415
+
     objects = read_eds_files(eds)
     try:
         return Decoder(objects, dbc)
@@ -60,8 +66,13 @@ def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
 
 def read_filter(text: str | None) -> Filter | None:
     """Read what `-F` says; Refused with the column if it is no filter."""
+    if text is None:
+        return None
+    from tickrig.host.monitor.decode.filter import parse_filter  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.filter_error import FilterError  # noqa: PLC0415
+
     try:
-        return None if text is None else parse_filter(text)
+        return parse_filter(text)
     except FilterError as error:
         raise Refused(str(error)) from None
 
@@ -74,6 +85,8 @@ def _split(word: str) -> tuple[int, Path]:
 
 
 def _read(node: int, path: Path) -> EdsObjects:
+    from tickrig.host.monitor.decode.eds_objects import EdsError, read_eds  # noqa: PLC0415 - slow
+
     try:
         return read_eds(path, node)
     except OSError as error:

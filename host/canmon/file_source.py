@@ -13,7 +13,7 @@ from tickrig.host.monitor.candump_filter import flagged_id
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_reader import LogError, read_log
 
-BATCH: Final = 4_096
+BATCH: Final = 1_024
 """Frames of one poll."""
 
 

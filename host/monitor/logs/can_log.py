@@ -57,9 +57,16 @@ class CanLogReader:
         """Read the file."""
         self.tally = Tally()
         for message in self._messages():
-            heard = to_heard(message, channel_name(message.channel), self.tally)
+            heard = to_heard(message, self._channel(message), self.tally)
             if heard is not None:
                 yield heard
+
+    def _channel(self, message: can.Message) -> str:
+        """Return the name of a bus; of TRC alone python-can leaves the count from one."""
+        channel = message.channel
+        if self._kind is LogFormat.TRC and isinstance(channel, int) and channel > 0:
+            return channel_name(channel - 1)
+        return channel_name(channel)
 
     def _messages(self) -> Iterator[can.Message]:
         with open_log(self._path) as file:

@@ -12,7 +12,7 @@ from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, log_format
 from tickrig.host.monitor.logs.log_lines import LogLines
 from tickrig.host.monitor.logs.tally import BadLines, Tally
 
-BLOCK_BYTES: Final = 1 << 16
+BLOCK_BYTES: Final = 1 << 15
 
 
 class LogError(ValueError):

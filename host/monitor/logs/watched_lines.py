@@ -13,7 +13,7 @@ from tickrig.host.monitor.logs.tally import Tally
 OTHER_LINES: Final = "lines with other events"
 
 _EVENTS: Final = {
-    LogFormat.ASC: re.compile(r"\s*[0-9]+\.[0-9]+\s+(?!Start of measurement)\S"),
+    LogFormat.ASC: re.compile(r"\s*[0-9]+\.[0-9]+\s+(?!Start of measurement|//)\S"),
     LogFormat.TRC: re.compile(r"\s*[0-9]+\)?\s"),
     LogFormat.CSV: re.compile(r"\s*[0-9]"),
 }

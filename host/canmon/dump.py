@@ -1,0 +1,134 @@
+"""The verb `dump`: frames as they come, one line each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.host.canmon.decode_options import (
+    decode_options,
+    filter_option,
+    make_decoder,
+    read_filter,
+)
+from tickrig.host.canmon.ending import report, until_interrupted
+from tickrig.host.canmon.log_file import LogFile
+from tickrig.host.canmon.meaning import Meaning, Meant
+from tickrig.host.canmon.printer import Output, printer_of
+from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.stdout import Printed, until_unread
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH, add_options
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.dump_line import Stamp
+
+POLL_US: Final = 100_000
+
+Take = Callable[[list[Meant], int], None]
+"""Takes frames, and how many were lost so far."""
+
+_shown: Final = add_options(
+    click.option(
+        "-t",
+        "stamp",
+        type=click.Choice([stamp.value for stamp in Stamp if stamp]),
+        help="Time: (a)bsolute, (d)elta, (z)ero at the first, (A)bsolute with date.",
+    ),
+    click.option("-x", "extra", is_flag=True, help="Show RX or TX."),
+    click.option("-r", "--raw", is_flag=True, help="Bytes alone, as candump shows them."),
+    click.option("-L", "output", flag_value="log", help="Lines of a log, as candump -L."),
+    click.option("--jsonl", "output", flag_value="jsonl", help="One JSON object a line."),
+    click.option("--csv", "output", flag_value="csv", help="Rows with a header."),
+    click.option(
+        "-l", "file", type=PATH, metavar="FILE", help="Into a log, as run.blf; nothing is shown."
+    ),
+)
+_ending: Final = add_options(
+    click.option("-n", "count", type=click.IntRange(1), metavar="N", help="End after N frames."),
+    click.option(
+        "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
+    ),
+    click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost."),
+)
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", nargs=-1)
+@_shown
+@filter_option
+@decode_options
+@_ending
+@bus_options
+def command(  # noqa: PLR0913 - options
+    *,
+    source: Sequence[str],
+    stamp: str | None,
+    extra: bool,
+    raw: bool,
+    output: str | None,
+    file: Path | None,
+    wanted: str | None,
+    eds: Sequence[str],
+    dbc: Sequence[Path],
+    count: int | None,
+    quiet_ms: int | None,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Show frames as they come, and what they mean.
+
+    It listens only. What frames mean is told by the CANopen standard, by
+    --eds and --dbc, and by the SDO traffic that is heard. Frames are on
+    standard output; what was lost or is no frame is said on standard error.
+
+    \b
+    canmon dump can0 -t z
+    canmon dump can0 --eds 3=drive.eds -F 'node=3 and (pdo or emcy)'
+    canmon dump can0 -l run.blf
+    canmon dump run.asc.gz -L > run.log
+    ssh robot canmon dump can0 --jsonl | canmon top -
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    if file is not None and output:
+        raise Refused("-l shows nothing: it goes without -L, --jsonl and --csv")
+    chosen, form = read_filter(wanted), Output(output or "")
+    plain = raw or form is Output.LOG or file is not None
+    decoder = None if plain and chosen is None else make_decoder(eds, dbc)
+    shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain), form)
+    with ExitStack() as held:
+        log = None if file is None else held.enter_context(closing(LogFile(file, source)))
+        frames = held.enter_context(closing(open_source(source, BusOptions(**options))))
+        with until_interrupted(), until_unread():
+            pass_on(frames, Meaning(decoder, chosen), (log or shown).take, count, quiet_ms)
+    report(frames, strict)
+
+
+def pass_on(
+    source: Source,
+    meaning: Meaning,
+    take: Take,
+    count: int | None = None,
+    quiet_ms: int | None = None,
+) -> None:
+    """Pass frames on until the source ends, `count` of them came, or none for `quiet_ms`."""
+    quiet_s = quiet_ms / 1e3 if quiet_ms else float("inf")
+    latest_s, left = time.monotonic(), count
+    while not source.ended and left != 0:
+        heards = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
+        meant = list(islice(meaning.take(heards), left))
+        take(meant, source.lost)
+        left = None if left is None else left - len(meant)
+        if heards:
+            latest_s = time.monotonic()
+        elif time.monotonic() - latest_s >= quiet_s:
+            break
+
+
+command.help = (command.help or "").replace("{source}", SOURCE_HELP)

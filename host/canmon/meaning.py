@@ -1,0 +1,36 @@
+"""What frames mean, and which of them are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from tickrig.host.monitor.heard import Heard
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.decoder import Decoder
+    from tickrig.host.monitor.decode.filter import Filter
+
+Meant = tuple[Heard, "Decoded | None"]
+"""A frame, and what it means where somebody asked."""
+
+
+class Meaning:
+    """Decodes frames and passes on those that are wanted.
+
+    Args:
+        decoder: tells what frames mean; None where nobody asks.
+        wanted: which frames pass; None for all. It needs a decoder.
+    """
+
+    def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
+        self._decoder, self._wanted = decoder, wanted
+
+    def take(self, heards: Sequence[Heard]) -> Iterator[Meant]:
+        """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
+        decoder, wanted = self._decoder, self._wanted
+        for heard in heards:
+            decoded = None if decoder is None else decoder.take(heard)
+            if wanted is None or (decoded is not None and wanted.matches(heard, decoded)):
+                yield heard, decoded

@@ -1,0 +1,101 @@
+"""What `dump` prints of each frame: candump's lines, its log format, JSON or CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import TYPE_CHECKING, Final, assert_never
+
+from tickrig.host.monitor.dump_line import DumpLines, Stamp
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.json_line import json_line
+from tickrig.host.monitor.logs.log_writer import log_line
+from tickrig.wire.can_error import ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+
+Printer = Callable[[Heard, "Decoded | None"], str]
+"""Writes a frame and what it means, where that is known, as one line."""
+
+
+class Output(StrEnum):
+    """What is printed."""
+
+    TEXT = ""
+    LOG = "log"
+    JSONL = "jsonl"
+    CSV = "csv"
+
+
+CSV_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
+
+
+def printer_of(output: Output, stamp: Stamp, extra: bool, plain: bool) -> Printer:
+    """Return what prints a frame; `plain` leaves out what it means, as `stamp` asks."""
+    match output:
+        case Output.TEXT:
+            lines = DumpLines(stamp, extra)
+            return lambda heard, decoded: lines.line(
+                heard, decoded_text(None if plain else decoded)
+            )
+        case Output.LOG:
+            return log_printer
+        case Output.JSONL:
+            return lambda heard, decoded: json_printer(heard, None if plain else decoded)
+        case Output.CSV:
+            return lambda heard, decoded: csv_printer(heard, None if plain else decoded)
+        case _:
+            assert_never(output)
+
+
+def log_printer(heard: Heard, decoded: Decoded | None) -> str:
+    """Write a line of a log."""
+    return log_line(heard)
+
+
+def json_printer(heard: Heard, decoded: Decoded | None) -> str:
+    """Write an object in JSON, with kind, node, text, signals and their source."""
+    if decoded is None:
+        return json_line(heard)
+    import json  # noqa: PLC0415 - seldom wanted
+
+    node = "" if decoded.node is None else f',"node":{decoded.node}'
+    text = f',"text":{json.dumps(decoded.text)}' if decoded.text else ""
+    values = {signal.name: _plain(signal.value) for signal in decoded.signals}
+    signals = f',"sig":{json.dumps(values, separators=(",", ":"))}' if values else ""
+    source = f',"src":"{decoded.source}"' if decoded.source else ""
+    return json_line(heard, f',"kind":"{decoded.kind}"{node}{text}{signals}{source}')
+
+
+def csv_printer(heard: Heard, decoded: Decoded | None) -> str:
+    """Write a row below `CSV_HEADER`."""
+    at_us, channel, frame, sent = heard
+    text, _, data = str(frame).partition("#")
+    length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+    meaning = ("", "", "")
+    if decoded is not None:
+        node = "" if decoded.node is None else str(decoded.node)
+        meaning = (decoded.kind, node, _cell(decoded.text))
+    at_s = f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}"
+    cells = (at_s, _cell(channel), text, "tx" if sent else "rx", str(length), data, *meaning)
+    return ",".join(cells)
+
+
+def decoded_text(decoded: Decoded | None) -> str:
+    """Write what a frame means: node, kind, and what it says."""
+    if decoded is None or decoded.kind == "raw":
+        return ""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    return f"{node}{decoded.kind} {decoded.text}".rstrip()
+
+
+def _plain(value: object) -> object:
+    """Return a value as JSON has it; bytes are hex."""
+    return value.hex().upper() if isinstance(value, bytes | bytearray) else value
+
+
+def _cell(text: str) -> str:
+    """Quote a cell that needs it (RFC 4180)."""
+    quoted = text.replace('"', '""')
+    return f'"{quoted}"' if set(text) & set(',"\r\n') else text

@@ -1,0 +1,40 @@
+"""Standard output of a verb that prints many lines."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from tickrig.host.canmon.meaning import Meant
+from tickrig.host.canmon.printer import CSV_HEADER, Output, Printer
+from tickrig.host.monitor.logs.json_line import drop_line
+
+
+class Printed:
+    """Lines on standard output; in JSON, losses among them."""
+
+    def __init__(self, printer: Printer, output: Output) -> None:
+        self._printer, self._output, self._lost = printer, output, 0
+        self._header = output is Output.CSV
+
+    def take(self, meant: Sequence[Meant], lost: int) -> None:
+        """Print frames, at once."""
+        lines = [CSV_HEADER] if self._header else []
+        lines += [self._printer(*one) for one in meant]
+        if lost != self._lost and self._output is Output.JSONL:
+            lines.append(drop_line(lost - self._lost))
+        self._header, self._lost = False, lost
+        if lines:
+            sys.stdout.write("\n".join(lines) + "\n")
+            sys.stdout.flush()
+
+
+@contextmanager
+def until_unread() -> Iterator[None]:
+    """End the block quietly when nobody reads standard output any more, as before `| head`."""
+    try:
+        yield
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at exit
