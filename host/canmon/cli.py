@@ -10,6 +10,9 @@ import click
 from tickrig import __version__
 
 VERBS: Final[dict[str, str]] = {
+    "dump": "dump",
+    "conv": "conv",
+    "info": "info",
     "top": "top",
     "nodes": "nodes",
     "send": "send",
