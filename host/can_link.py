@@ -3,36 +3,55 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import can
 
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.errors import LinkClosed
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can_error_class import CONTROLLER_BYTE, ControllerFlag, ErrorClass
 
 SEND_TIMEOUT_S = 1
+PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
 class CanLink:
     """A `Link[Frames]` over python-can.
 
-    Error frames and CAN FD frames that arrive are passed over.
+    CAN FD frames that arrive are passed over, and error frames but for what
+    they say of the error state.
 
     Args:
-        channel: which bus of the interface, as `can0`.
-        interface: python-can's name of the adapter's kind, as `socketcan`.
-        bit_rate: bits a second, where the interface sets it.
+        bus: an open bus; nobody else may read from it.
+        name: what people call it.
 
-    Raises:
-        LinkClosed: the bus cannot be opened.
+    Attributes:
+        on_error_state: told the error state of the controller, where the driver says it.
     """
 
-    def __init__(self, channel: str, interface: str, bit_rate: int | None = None) -> None:
-        self._name = f"{interface}:{channel}"
+    def __init__(self, bus: can.BusABC, name: str) -> None:
+        self._bus, self._name = bus, name
+        self.on_error_state: Callable[[ErrorState], None] | None = None
+
+    @classmethod
+    def open(cls, channel: str, interface: str, bit_rate: int | None = None) -> CanLink:
+        """Open a bus.
+
+        Args:
+            channel: which bus of the interface, as `can0`.
+            interface: python-can's name of the adapter's kind, as `socketcan`.
+            bit_rate: bits a second, where the interface sets it.
+
+        Raises:
+            LinkClosed: the bus cannot be opened.
+        """
+        name = f"{interface}:{channel}"
         try:
-            self._bus = _open(channel, interface, bit_rate)
+            return cls(_open(channel, interface, bit_rate), name)
         except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-            raise LinkClosed(f"cannot open {self._name}: {error}") from error
+            raise LinkClosed(f"cannot open {name}: {error}") from error
 
     @property
     def now_us(self) -> int:
@@ -58,8 +77,7 @@ class CanLink:
                 if message is None and not wait_us:
                     break
                 while message is not None:
-                    frame = to_frame(message)
-                    frames += (frame,) if frame is not None else ()
+                    frames += self._take(message)
                     message = self._bus.recv(0)
         except (can.CanError, OSError) as error:
             raise LinkClosed(f"cannot read from {self._name}: {error}") from error
@@ -69,8 +87,31 @@ class CanLink:
         """Close the bus."""
         self._bus.shutdown()
 
+    def _take(self, message: can.Message) -> Frames:
+        if message.is_error_frame:
+            state = _error_state(message)
+            if state is not None and self.on_error_state is not None:
+                self.on_error_state(state)
+        frame = to_frame(message)
+        return () if frame is None else (frame,)
+
 
 def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
     if bit_rate is None:
         return can.Bus(channel=channel, interface=interface)
     return can.Bus(channel=channel, interface=interface, bitrate=bit_rate)
+
+
+def _error_state(message: can.Message) -> ErrorState | None:
+    """Return the error state that an error frame of SocketCAN tells, None if it tells none."""
+    error = ErrorClass(message.arbitration_id & 0x1FF)
+    if ErrorClass.BUS_OFF in error:
+        return ErrorState.BUS_OFF
+    if ErrorClass.RESTARTED in error:
+        return ErrorState.ACTIVE
+    if ErrorClass.CONTROLLER not in error or len(message.data) <= CONTROLLER_BYTE:
+        return None
+    flags = ControllerFlag(message.data[CONTROLLER_BYTE] & 0x7F)
+    if flags & PASSIVE:
+        return ErrorState.PASSIVE
+    return ErrorState.ACTIVE if ControllerFlag.ACTIVE in flags else None

@@ -11,6 +11,7 @@ from tests.emulators.can_bench import frames
 from tickrig.host.can_link import CanLink
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.errors import LinkClosed
+from tickrig.wire.can_error import ErrorState
 
 
 @pytest.fixture
@@ -20,7 +21,7 @@ def other() -> Iterator[can.BusABC]:
 
 
 def test_frames_go_both_ways(other: can.BusABC) -> None:
-    link = CanLink("can_link", "virtual", bit_rate=500_000)
+    link = CanLink.open("can_link", "virtual", bit_rate=500_000)
     link.send(frames("601#4000100000000000 00000605#R8"))
     heard = [other.recv(1), other.recv(1)]
     assert tuple(to_frame(m) for m in heard if m) == frames("601#4000100000000000 00000605#R8")
@@ -31,7 +32,7 @@ def test_frames_go_both_ways(other: can.BusABC) -> None:
 
 
 def test_silence_ends_with_the_timeout(other: can.BusABC) -> None:
-    link = CanLink("can_link", "virtual")
+    link = CanLink.open("can_link", "virtual")
     before_us = link.now_us
     assert link.receive(2_000) == ()
     assert link.now_us >= before_us + 2_000
@@ -39,7 +40,7 @@ def test_silence_ends_with_the_timeout(other: can.BusABC) -> None:
 
 
 def test_error_frames_and_fd_frames_are_passed_over(other: can.BusABC) -> None:
-    link = CanLink("can_link", "virtual")
+    link = CanLink.open("can_link", "virtual")
     other.send(can.Message(is_error_frame=True))
     other.send(can.Message(is_fd=True, data=bytes(12)))
     other.send(to_message(frames("080#")[0]))
@@ -48,7 +49,7 @@ def test_error_frames_and_fd_frames_are_passed_over(other: can.BusABC) -> None:
 
 
 def test_a_closed_link_says_so(other: can.BusABC) -> None:
-    link = CanLink("can_link", "virtual")
+    link = CanLink.open("can_link", "virtual")
     link.close()
     link.close()
     with pytest.raises(LinkClosed, match="cannot send on virtual:can_link"):
@@ -59,4 +60,29 @@ def test_a_closed_link_says_so(other: can.BusABC) -> None:
 
 def test_a_bus_that_cannot_be_opened_is_told() -> None:
     with pytest.raises(LinkClosed, match="cannot open nonsense:can0"):
-        CanLink("can0", "nonsense")
+        CanLink.open("can0", "nonsense")
+
+
+@pytest.mark.parametrize(
+    ("error", "data", "state"),
+    [
+        (0x040, b"", ErrorState.BUS_OFF),
+        (0x100, b"", ErrorState.ACTIVE),
+        (0x004, b"\0\x20", ErrorState.PASSIVE),
+        (0x004, b"\0\x10", ErrorState.PASSIVE),
+        (0x004, b"\0\x40", ErrorState.ACTIVE),
+        (0x004, b"\0\x08", None),
+        (0x004, b"", None),
+        (0x020, bytes(8), None),
+    ],
+)
+def test_an_error_frame_tells_the_error_state(
+    other: can.BusABC, error: int, data: bytes, state: ErrorState | None
+) -> None:
+    link, told = CanLink.open("can_link", "virtual"), list[ErrorState]()
+    link.on_error_state = told.append
+    other.send(can.Message(is_error_frame=True, arbitration_id=error, data=data))
+    other.send(to_message(frames("080#")[0]))
+    link.receive(1_000_000)
+    assert told == ([] if state is None else [state])
+    link.close()
