@@ -1,0 +1,248 @@
+"""What the builder writes is what a DeviceRTC is (DECISION K17)."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.make import make_device_rtc, make_dictionary
+from tickrig.emulators.canopen.rtc import describe_rtc
+from tickrig.host.rtc_canopen.builder.build import build
+from tickrig.host.rtc_canopen.builder.names import COMPONENT_NAMES
+from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project
+from tickrig.host.rtc_canopen.commands.builder import main
+from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.rtc_canopen.objects import object_table
+
+EVERYTHING = """
+name = "EveryThing"
+version = "2.7"
+vendor = 'Some "one"'
+product_code = 0x1234
+rate_hz = 250
+word_bits = 16
+strict_cia301 = true
+port = [
+    {name = "in", direction = "in", type = "Integer", length = 4},
+    {name = "short", direction = "in", type = "Character"},
+    {name = "SHORT", direction = "out", type = "Short"},
+    {name = "inputs", direction = "in", type = "Boolean", length = 2},
+    {name = "big", direction = "out", type = "UnsignedLongLong"},
+    {name = "real", direction = "out", type = "Double"},
+    {name = "small", direction = "out", type = "Float", length = 2},
+    {name = "octets", direction = "in", type = "Octet", length = 8},
+]
+"""
+NO_PORTS = 'name = "Nothing"\n'
+PROFILES = [EXAMPLE, EVERYTHING, NO_PORTS]
+each_profile = pytest.mark.parametrize("text", PROFILES, ids=["example", "everything", "no ports"])
+
+PROGRAM = r"""
+#define {upper}_OD_DEFINE
+#include "{lower}_od.h"
+#include <stdio.h>
+#include <inttypes.h>
+{lower}_result {lower}_on_initialize(void) {{ return {upper}_RTC_OK; }}
+int main(void) {{
+    for (size_t at = 0; at < {upper}_OD_COUNT; at++) {{
+        const {lower}_od_entry *row = &{lower}_od[at];
+        printf("%x %x %x %x %x %" PRIx64 " %s %d\n", (unsigned)row->index, (unsigned)row->sub,
+               (unsigned)row->data_type, (unsigned)row->access, (unsigned)row->size, row->number,
+               row->text ? row->text : "", row->port != {upper}_NO_PORT);
+    }}
+    return {lower}_on_initialize();
+}}
+"""
+
+
+def component(folder: Path, project: Project) -> type[Component]:
+    """Return the class of the skeleton."""
+    stem = next(name for name in build(project) if name.endswith(".py"))
+    space: dict[str, object] = {"__name__": "skeleton"}
+    exec(compile((folder / stem).read_text("utf-8"), stem, "exec"), space)
+    kind = space[project.profile.type_name]
+    assert isinstance(kind, type)
+    assert issubclass(kind, Component)
+    return kind
+
+
+def written(folder: Path, text: str) -> Project:
+    project = parse_project(text)
+    for name, content in build(project).items():
+        (folder / name).write_text(content, "utf-8")
+    return project
+
+
+@each_profile
+def test_the_eds_is_what_the_device_of_the_skeleton_writes(tmp_path: Path, text: str) -> None:
+    project = written(tmp_path, text)
+    (skeleton,) = tmp_path.glob("*.py")
+    described = describe_rtc(f"{skeleton}:{project.profile.type_name}")
+    eds = write_eds(described.template, described.info)
+    assert eds == skeleton.with_suffix(".eds").read_text("utf-8")
+
+
+@each_profile
+def test_the_skeleton_has_the_profile_and_runs(tmp_path: Path, text: str) -> None:
+    project = written(tmp_path, text)
+    kind = component(tmp_path, project)
+    assert kind.profile().placed() == project.profile.placed()
+    assert kind.strict_cia301 is project.strict_cia301
+    slave = make_device_rtc(kind, 16)
+    sent = [str(frame) for frame in slave.tick(1_000, ())]
+    for number, command in enumerate(("0110", "8010", "0210", "8110"), 2):
+        frames = slave.tick(number * 100_000, (CanFrame.parse(f"000#{command}"),))
+        sent += [str(frame) for frame in frames if frame.can_id == 0x710]
+        sent += [str(frame) for frame in slave.tick(number * 100_000 + 50_000, ())]
+    assert sent[0] == sent[-1] == "710#00"
+
+
+def test_the_skeleton_of_the_example_is_formatted_as_our_code_is(tmp_path: Path) -> None:
+    written(tmp_path, EXAMPLE)
+    ruff = shutil.which("ruff")
+    if ruff is None:
+        pytest.skip("ruff is not on the path")
+    subprocess.run([ruff, "format", "--check", "--isolated", tmp_path], check=True)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@each_profile
+def test_the_header_compiles_and_its_table_is_the_dictionary(tmp_path: Path, text: str) -> None:
+    project = written(tmp_path, text)
+    (header,) = tmp_path.glob("*.h")
+    lower = header.stem.removesuffix("_od")
+    (tmp_path / "main.c").write_text(PROGRAM.format(lower=lower, upper=lower.upper()))
+    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "main.c", "-o", "main"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    shown = subprocess.run([tmp_path / "main"], capture_output=True, check=True, text=True)
+    ports = {(port.index, sub) for port in project.profile.placed() for sub in port.subs}
+    expected = []
+    for row in object_table(project.profile):
+        access = row.access.value | 0x80 * row.relative
+        number = int.from_bytes(row.default, "little") if row.data_type.size else 0
+        words = "" if row.data_type.size else row.default.decode()
+        port = int((row.index, row.sub) in ports)
+        expected.append(
+            f"{row.index:x} {row.sub:x} {row.data_type:x} {access:x} {row.data_type.size:x}"
+            f" {number:x} {words} {port}"
+        )
+    assert shown.stdout.splitlines() == expected
+
+
+@each_profile
+def test_the_fragment_is_a_system_definition_of_this_node(tmp_path: Path, text: str) -> None:
+    project = written(tmp_path, text)
+    (fragment,) = tmp_path.glob("*.yaml")
+    (node,) = parse_definition(fragment.read_text("utf-8")).nodes
+    assert (node.id, node.name) == (16, f"{project.profile.type_name}0")
+    assert (tmp_path / node.eds).exists()
+    ports = {port.profile.name: port for port in project.profile.placed()}
+    assert set(node.ports.values()) == ports.keys()
+    dictionary = make_dictionary(component(tmp_path, project))
+    for pdo, name in node.ports.items():
+        parameter = (0x1800 if pdo[0] == "t" else 0x1400) + int(pdo[4:]) - 1
+        assert dictionary[parameter, 1].number == ports[name].cob_id
+
+
+def test_names_that_a_component_has_are_known() -> None:
+    mine = {name for name in (*dir(Component), *vars(Component())) if not name.startswith("_")}
+    assert mine == COMPONENT_NAMES
+
+
+REFUSED = [
+    ("name", "Expected '=' after a key in a key/value pair (at end of document)"),
+    ("", "name is missing"),
+    ('name = "G"\nrate = 5', "no key rate; known: name, version, vendor, category, rate_hz"),
+    ('name = "G"\nrate_hz = "5"', "rate_hz '5' is no whole number"),
+    ('name = "G"\nstrict_cia301 = 1', "strict_cia301 1 is neither true nor false"),
+    ("name = 5", "name 5 is no text"),
+    ('name = "G"\nnode_id = 128', "node_id 128 is not in 1..127"),
+    ('name = "class"', "name 'class' is a keyword of Python"),
+    ('name = "G"\nport = 5', "port: ports are tables [[port]]"),
+    ('name = "G"\nport = [5]', "port: ports are tables [[port]]"),
+    ("{size}", "port 1: no key size; known: name, direction, type, length"),
+    ("{direction}", "port 1: direction 'up' is not one of in, out"),
+    ("{type}", "port 1: type 'Int' is not one of Boolean, Octet, Character, Short"),
+    ("{length}", "port 1: a sequence of 0 elements, at least 1 is needed"),
+    ("{name}", "port 1: name is missing"),
+    ("{bits}", "port a: 9 x Octet are 72 bits, a PDO has 64"),
+    ("{text}", "port a: String does not fit a PDO; use an SDO"),
+    ("{word}", "port 1: a word of 12 bits; Integer has 8, 16 or 32"),
+    ("{twice}", "port 'in' becomes 'in_', and so is another called"),
+]
+PORTS = {
+    "{size}": '{name = "a", size = 1}',
+    "{direction}": '{name = "a", direction = "up", type = "Short"}',
+    "{type}": '{name = "a", direction = "in", type = "Int"}',
+    "{length}": '{name = "a", direction = "in", type = "Short", length = 0}',
+    "{name}": '{direction = "in", type = "Short"}',
+    "{bits}": '{name = "a", direction = "in", type = "Octet", length = 9}',
+    "{text}": '{name = "a", direction = "in", type = "String"}',
+    "{word}": '{name = "a", direction = "in", type = "Integer"}',
+    "{twice}": '{name = "in", direction = "in", type = "Short"},'
+    ' {name = "in_", direction = "in", type = "Short"}',
+}
+
+
+def run(*words: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.mark.parametrize(("text", "reason"), REFUSED)
+def test_a_profile_that_cannot_be_is_one_line(tmp_path: Path, text: str, reason: str) -> None:
+    if text in PORTS:
+        text = f'name = "G"\nword_bits = 12\nport = [{PORTS[text]}]'
+    file = tmp_path / "g.toml"
+    file.write_text(text)
+    result = run(file)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"Error: profile {file}: {reason}")
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_profile_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
+    for file, reason in (("nothing.toml", "No such file"), ("latin.toml", "is no text in UTF-8")):
+        result = run(tmp_path / file)
+        assert (result.exit_code, reason in result.stderr) == (2, True)
+    assert "give a PROFILE" in run().stderr
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "g.toml").write_text(EXAMPLE)
+    result = run(tmp_path / "g.toml", "--out", tmp_path / "g.toml" / "build")
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+
+
+def test_the_example_builds_and_a_filled_skeleton_is_kept(tmp_path: Path) -> None:
+    profile, out = tmp_path / "g.toml", tmp_path / "build"
+    profile.write_text(run("--example").stdout)
+    assert run(profile, "--out", out).exit_code == 0
+    names = {path.name for path in out.iterdir()}
+    assert names == {"gripper.eds", "gripper.py", "gripper_od.h", "gripper.yaml"}
+    skeleton = out / "gripper.py"
+    skeleton.write_text("mine")
+    assert run(profile, "--out", out).stderr == f"{skeleton} is kept; --force overwrites it\n"
+    assert skeleton.read_text() == "mine"
+    run(profile, "--out", out, "--force")
+    assert skeleton.read_text() != "mine"
+
+
+def test_objects_and_pdos_are_shown(tmp_path: Path) -> None:
+    (tmp_path / "g.toml").write_text(EXAMPLE)
+    lines = run(tmp_path / "g.toml").stdout.splitlines()
+    assert [line.split()[0] for line in lines if line] == [
+        *("object", "2100h:00", "2101h:00", "2101h:01", "2101h:02", "2101h:03"),
+        *("PDO", "rpdo1", "tpdo1"),
+    ]
+    assert lines[-1].split() == ["tpdo1", "180h+id", "48", "forces_mn:", "3", "x", "Short"]
+    every = run(tmp_path / "g.toml", "--all").stdout
+    assert "1017h:00  Producer heartbeat time" in every
+    assert len(every.splitlines()) > 70
