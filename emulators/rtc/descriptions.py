@@ -8,6 +8,7 @@ from tickrig.host.rtc.configuration import Configuration
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc.parameter import as_text
 from tickrig.host.rtc.port import AnyPort, ConnectorProfile
+from tickrig.host.rtc.states import LifeCycleState
 
 
 def describe_component(manager: Manager, component: RtComponent) -> Object:
@@ -21,7 +22,7 @@ def describe_component(manager: Manager, component: RtComponent) -> Object:
         "version": spec.version,
         "vendor": spec.vendor,
         "category": spec.category,
-        "state": manager.state_of(name).name,
+        "state": _state(component),
         "contexts": [
             {
                 "rate_hz": context.rate_hz,
@@ -50,6 +51,12 @@ def describe_configuration(configuration: Configuration) -> Object:
             for parameter in configuration.parameters.values()
         ],
     }
+
+
+def _state(component: RtComponent) -> str:
+    """Return the state in the first execution context."""
+    contexts = component.contexts
+    return (contexts[0].state_of(component) if contexts else LifeCycleState.CREATED).name
 
 
 def _port(port: AnyPort) -> Object:

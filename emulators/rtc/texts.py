@@ -13,7 +13,7 @@ def component_row(component: Any) -> str:
     """Write a line of `ls -l`: state, ports with those that are connected, rate, type, name."""
     ports = component["ports"]
     connected = sum(1 for port in ports if port["connectors"])
-    rate = f"{component['contexts'][0]['rate_hz']:g}Hz"
+    rate = "".join(f"{context['rate_hz']:g}Hz" for context in component["contexts"][:1])
     state = component["state"].capitalize()
     return (
         f"{state:<9} {len(ports):>3}/{connected:<3} {rate:>9}  "

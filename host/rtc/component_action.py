@@ -23,8 +23,8 @@ def guarded(
 ) -> ReturnCode:
     """Run a callback; what it raises is logged and counts as RTC_ERROR.
 
-    The one place at which any exception is caught: what one component does
-    must not end the others.
+    Any exception is caught, here and from listeners of ports: what one
+    component does must not end the others.
     """
     try:
         return callback(*args, **kwargs)

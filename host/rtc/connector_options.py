@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution_context import MAX_RATE_HZ, MIN_RATE_HZ
 from tickrig.host.rtc.ring_buffer import (
     DEFAULT_LENGTH,
     BufferOptions,
@@ -18,8 +19,6 @@ from tickrig.host.rtc.ring_buffer import (
 from tickrig.wire.rtc_types.cdr import Endian
 
 E = TypeVar("E", bound=StrEnum)
-
-MAX_PUSH_RATE_HZ: Final = 1_000_000
 
 
 class InterfaceType(StrEnum):
@@ -144,8 +143,8 @@ class _Reader:
             rate_hz = default if text is None else float(text)
         except ValueError:
             rate_hz = 0.0
-        if not 0 < rate_hz <= MAX_PUSH_RATE_HZ:
-            raise self._refusal(key, text, f"up to {MAX_PUSH_RATE_HZ} Hz")
+        if not MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ:
+            raise self._refusal(key, text, f"{MIN_RATE_HZ}..{MAX_RATE_HZ} Hz")
         return rate_hz
 
     def endian(self, key: str) -> Endian:

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from tickrig.host.rtc.component import RtComponent
 
 SECOND_US: Final = 1_000_000
+MAX_RATE_HZ: Final = 1_000_000
+MIN_RATE_HZ: Final = 1e-6
+"""One period in eleven days."""
 
 
 class ExecutionContext:
@@ -29,7 +32,7 @@ class ExecutionContext:
     It is PERIODIC; EVENT_DRIVEN and OTHER are not emulated.
 
     Args:
-        rate_hz: periods a second, up to 1 MHz; a period is a whole number of microseconds.
+        rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
 
     Attributes:
         now_us: the time it was told last; what callbacks take as the present.
@@ -46,7 +49,7 @@ class ExecutionContext:
 
     def __init__(self, rate_hz: float = 1_000.0) -> None:
         if not _possible(rate_hz):
-            raise ValueError(f"rate {rate_hz} Hz is not in 0 < rate <= {SECOND_US} Hz")
+            raise ValueError(f"rate {rate_hz} Hz is not in {MIN_RATE_HZ}..{MAX_RATE_HZ} Hz")
         self.now_us, self.due_us, self.running = 0, NEVER, False
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         self._participants: tuple[Participant, ...] = ()
@@ -105,7 +108,7 @@ class ExecutionContext:
         """Change the rate, with on_rate_changed of every participant.
 
         Returns:
-            BAD_PARAMETER unless 0 < rate <= 1 MHz.
+            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz.
         """
         if not _possible(rate_hz):
             return ReturnCode.BAD_PARAMETER
@@ -236,7 +239,7 @@ _PASSES: Final = (Participant.pre, Participant.do, Participant.post)
 
 
 def _possible(rate_hz: float) -> bool:
-    return 0 < rate_hz <= SECOND_US
+    return MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ
 
 
 def _period_us(rate_hz: float) -> int:

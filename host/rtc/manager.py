@@ -167,8 +167,10 @@ class Manager(Schedule):
         connector.end()
 
     def context_of(self, name: str) -> ExecutionContext:
-        """Return the first execution context of a component."""
-        return self.find(name).contexts[0]
+        """Return the first execution context of a component; RtcRefused if it has none."""
+        if not (contexts := self.find(name).contexts):
+            raise RtcRefused(f"{name} takes part in no execution context")
+        return contexts[0]
 
     def state_of(self, name: str) -> LifeCycleState:
         """Return the state of a component in its first execution context."""

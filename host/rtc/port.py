@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeVar
+
+_LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +144,12 @@ class Port(Generic[C]):
         self.connectors = tuple(c for c in self.connectors if c is not connector)
 
     def tell(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
-        """Tell listeners of a connector."""
+        """Tell listeners of a connector; what one raises is logged, and the others are told."""
         for listener in tuple(listeners):
-            listener(profile)
+            try:
+                listener(profile)
+            except Exception:  # as callbacks of a component: one must not end the others
+                _LOG.exception("%s: a listener raised", self.full_name)
 
     def _properties(self) -> Mapping[str, str]:
         return {}

@@ -12,6 +12,7 @@ from tickrig.host.rtc.port_status import PortStatus
 T = TypeVar("T")
 
 DEFAULT_LENGTH: Final = 8
+MAX_LENGTH: Final = 1_000_000
 
 
 class FullPolicy(StrEnum):
@@ -43,14 +44,14 @@ class BufferOptions:
     """How a buffer behaves.
 
     Attributes:
-        length: how many values it holds, 1 or more.
+        length: how many values it holds, 1 to 1 000 000.
         full: what writing does when it is full.
         empty: what reading does when it is empty.
         read: which value is read.
         skip_count: how many are dropped before each one that is read, with `skip`.
 
     Raises:
-        ValueError: a length below 1, or a skip_count that is not below the length.
+        ValueError: a length out of its range, or a skip_count that is not below the length.
     """
 
     length: int = DEFAULT_LENGTH
@@ -61,8 +62,8 @@ class BufferOptions:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if self.length < 1:
-            raise ValueError(f"buffer length {self.length}, at least 1 is needed")
+        if not 1 <= self.length <= MAX_LENGTH:
+            raise ValueError(f"buffer length {self.length} is not in 1..{MAX_LENGTH}")
         if not 0 <= self.skip_count < self.length:
             raise ValueError(f"skip_count {self.skip_count} is not in 0..{self.length - 1}")
 

@@ -108,7 +108,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("bad.xml", "system bad.xml: a is not an RTSProfile"),
         ("latin.toml", "system latin.toml: byte 2 is not UTF-8"),
         ("twice.toml", "system twice.toml: no component type 'Twice'; known: ConsoleIn, "),
-        ("chain.toml --rate 0", "system chain.toml: rate 0.0 Hz is not in 0 < rate <= 1000000 Hz"),
+        ("chain.toml --rate 0", "system chain.toml: rate 0.0 Hz is not in 1e-06..1000000 Hz"),
         ("chain.toml --save x.yaml", "system x.yaml: the name ends in .toml or .xml"),
         ("chain.toml --component x", "--component x: 'x' is not FILE.py:Class"),
         ("chain.toml --component no.py:A", "--component no.py:A: no.py: No such file or directory"),
