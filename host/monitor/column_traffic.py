@@ -38,7 +38,7 @@ def _bus(channel: str, frames: Columns, now_us: int) -> tuple[BusRow, list[IdRow
     errors, frames = _take_errors(frames)
     bits = column_bits(frames.ident, frames.dlc, frames.payload)
     load = Load(first_us)
-    for window in windows_of(first_us, frames.at_us, bits):
+    for window, _ in windows_of(first_us, frames.at_us, bits):
         load.take(*window)
     row = BusRow(
         channel,
@@ -64,15 +64,16 @@ def _take_errors(frames: Columns) -> tuple[Controller, Columns]:
     return errors, select(frames, np.flatnonzero(~is_error))
 
 
-def windows_of(first_us: int, at_us: Ints, bits: Ints) -> list[Window]:
-    """Return the seconds that have frames, with their bits, as `Load` opens them."""
+def windows_of(first_us: int, at_us: Ints, bits: Ints) -> list[tuple[Window, int]]:
+    """Return the seconds that have frames, as `Load` opens them, each with its first row."""
     if not len(at_us):
         return []
     seconds = np.maximum.accumulate(np.maximum(at_us - first_us, 0) // WINDOW_US)
     begins = np.flatnonzero(np.diff(seconds, prepend=-1))
     sums = np.add.reduceat(bits, begins)
     starts = seconds[begins] * WINDOW_US + first_us
-    return [Window(*window) for window in zip(starts.tolist(), sums.tolist(), strict=True)]
+    windows = map(Window, starts.tolist(), sums.tolist())
+    return list(zip(windows, begins.tolist(), strict=True))
 
 
 def _id_rows(channel: str, frames: Columns, bits: Ints) -> list[IdRow]:

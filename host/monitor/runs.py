@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +31,9 @@ class Runs:
     idents: Ints
 
     @classmethod
-    def of(cls, ident: npt.NDArray[np.uint32]) -> Runs:
+    def of(cls, ident: npt.NDArray[np.uint32] | npt.NDArray[np.uint64]) -> Runs:
         """Sort the rows of a column of identifiers, one row at least."""
-        keys = ident.astype(np.uint16) if ident.max() <= RADIX_MAX else ident
+        keys: npt.NDArray[Any] = ident.astype(np.uint16) if ident.max() <= RADIX_MAX else ident
         order = np.argsort(keys, kind="stable")
         ordered = ident[order]
         begins = np.flatnonzero(np.diff(ordered, prepend=~ordered[0]))

@@ -1,0 +1,82 @@
+"""A log file that is read at once, where that is faster than frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.canmon.failure import SourceFailed
+from tickrig.host.canmon.source_word import FileWord, parse_source
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.log_reader import LogError
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.logs.columns import Columns
+
+SMALL_BYTES: Final = 1 << 20
+"""Below it a log is read frame by frame sooner than numpy is imported."""
+
+
+class WholeLog:
+    """All of a log file, as a source whose end is reached.
+
+    Attributes:
+        columns: its frames.
+    """
+
+    live = False
+    ended = True
+    failed = ""
+
+    def __init__(self, path: Path, columns: Columns) -> None:
+        self._name, self.columns = str(path), columns
+
+    @property
+    def lost(self) -> int:
+        """Frames that its recorder says it lost."""
+        return self.columns.tally.lost
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Return nothing: all is in the columns."""
+        return []
+
+    def words(self) -> list[str]:
+        """Say what was no frame or got lost, one line each."""
+        return self.columns.tally.words(self._name)
+
+    def close(self) -> None:
+        """Close nothing: it was read."""
+
+
+def whole_log(words: Sequence[str]) -> WholeLog | None:
+    """Read the log that SOURCE words name; None if it is better read frame by frame.
+
+    Raises:
+        Refused: words that name nothing.
+        SourceFailed: a file that cannot be read.
+    """
+    path = _large_log(words)
+    if path is None:
+        return None
+    from tickrig.host.monitor.logs.column_reader import read_columns  # noqa: PLC0415 - numpy
+
+    try:
+        return WholeLog(path, read_columns(path))
+    except OSError as error:
+        raise SourceFailed(f"{path}: {error.strerror}") from error
+    except LogError as error:
+        raise SourceFailed(str(error)) from error
+
+
+def _large_log(words: Sequence[str]) -> Path | None:
+    if len(words) != 1 or find_spec("numpy") is None:
+        return None
+    word = parse_source(words[0])
+    if not isinstance(word, FileWord) or word.chosen is not None:
+        return None
+    try:
+        return word.path if word.path.stat().st_size >= SMALL_BYTES else None
+    except OSError:
+        return None  # who reads it frame by frame says so

@@ -1,0 +1,1 @@
+"""Rules that traffic must keep, and what breaks them."""

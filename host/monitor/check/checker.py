@@ -1,0 +1,106 @@
+"""Rules against frames, one by one.
+
+>>> from tickrig.wire.can import CanFrame
+>>> checker = Checker(Rules(no_emcy=True))
+>>> for finding in checker.take(Heard(5, "can0", CanFrame.parse("083#3081110000000000"))):
+...     print(finding)
+(0.000005) no-emcy: node 3: EMCY 8130h life guard error or heartbeat error [can0 083#3081110000000000]
+"""  # noqa: E501 - as it is printed
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.rule import Rule
+from tickrig.host.monitor.check.rules import NO_LOSS, Rules
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.ident import ERROR, ident_of
+from tickrig.host.monitor.load import Load, Window
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can_error import ErrorFrame
+
+
+class Checker:
+    """Holds frames against rules; what it keeps grows with identifiers, not with frames.
+
+    Args:
+        rules: what must hold.
+        bit_rate: bits a second, for the load.
+
+    Raises:
+        ValueError: a limit of the load without a bit rate.
+    """
+
+    def __init__(self, rules: Rules, bit_rate: int | None = None) -> None:
+        self._rules, self._made, self._load = rules, rules.make(), rules.load(bit_rate)
+        self._wanting: dict[int, list[Rule]] = {}
+        self._last_us: dict[tuple[str, int], int] = {}
+        self._loads: dict[str, Load] = {}
+
+    def take(self, heard: Heard) -> list[Finding]:
+        """Return what is wrong with a frame, and with the second that it ended."""
+        at_us, channel, frame, _ = heard
+        found = self._too_busy(at_us, channel, frame) if self._load else []
+        if isinstance(frame, ErrorFrame):
+            return found + self._judged(ERROR, heard, None)
+        ident = ident_of(frame)
+        key = channel, ident
+        before_us = self._last_us.get(key)
+        self._last_us[key] = at_us
+        gap_us = None if before_us is None else max(0, at_us - before_us)
+        return found + self._judged(ident, heard, gap_us)
+
+    def end(self, end_us: int, lost: Iterable[str] = ()) -> list[Finding]:
+        """Return what is missing.
+
+        Args:
+            end_us: when listening ended.
+            lost: what the source says was lost or is no frame.
+        """
+        windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
+        found = [one for channel, window in windows for one in self.judge_window(channel, window)]
+        return found + ended(self._rules, self._made, _latest(self._last_us), end_us, lost)
+
+    def judge_window(self, channel: str, window: Window) -> list[Finding]:
+        """Return what is wrong with a second of a bus."""
+        text = self._load.judge(channel, window) if self._load else None
+        return [] if text is None else [Finding(window.at_us, "max-load", text)]
+
+    def _judged(self, ident: int, heard: Heard, gap_us: int | None) -> list[Finding]:
+        wanting = self._wanting.get(ident)
+        if wanting is None:
+            wanting = self._wanting[ident] = [rule for rule in self._made if rule.wants(ident)]
+        texts = ((rule.name, rule.judge(heard, gap_us)) for rule in wanting)
+        return [Finding(heard.at_us, name, text, heard) for name, text in texts if text]
+
+    def _too_busy(self, at_us: int, channel: str, frame: CanFrame | ErrorFrame) -> list[Finding]:
+        load = self._loads.get(channel)
+        if load is None:
+            load = self._loads[channel] = Load(at_us)
+        if isinstance(frame, ErrorFrame):
+            return []
+        window = load.take(at_us, frame_bits(frame))
+        return [] if window is None else self.judge_window(channel, window)
+
+
+def ended(
+    rules: Rules,
+    made: Iterable[Rule],
+    latest_us: dict[int, int],
+    end_us: int,
+    lost: Iterable[str],
+) -> list[Finding]:
+    """Return what rules miss at the end."""
+    found = [
+        Finding(end_us, rule.name, text) for rule in made for text in rule.end(latest_us, end_us)
+    ]
+    return found + [Finding(end_us, NO_LOSS, text) for text in lost if rules.no_loss]
+
+
+def _latest(last_us: dict[tuple[str, int], int]) -> dict[int, int]:
+    latest: dict[int, int] = {}
+    for (_, ident), at_us in last_us.items():
+        latest[ident] = max(at_us, latest.get(ident, at_us))
+    return latest

@@ -1,0 +1,43 @@
+"""Findings as a JUnit report, one test case for each rule."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+from xml.sax.saxutils import escape, quoteattr
+
+from tickrig.host.monitor.check.finding import Finding
+
+CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
+"""Characters that XML does not have."""
+
+
+def junit(suite: str, names: Sequence[str], findings: Iterable[Finding]) -> str:
+    """Return the report.
+
+    Args:
+        suite: what was checked.
+        names: of all rules, also of those that hold.
+        findings: in their order.
+    """
+    by_rule: dict[str, list[Finding]] = {name: [] for name in names}
+    for finding in findings:
+        by_rule[finding.rule].append(finding)
+    failures = sum(bool(found) for found in by_rule.values())
+    head = f"<testsuite name={_attribute(suite)} tests='{len(names)}' failures='{failures}'>"
+    cases = [_case(suite, name, found) for name, found in by_rule.items()]
+    lines = ["<?xml version='1.0' encoding='utf-8'?>", "<testsuites>", head, *cases]
+    return "\n".join([*lines, "</testsuite>", "</testsuites>", ""])
+
+
+def _case(suite: str, name: str, found: Sequence[Finding]) -> str:
+    head = f"<testcase classname={_attribute(suite)} name={_attribute(name)}"
+    if not found:
+        return f"{head}/>"
+    message = f"{len(found)} findings, first: {found[0].text}"
+    text = escape("\n".join(map(str, found)).translate(CONTROLS))
+    return f"{head}><failure message={_attribute(message)}>{text}</failure></testcase>"
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(text.translate(CONTROLS))

@@ -1,0 +1,70 @@
+"""What a rule is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Final, NamedTuple, Protocol
+
+from tickrig.host.monitor.heard import Heard
+
+NO_GAP_US: Final = -1
+"""Where a gap is compared: the first frame of an identifier has none."""
+
+
+class Suspects(NamedTuple):
+    """Which frames of its identifiers a rule must see; all others break it in no case.
+
+    Where nothing is given, all of them.
+
+    Attributes:
+        below_us: frames after a shorter gap.
+        above_us: frames after a longer gap.
+        first_bytes: frames that begin with one of these.
+        firsts: the first frame of an identifier on a bus.
+    """
+
+    below_us: int | None = None
+    above_us: int | None = None
+    first_bytes: frozenset[int] = frozenset()
+    firsts: bool = False
+
+
+class Rule(Protocol):
+    """One rule.
+
+    Attributes:
+        name: as findings and reports have it.
+        suspects: which frames of those it wants can break it.
+    """
+
+    @property
+    def name(self) -> str:
+        """As findings and reports have it."""
+        ...
+
+    @property
+    def suspects(self) -> Suspects:
+        """Which of the frames that it wants it must see."""
+        ...
+
+    def wants(self, ident: int, /) -> bool:
+        """Say whether frames of an identifier matter; error frames have `ident.ERROR`."""
+        ...
+
+    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+        """Say what is wrong with a frame.
+
+        Args:
+            heard: the frame.
+            gap_us: since the one before it with this identifier on this bus; None for the first.
+        """
+        ...
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Say what is missing.
+
+        Args:
+            latest_us: when each identifier was heard last, on any bus.
+            end_us: when listening ended.
+        """
+        ...

@@ -1,0 +1,185 @@
+"""Rules about frames that should come, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Final, NamedTuple
+
+from tickrig.host.monitor.check.frame_rules import NODE_MASK
+from tickrig.host.monitor.check.rule import Suspects
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.ident import ident_text
+from tickrig.host.monitor.quantity import ms_text
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.nmt import (
+    ALL_NODES,
+    ERROR_CONTROL_COB_ID,
+    NMT_COB_ID,
+    NmtCommand,
+    NmtState,
+)
+
+BOOT_UP: Final = bytes([NmtState.INITIALISING])
+RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
+ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
+
+
+class HeartbeatTimes(NamedTuple):
+    """When the heartbeat of a node must come.
+
+    Attributes:
+        node: its node-ID.
+        low_us: it comes no sooner after the one before.
+        high_us: and no later.
+    """
+
+    node: int
+    low_us: int
+    high_us: int
+
+
+class Heartbeat:
+    """A heartbeat comes in time, the first one after a boot-up whenever it likes.
+
+    Attributes:
+        name: as findings have it.
+        suspects: what comes too soon or too late, and boot-ups.
+    """
+
+    def __init__(self, times: HeartbeatTimes) -> None:
+        self._times, self._ident = times, ERROR_CONTROL_COB_ID + times.node
+        self.name = f"heartbeat {times.node}"
+        boot_up = frozenset(BOOT_UP)
+        self.suspects = Suspects(times.low_us, times.high_us, boot_up, firsts=True)
+        self._booted_us: dict[str, int] = {}
+
+    def wants(self, ident: int, /) -> bool:
+        """Take its COB-ID."""
+        return ident == self._ident
+
+    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+        """Compare the gap, unless the frame or the one before it is a boot-up."""
+        if heard.frame.data == BOOT_UP:
+            self._booted_us[heard.channel] = heard.at_us
+            return None
+        if gap_us is None or heard.at_us - gap_us == self._booted_us.get(heard.channel):
+            return None
+        if gap_us > self._times.high_us:
+            return self._said(gap_us, "at most", self._times.high_us)
+        if gap_us < self._times.low_us:
+            return self._said(gap_us, "at least", self._times.low_us)
+        return None
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Say that it stopped or never came."""
+        if self._ident not in latest_us:
+            yield f"no heartbeat of node {self._times.node} came"
+        elif end_us - latest_us[self._ident] > self._times.high_us:
+            yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
+
+    def _said(self, gap_us: int, bound: str, limit_us: int) -> str:
+        node, said = self._times.node, f"{bound} {ms_text(limit_us)} is right"
+        return f"node {node}: {ms_text(gap_us)} ms since its last heartbeat, {said}"
+
+
+class MaxGap:
+    """An identifier comes again in time.
+
+    Attributes:
+        name: as findings have it.
+        suspects: what comes too late.
+    """
+
+    def __init__(self, ident: int, most_us: int) -> None:
+        self._ident, self._most_us = ident, most_us
+        self.name = f"max-gap {ident_text(ident)}"
+        self.suspects = Suspects(above_us=most_us)
+
+    def wants(self, ident: int, /) -> bool:
+        """Take its frames."""
+        return ident == self._ident
+
+    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+        """Compare the gap."""
+        return None if gap_us is None or gap_us <= self._most_us else self._said(gap_us)
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Say that it stopped or never came."""
+        if self._ident not in latest_us:
+            yield f"{ident_text(self._ident)} never came"
+        elif end_us - latest_us[self._ident] > self._most_us:
+            yield self._said(end_us - latest_us[self._ident])
+
+    def _said(self, gap_us: int) -> str:
+        limit = f"at most {ms_text(self._most_us)} is right"
+        return f"{ms_text(gap_us)} ms without {ident_text(self._ident)}, {limit}"
+
+
+class NodesPresent:
+    """These nodes are heard: boot-up, heartbeat or guarding.
+
+    Attributes:
+        name: as findings have it.
+        suspects: none.
+    """
+
+    name = "nodes"
+    suspects = Suspects(firsts=True)
+
+    def __init__(self, nodes: Iterable[int]) -> None:
+        self._nodes = sorted(nodes)
+
+    def wants(self, ident: int, /) -> bool:
+        """Take nothing: what is missing is seen at the end."""
+        return False
+
+    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+        """Find nothing."""
+        return None
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Name those that were never heard."""
+        for node in self._nodes:
+            if ERROR_CONTROL_COB_ID + node not in latest_us:
+                yield f"node {node} was never heard"
+
+
+class NoReboot:
+    """No node that was heard before boots without an NMT reset.
+
+    Attributes:
+        name: as findings have it.
+        suspects: boot-ups and resets.
+    """
+
+    name = "no-reboot"
+    suspects = Suspects(first_bytes=RESETS | frozenset(BOOT_UP))
+
+    def __init__(self) -> None:
+        self._asked: set[int] = set()
+
+    def wants(self, ident: int, /) -> bool:
+        """Take NMT commands and error control."""
+        return ident == NMT_COB_ID or ident in ERROR_CONTROL_IDS
+
+    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+        """Note a reset; say that a boot-up comes without one."""
+        frame = heard.frame
+        assert isinstance(frame, CanFrame)
+        if frame.can_id == NMT_COB_ID:
+            if len(frame.data) == 2 and frame.data[0] in RESETS:
+                self._ask(frame.data[1])
+            return None
+        if frame.data != BOOT_UP:
+            return None
+        node = frame.can_id & NODE_MASK
+        expected = gap_us is None or node in self._asked
+        self._asked.discard(node)
+        return None if expected else f"node {node} boots again without an NMT reset"
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Say nothing."""
+        return ()
+
+    def _ask(self, node: int) -> None:
+        self._asked |= set(range(1, 0x80)) if node == ALL_NODES else {node}

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.host.monitor.column_log import columns
+from tests.host.monitor.strategies import traffic
+from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.time_rules import HeartbeatTimes
+from tickrig.host.monitor.heard import Heard
+from tickrig.wire.can import CanFrame
+
+BIT_RATE = 1_000
+ALL = Rules(
+    max_load=20,
+    no_emcy=True,
+    no_sdo_abort=True,
+    no_error_frames=True,
+    no_reboot=True,
+    no_loss=True,
+    heartbeats=(HeartbeatTimes(3, 80_000, 120_000),),
+    nodes=(3, 5),
+    max_gaps=((0x181, 100_000), (0x7FF, 200)),
+    known=frozenset({0x000, 0x181, 0x703}),
+)
+
+
+def one_by_one(heards: list[Heard], rules: Rules) -> list[Finding]:
+    checker = Checker(rules, BIT_RATE)
+    found = [finding for heard in heards for finding in checker.take(heard)]
+    return found + checker.end(heards[-1].at_us if heards else 0, ["a line is none"])
+
+
+@given(traffic())
+def test_a_log_at_once_has_the_same_findings_as_frame_by_frame(heards: list[Heard]) -> None:
+    found = check_columns(columns(heards), ALL, BIT_RATE, ["a line is none"])
+    assert found == one_by_one(heards, ALL)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0, 79_999, 100_000, 120_001]),
+            st.sampled_from(["703#00", "703#05", "000#8103", "000#8200"]),
+        ),
+        max_size=30,
+    )
+)
+def test_boots_and_heartbeats_are_judged_the_same(steps: list[tuple[int, str]]) -> None:
+    at_us, heards = 0, []
+    for step_us, text in steps:
+        at_us += step_us
+        heards.append(Heard(at_us, "can0", CanFrame.parse(text)))
+    found = check_columns(columns(heards), ALL, BIT_RATE, ["a line is none"])
+    assert found == one_by_one(heards, ALL)

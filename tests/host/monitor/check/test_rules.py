@@ -1,0 +1,147 @@
+"""Each rule against few frames."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.host.monitor.heard_log import hear
+from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.words import parse_rules
+
+
+def broken(
+    rules: Rules, text: str, end_s: float | None = None, bit_rate: int | None = None
+) -> list[str]:
+    """Return what is found, as text with the time in seconds before it."""
+    checker, heards = Checker(rules, bit_rate), hear(text)
+    found = [finding for heard in heards for finding in checker.take(heard)]
+    found += checker.end(round(end_s * 1e6) if end_s else heards[-1].at_us)
+    return [f"{finding.at_us / 1e6:g} {finding.text}" for finding in found]
+
+
+def test_an_emcy_is_found_and_its_end_is_not() -> None:
+    rules = Rules(no_emcy=True)
+    assert broken(rules, "1 083#3081110000000000\n2 083#0000000000000000") == [
+        "1 node 3: EMCY 8130h life guard error or heartbeat error"
+    ]
+
+
+@pytest.mark.parametrize("frame", ["083#", "083#308111", "080#3081110000000000", "083#R8"])
+def test_what_is_no_emcy_is_not_found(frame: str) -> None:
+    assert broken(Rules(no_emcy=True), f"1 {frame}") == []
+
+
+def test_aborts_of_both_sides_are_found() -> None:
+    text = "1 583#8040600000000206\n2 603#8040600000000405"
+    assert broken(Rules(no_sdo_abort=True), text) == [
+        "1 node 3: server aborts 6040h:00, object does not exist (06020000h)",
+        "2 node 3: client aborts 6040h:00, SDO protocol timed out (05040000h)",
+    ]
+
+
+def test_other_sdo_frames_are_not_found() -> None:
+    assert broken(Rules(no_sdo_abort=True), "1 583#6040600000000000\n2 583#80") == []
+
+
+def test_error_frames_are_found() -> None:
+    assert broken(Rules(no_error_frames=True), "1 20000020#0000000000000000") == [
+        "1 no acknowledge"
+    ]
+
+
+def test_each_unknown_identifier_is_found_once() -> None:
+    rules = parse_rules({"known": "181,280-282"})
+    text = "1 181#\n2 281#\n3 183#\n4 183#\n5 00000181#\n6 20000020#0000000000000000"
+    assert broken(rules, text) == ["3 183 is not expected", "5 00000181 is not expected"]
+
+
+HEARTBEAT = parse_rules({"heartbeat": "3=100ms±20%"})
+
+
+def test_heartbeats_in_time_are_right() -> None:
+    assert broken(HEARTBEAT, "1 703#05\n1.08 703#05\n1.2 703#7F") == []
+
+
+def test_a_late_and_an_early_heartbeat_are_found() -> None:
+    assert broken(HEARTBEAT, "1 703#05\n1.13 703#05\n1.2 703#05") == [
+        "1.13 node 3: 130.000 ms since its last heartbeat, at most 120.000 is right",
+        "1.2 node 3: 70.000 ms since its last heartbeat, at least 80.000 is right",
+    ]
+
+
+def test_the_times_around_a_boot_up_are_free() -> None:
+    assert broken(HEARTBEAT, "1 703#05\n1.5 703#00\n1.9 703#7F\n2.0 703#7F") == []
+
+
+def test_the_second_heartbeat_after_a_boot_up_is_judged() -> None:
+    text = "1 703#00\n1.9 703#7F\n2.5 703#7F"
+    assert [line[:3] for line in broken(HEARTBEAT, text)] == ["2.5"]
+
+
+def test_a_heartbeat_that_stops_or_never_comes_is_found() -> None:
+    assert broken(HEARTBEAT, "1 703#05", end_s=1.5) == [
+        "1.5 node 3: 500.000 ms since its last heartbeat, at most 120.000 is right"
+    ]
+    assert broken(HEARTBEAT, "1 181#") == ["1 no heartbeat of node 3 came"]
+
+
+def test_a_long_gap_is_found_and_one_that_lasts() -> None:
+    rules = parse_rules({"max_gap": "181=20ms"})
+    assert broken(rules, "1 181#\n1.02 181#\n1.05 181#", end_s=1.1) == [
+        "1.05 30.000 ms without 181, at most 20.000 is right",
+        "1.1 50.000 ms without 181, at most 20.000 is right",
+    ]
+    assert broken(rules, "1 182#") == ["1 181 never came"]
+
+
+def test_gaps_are_those_of_one_bus() -> None:
+    checker = Checker(parse_rules({"max_gap": "181=20ms"}))
+    heards = sorted(hear("1 181#\n1.02 181#", "can0") + hear("1.01 181#\n1.1 181#", "can1"))
+    found = [finding for heard in heards for finding in checker.take(heard)]
+    assert [(finding.at_us, finding.heard and finding.heard.channel) for finding in found] == [
+        (1_100_000, "can1")
+    ]
+
+
+def test_nodes_that_were_never_heard_are_found() -> None:
+    rules = parse_rules({"nodes": "3,5-6"})
+    assert broken(rules, "1 705#7F") == ["1 node 3 was never heard", "1 node 6 was never heard"]
+
+
+@pytest.mark.parametrize("command", ["8103", "8200"])
+def test_a_boot_after_a_reset_is_right(command: str) -> None:
+    assert broken(Rules(no_reboot=True), f"1 703#00\n2 703#05\n3 000#{command}\n4 703#00") == []
+
+
+@pytest.mark.parametrize("command", ["000#8104", "000#0103", "000#81"])
+def test_a_boot_without_a_reset_is_found(command: str) -> None:
+    text = f"1 703#00\n2 703#05\n3 {command}\n4 703#00"
+    assert broken(Rules(no_reboot=True), text) == ["4 node 3 boots again without an NMT reset"]
+
+
+def test_a_reset_excuses_one_boot() -> None:
+    text = "1 703#00\n2 000#8103\n3 703#00\n4 703#00"
+    assert [line[0] for line in broken(Rules(no_reboot=True), text)] == ["4"]
+
+
+def test_a_second_that_is_too_busy_is_found_when_it_is_over() -> None:
+    busy = "\n".join(f"{n / 100:.2f} 181#" for n in range(100))
+    assert broken(Rules(max_load=49.5), f"{busy}\n1.5 181#", bit_rate=10_000) == [
+        "0 can0: load 50.0 %, at most 49.5 % is right"
+    ]
+    assert broken(Rules(max_load=50), f"{busy}\n1.5 181#", bit_rate=10_000) == []
+
+
+def test_a_second_that_is_not_over_is_judged_at_the_end() -> None:
+    assert len(broken(Rules(max_load=0), "1 181#", bit_rate=10_000)) == 1
+
+
+def test_a_load_without_a_bit_rate_is_refused() -> None:
+    with pytest.raises(ValueError, match="a limit of the load needs the bit rate: give -b"):
+        Checker(Rules(max_load=50))
+
+
+def test_what_was_lost_is_a_finding_of_its_rule_alone() -> None:
+    assert len(Checker(Rules(no_loss=True)).end(0, ["12 frames"])) == 1
+    assert Checker(Rules(no_emcy=True)).end(0, ["12 frames"]) == []
