@@ -18,6 +18,7 @@ VERBS: Final[dict[str, str]] = {
     "send": "send",
     "seq": "seq",
     "play": "play",
+    "graph": "graph",
 }
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.eds_option import eds_option, read_eds_option
+from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -75,7 +75,7 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame]:
             texts[-1] += f" {word}"
         else:
             texts.append(word)
-    named = PdoWords(read_eds_option(eds))
+    named = PdoWords(read_eds_files(eds))
     try:
         return [CanFrame.parse(text) if "#" in text else named.frame(text) for text in texts]
     except (ValueError, WireError) as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.eds_option import eds_option, read_eds_option
+from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.watch import Watch
@@ -62,7 +62,7 @@ def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> 
     """  # noqa: D301 - click wants the backspace
     variables, eds = options.pop("variables"), options.pop("eds")
     dry_run, quiet = options.pop("dry_run"), options.pop("quiet")
-    watch = Watch(read_eds_option(eds))
+    watch = Watch(read_eds_files(eds))
     sequence = _read(file, variables, watch)
     if dry_run:
         click.echo("\n".join(steps.outline(sequence.steps)))

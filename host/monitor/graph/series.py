@@ -5,7 +5,9 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
+from itertools import islice
 from math import isfinite
+from operator import le
 
 
 @dataclass(slots=True)
@@ -47,6 +49,15 @@ class Series:
         self.values.append(value)
         if self.most and len(self.at_us) >= 2 * self.most:
             del self.at_us[: -self.most], self.values[: -self.most]
+
+    def extend(self, at_us: bytes, values: bytes) -> None:
+        """Add many samples to an empty series: 64-bit numbers and doubles of this machine."""
+        times, numbers = array("q", at_us), array("d", values)
+        if all(map(isfinite, numbers)) and all(map(le, times, islice(times, 1, None))):
+            self.at_us, self.values = times, numbers
+            return
+        for time_us, value in zip(times, numbers, strict=True):
+            self.append(time_us, value)
 
     def clear(self) -> None:
         """Forget the samples."""

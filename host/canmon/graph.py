@@ -1,0 +1,175 @@
+"""The verb `graph`: curves of signals, in the terminal and in files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.host.canmon.decode_options import eds_option, make_decoder
+from tickrig.host.canmon.ending import report, until_interrupted
+from tickrig.host.canmon.failure import SourceFailed
+from tickrig.host.canmon.graph_file import write_graph
+from tickrig.host.canmon.graph_request import GraphRequest
+from tickrig.host.canmon.pace import Pace
+from tickrig.host.canmon.screen import Screen
+from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source_word import FileWord, parse_source
+from tickrig.host.canmon.stopwatch import Stopwatch
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.graph.collector import Collector
+from tickrig.host.monitor.graph.frame_slice import FrameSlice
+from tickrig.host.monitor.graph.plot import render
+from tickrig.host.monitor.graph.series import Series
+from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
+from tickrig.host.monitor.graph.view import View
+from tickrig.host.monitor.logs.log_reader import LogError
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.logs.columns import Columns
+
+POLL_US: Final = 20_000
+PAINT_US: Final = 100_000
+MOST: Final = 2_000_000
+"""Samples of a signal that are kept of a bus."""
+
+SIZE: Final = (100, 28)
+"""Columns and lines where there is no terminal."""
+
+
+@click.command(cls=BusCommand)
+@click.argument("source")
+@click.argument("signals", nargs=-1, required=True, metavar="SIGNAL...")
+@eds_option
+@click.option("-o", "files", multiple=True, type=PATH, metavar="FILE", help=".svg .html .png .csv")
+@click.option("--from", "from_", metavar="TIME", help="Begin 3s after the first sample.")
+@click.option("--to", metavar="TIME", help="End 9s after the first sample.")
+@click.option("--at", metavar="TIME", help="Read out the values there.")
+@click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
+@click.option("--size", metavar="WxH", default="960x400", help="Of a picture; 960x400 pixels.")
+@click.option("--window", metavar="TIME", default="10s", help="Shown of a bus; 10s.")
+@click.option("--for", "span", metavar="TIME", help="Leave a bus after this time.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@bus_options
+def command(source: str, signals: Sequence[str], **options: Any) -> None:
+    """Draw curves of SOURCE: in the terminal, or to files.
+
+    A SIGNAL is an object, as 3.velocity_actual_value or 3.statusword.fault
+    (names of the EDS, or of what SDO traffic told), or a slice of a frame, as
+    ID[BYTES]TYPE*FACTOR+OFFSET: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5; TYPE
+    is u, s or f, with b behind it big-endian. LABEL= before it names it, @2
+    behind it takes another axis. A spike never vanishes: each column shows its
+    least and greatest value.
+
+    \b
+    canmon graph run.log '181[2:6]s*0.001'
+    canmon graph run.blf 'speed=181[2:6]s*0.001' '281[0:2]@2' -o g.svg -o g.csv
+    canmon graph can0 3.velocity_actual_value --eds 3=drive.eds --window 5s
+
+    A bus is drawn live; q or Ctrl-C ends that.
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    request = GraphRequest.of(options)
+    try:
+        words = [parse_signal(text) for text in signals]
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    decoder, strict = make_decoder(options.pop("eds")), options.pop("strict")
+    columns = _columns(source, words)
+    if columns is not None:
+        collector = Collector(words)
+        collector.take_columns(columns)
+        click.echo("".join(f"{word}\n" for word in columns.tally.words(source)), err=True, nl=False)
+        _show(collector.series, request)
+        return
+    frames = open_source([source], BusOptions(**options))
+    collector = Collector(words, decoder, MOST if frames.live else 0)
+    try:
+        with until_interrupted():
+            _collect(frames, collector, request)
+        _show(collector.series, request)
+    finally:
+        frames.close()
+    report(frames, strict)
+
+
+def _columns(source: str, words: Sequence[SignalWord]) -> Columns | None:
+    """Return the log as columns where that is all it takes: slices, and numpy."""
+    log = parse_source(source)
+    slices = all(isinstance(word.source, FrameSlice) for word in words)
+    if not (slices and isinstance(log, FileWord) and log.chosen is None and find_spec("numpy")):
+        return None
+    from tickrig.host.monitor.logs.column_reader import read_columns  # noqa: PLC0415 - an extra
+
+    try:
+        return read_columns(log.path)
+    except OSError as error:
+        raise SourceFailed(f"{log.path}: {error.strerror}") from error
+    except LogError as error:
+        raise SourceFailed(str(error)) from error
+
+
+def _collect(frames: Source, collector: Collector, request: GraphRequest) -> None:
+    """Take what comes; live, paint it where there is a terminal."""
+    if frames.live and sys.stdout.isatty():
+        with Screen() as screen:
+            _watch(frames, collector, request, screen)
+        return
+    pace = Pace()
+    while not (frames.ended or _is_over(pace, request)):
+        for heard in frames.poll(POLL_US):
+            collector.take(heard)
+
+
+def _watch(frames: Source, collector: Collector, request: GraphRequest, screen: Screen) -> None:
+    pace, watch, due_us = Pace(), Stopwatch(), 0
+    pressed: list[str] = []
+    while not (frames.ended or "q" in pressed or _is_over(pace, request)):
+        pressed = screen.keys()
+        heards = frames.poll(POLL_US)
+        watch.take(heards)
+        for heard in heards:
+            collector.take(heard)
+        if pace.now_us >= due_us:
+            due_us = pace.now_us + PAINT_US
+            screen.paint(_live(collector.series, request, watch.now_us, screen.size()))
+
+
+def _live(
+    series: Sequence[Series], request: GraphRequest, now_us: int, size: tuple[int, int]
+) -> list[str]:
+    view = View(now_us - request.window_us, now_us, request.ranges, None, now_us)
+    width, height = size
+    return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
+
+
+def _is_over(pace: Pace, request: GraphRequest) -> bool:
+    return request.span_us is not None and pace.now_us >= request.span_us
+
+
+def _show(series: Sequence[Series], request: GraphRequest) -> None:
+    """Write the files, else print the picture; say what has no samples."""
+    for one in series:
+        if not one:
+            click.echo(f"{one.label}: no samples", err=True)
+        if one.not_numbers:
+            click.echo(f"{one.label}: {one.not_numbers} samples are no numbers", err=True)
+    view = request.view(series)
+    for file in request.files:
+        write_graph(file, series, view, request.size)
+    if not request.files:
+        width, height = shutil.get_terminal_size(SIZE)
+        colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+        lines = render(series, view, width, min(height - 1, SIZE[1]), colour=colour)
+        click.echo("\n".join(line.rstrip() for line in lines))
+
+
+command.help = (command.help or "").replace("{source}", SOURCE_HELP)
