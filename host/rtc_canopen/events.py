@@ -69,6 +69,9 @@ class Event:
         )
 
 
+Listener = Callable[[Event], None]
+
+
 class EventLog:
     """The events of a server, the latest last.
 
@@ -78,7 +81,7 @@ class EventLog:
 
     def __init__(self) -> None:
         self._events: deque[Event] = deque(maxlen=KEPT)
-        self.listeners: list[Callable[[Event], None]] = []
+        self.listeners: list[Listener] = []
 
     @property
     def events(self) -> tuple[Event, ...]:

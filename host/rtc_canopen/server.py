@@ -57,6 +57,7 @@ class Server:
         log: what happened.
         connections: connectors through the PC.
         links: PDO links.
+        now_us: the time it was told last.
         due_us: when `tick` has something to do.
     """
 
@@ -68,7 +69,7 @@ class Server:
     ) -> None:
         self.definition, self.manager = definition, manager or Manager()
         self.log, self._out = EventLog(), list[CanFrame]()
-        self._now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
+        self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
         self._started, self._heartbeat_us, self._foreign_us = False, NEVER, -QUIET_US
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
@@ -83,7 +84,7 @@ class Server:
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Take what was heard; do what is due; return what is to be sent."""
-        self._now_us = now_us
+        self.now_us = now_us
         if not self._started:
             self._start()
         self._hear_bus()
@@ -107,7 +108,7 @@ class Server:
 
     def stop(self, now_us: int) -> Frames:
         """End all proxies, and leave the nodes as the definition says (K14, finalize)."""
-        self._now_us = now_us
+        self.now_us = now_us
         for node in self.nodes.values():
             node.dialogue.clear()
             self.gone(node)
@@ -120,7 +121,7 @@ class Server:
     def bus_state(self, state: ErrorState, /) -> None:
         """Tell what its CAN controller reports; it is seen to in the next tick."""
         self._bus_states.append(state)
-        self.due_us = self._now_us
+        self.due_us = self.now_us
 
     def put(self, name: str, value: Struct) -> ReturnCode:
         """Send a value to a device past all connectors, by the full name of an InPort.
@@ -142,7 +143,7 @@ class Server:
 
     def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
         """Take an event."""
-        self.log.note(self._now_us, kind, node, text)
+        self.log.note(self.now_us, kind, node, text)
 
     def send(self, can_id: int, data: bytes, /) -> None:
         """Send a frame with this tick's traffic."""
@@ -158,7 +159,7 @@ class Server:
         if node.proxy is None:
             self._make_proxy(node)
         node.to_start = node.to_start or self.definition.start.autoactivate
-        self.links.make(self._now_us, node.entry.id)
+        self.links.make(self.now_us, node.entry.id)
 
     def gone(self, node: ServedNode, /) -> None:
         """Remove the proxy of a node."""
@@ -179,14 +180,14 @@ class Server:
 
     def _start(self) -> None:
         self._started = True
-        self.manager.tick(self._now_us)
+        self.manager.tick(self.now_us)
         self.manager.run_context(self._context)
         self._context.start()
         self._error_control(NmtState.INITIALISING)
         if self.definition.master.heartbeat_ms:
-            self._heartbeat_us = self._now_us + 1_000 * self.definition.master.heartbeat_ms
+            self._heartbeat_us = self.now_us + 1_000 * self.definition.master.heartbeat_ms
         for node in self.nodes.values():
-            node.look(self._now_us)
+            node.look(self.now_us)
 
     def _make_proxy(self, node: ServedNode) -> None:
         proxy = node.proxy = ProxyRtc(node.entry, node.layouts)
@@ -233,9 +234,9 @@ class Server:
         elif node is None:
             return
         elif can_id in ERROR_CONTROL:
-            node.hear_error_control(self._now_us, frame.data)
+            node.hear_error_control(self.now_us, frame.data)
         elif can_id in SDO_RESPONSES:
-            node.hear_sdo(self._now_us, frame.data)
+            node.hear_sdo(self.now_us, frame.data)
         elif can_id in EMERGENCY:
             self._hear_emergency(node, frame.data)
 
@@ -245,7 +246,7 @@ class Server:
                 text = f"{source.layout.name}: {len(frame.data)} of {source.layout.size} bytes"
                 self.note(EventKind.PDO_TOO_SHORT, node.entry.id, text)
             elif node.proxy is not None and node.proxy.passing:
-                source.receive(self._now_us, frame.data)
+                source.receive(self.now_us, frame.data)
 
     def _hear_command(self, data: bytes) -> None:
         if len(data) != 2:
@@ -256,13 +257,13 @@ class Server:
         self.note(EventKind.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
         for node in self.nodes.values():
             if node_id in (ALL_NODES, node.entry.id):
-                node.hear_foreign(self._now_us, command)
+                node.hear_foreign(self.now_us, command)
 
     def _hear_master(self) -> None:
-        if self._now_us - self._foreign_us >= QUIET_US:
+        if self.now_us - self._foreign_us >= QUIET_US:
             node_id = self.definition.master.node
             self.note(EventKind.FOREIGN_MASTER, node_id, "another node has the node-ID of ours")
-        self._foreign_us = self._now_us
+        self._foreign_us = self.now_us
 
     def _hear_emergency(self, node: ServedNode, data: bytes) -> None:
         try:
@@ -280,21 +281,21 @@ class Server:
             if state is ErrorState.BUS_OFF:
                 self.note(EventKind.BUS_OFF, 0, "the server can neither hear nor send")
                 for node in self.nodes.values():
-                    node.fail(self._now_us)
+                    node.fail(self.now_us)
             elif state is ErrorState.ACTIVE:
                 self.note(EventKind.BUS_ON, 0)
 
     def _tick_nodes(self) -> None:
         self._nodes_due_us = NEVER
         for node in self.nodes.values():
-            if node.due_us <= self._now_us:
-                node.tick(self._now_us)
+            if node.due_us <= self.now_us:
+                node.tick(self.now_us)
         self._nodes_due_us = min(node.due_us for node in self.nodes.values())
 
     def _carry_out(self) -> None:
         for node in self.nodes.values():
             if node.proxy is not None:
-                node.carry_out(self._now_us)
+                node.carry_out(self.now_us)
                 self._note_state(node, node.proxy)
 
     def _note_state(self, node: ServedNode, proxy: ProxyRtc) -> None:
@@ -338,7 +339,7 @@ class Server:
         return ReturnCode.RTC_OK
 
     def _send_heartbeat(self) -> None:
-        if self._now_us >= self._heartbeat_us:
+        if self.now_us >= self._heartbeat_us:
             self._heartbeat_us += 1_000 * self.definition.master.heartbeat_ms
             self._error_control(NmtState.OPERATIONAL)
 

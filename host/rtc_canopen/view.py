@@ -1,0 +1,217 @@
+"""A running server as tools see it: what is there, and what can be done."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+from tickrig.host.rtc.data_port import DataPort, OutPort
+from tickrig.host.rtc.port import AnyPort
+from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, SystemDefinition
+from tickrig.host.rtc_canopen.dialogue import Failure, Job
+from tickrig.host.rtc_canopen.errors import ServerRefused
+from tickrig.host.rtc_canopen.events import Event
+from tickrig.host.rtc_canopen.script import Script
+from tickrig.host.rtc_canopen.sdo_transfer import download, upload
+from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.server import Server
+
+NOT_HEARD: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class PortView:
+    """A port of a proxy.
+
+    Attributes:
+        name: full name, as `Palette0.ai`.
+        data_type: name of its type, as `TimedShort`.
+        out: it gives data.
+        peers: full names of the ports that it is connected with.
+    """
+
+    name: str
+    data_type: str
+    out: bool
+    peers: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PdoView:
+    """A PDO of a device that is on.
+
+    Attributes:
+        name: as `16.tpdo2`.
+        cob_id: its CAN-ID.
+        bits: its length.
+    """
+
+    name: PdoName
+    cob_id: int
+    bits: int
+
+
+@dataclass(frozen=True, slots=True)
+class NodeView:
+    """A node and its proxy.
+
+    Attributes:
+        nmt_state: as `OPERATIONAL`, empty before it was heard.
+        heartbeat_age_us: since it was heard, `NOT_HEARD` before.
+        proxy_state: as `ACTIVE`, empty without a proxy.
+        problem: why it is refused, empty while all is well.
+    """
+
+    node_id: int
+    name: str
+    role: Role
+    phase: Phase
+    nmt_state: str
+    heartbeat_age_us: int
+    proxy_state: str
+    problem: str
+    ports: tuple[PortView, ...]
+    pdos: tuple[PdoView, ...]
+
+
+class Transfer:
+    """An SDO transfer that somebody waits for.
+
+    Attributes:
+        done: it has ended.
+        data: what was read; empty after a write.
+        problem: why it failed, empty if it did not.
+    """
+
+    def __init__(self) -> None:
+        self.done, self.data, self.problem = False, b"", ""
+
+    def succeed(self, data: bytes | None) -> None:
+        """Take the result."""
+        self.done, self.data = True, data or b""
+
+    def fail(self, failure: Failure | str) -> None:
+        """Take what went wrong."""
+        self.done, self.problem = True, str(failure)
+
+    def drop(self) -> None:
+        """Take that the server had to do something else first."""
+        self.fail("given up: the node was reset, stopped or lost")
+
+
+class ServerView:
+    """Looks at a server and commands it, between its ticks and in its thread.
+
+    Commands return at once; what comes of them shows in the states and events.
+
+    Args:
+        server: the server.
+    """
+
+    def __init__(self, server: Server) -> None:
+        self._server = server
+
+    @property
+    def nodes(self) -> tuple[NodeView, ...]:
+        """All nodes, in the order of the definition."""
+        return tuple(self._view(node) for node in self._server.nodes.values())
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened, the latest last."""
+        return self._server.log.events
+
+    @property
+    def links(self) -> tuple[PdoLink, ...]:
+        """PDO links that are wanted."""
+        return tuple(self._server.links.links)
+
+    def node(self, node_id: int) -> NodeView:
+        """Return one node; ServerRefused if there is none."""
+        return self._view(self._node(node_id))
+
+    def activate(self, name: str) -> None:
+        """Ask for Active; RtcRefused if the proxy or component cannot."""
+        self._server.manager.activate(name)
+
+    def deactivate(self, name: str) -> None:
+        """Ask for Inactive; RtcRefused if the proxy or component cannot."""
+        self._server.manager.deactivate(name)
+
+    def reset(self, name: str) -> None:
+        """Ask for Error to Inactive; RtcRefused if the proxy or component cannot."""
+        self._server.manager.reset(name)
+
+    def start(self) -> None:
+        """Activate all nodes in the start order."""
+        self._server.start()
+
+    def boot(self, node_id: int) -> None:
+        """Set a node up again, one that was refused, too; its proxy is made anew."""
+        self._node(node_id).boot(self._server.now_us)
+
+    def connect(self, first: str, second: str, properties: Mapping[str, str] | None = None) -> None:
+        """Join two ports through the PC; RtcRefused if they do not fit."""
+        self._server.manager.connect(first, second, properties)
+
+    def disconnect(self, first: str, second: str) -> None:
+        """End such a connector; RtcRefused if there is none."""
+        self._server.manager.disconnect(first, second)
+
+    def link(self, source: PdoName, target: PdoName) -> None:
+        """Let an RPDO receive a TPDO without the PC; ServerRefused if they do not fit."""
+        self._server.links.add(self._server.now_us, PdoLink(source, target))
+
+    def read(self, node_id: int, index: int, sub: int) -> Transfer:
+        """Read an object of a device; ServerRefused if there is no such node."""
+        return self._transfer(node_id, upload(index, sub))
+
+    def write(self, node_id: int, index: int, sub: int, data: bytes) -> Transfer:
+        """Write an object of a device; ServerRefused if there is no such node."""
+        return self._transfer(node_id, download(index, sub, data))
+
+    def definition(self) -> SystemDefinition:
+        """Return the definition with connections and links as they are now."""
+        return replace(
+            self._server.definition,
+            pdo_links=self.links,
+            rt_connections=self._server.connections.all,
+        )
+
+    def _node(self, node_id: int) -> ServedNode:
+        if (node := self._server.nodes.get(node_id)) is None:
+            known = ", ".join(map(str, self._server.nodes))
+            raise ServerRefused(f"node {node_id} is none of: {known}")
+        return node
+
+    def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> Transfer:
+        transfer = Transfer()
+        job = Job("transfer", script, transfer.succeed, transfer.fail, transfer.drop)
+        self._node(node_id).run(self._server.now_us, job)
+        return transfer
+
+    def _view(self, node: ServedNode) -> NodeView:
+        state, proxy = node.nmt_state, node.proxy
+        return NodeView(
+            node.entry.id,
+            node.entry.name,
+            node.entry.role,
+            node.phase,
+            "" if state is None else state.name,
+            NOT_HEARD if state is None else self._server.now_us - node.heard_us,
+            "" if proxy is None else proxy.state.name,
+            node.problem,
+            tuple(_port(port) for port in proxy.ports.values()) if proxy else (),
+            tuple(
+                PdoView(PdoName(node.entry.id, pdo.name), pdo.cob_id, pdo.bits)
+                for pdo in node.layouts
+            ),
+        )
+
+
+def _port(port: AnyPort) -> PortView:
+    assert isinstance(port, DataPort)
+    ends = (end for connector in port.connectors for end in connector.profile.ports)
+    peers = tuple(end for end in ends if end != port.full_name)
+    return PortView(port.full_name, port.data_type.__name__, isinstance(port, OutPort), peers)
