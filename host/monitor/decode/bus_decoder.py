@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.eds_objects import EdsObjects
 from tickrig.host.monitor.decode.lss_messages import decode_lss
-from tickrig.host.monitor.decode.memory import DEVICE_TYPE, NodeMemory
+from tickrig.host.monitor.decode.memory import DEVICE_TYPE, HEARTBEAT_TIME, NodeMemory
 from tickrig.host.monitor.decode.network_services import (
     decode_emcy,
     decode_error_control,
@@ -114,7 +114,7 @@ class BusDecoder:
         return partial(self._sdo, node, take)
 
     def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
-        guarded = node in self._guarded
+        guarded = node in self._guarded and not self.memory(node).number(*HEARTBEAT_TIME)
         decoded = decode_error_control(node, frame, guarded=guarded)
         if frame.remote:
             self._guarded.add(node)

@@ -13,9 +13,11 @@ from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 STORE: Final = 0x1010
 SAVE: Final = b"save"
 DEVICE_TYPE: Final = (0x1000, 0)
+HEARTBEAT_TIME: Final = (0x1017, 0)
 STATUSWORD: Final = (0x6041, 0)
 STATUSWORD_BYTES: Final = 2
 DRIVE_PROFILE: Final = 402
+SEVERAL_PROFILES: Final = 0xFFFF
 DRIVE_WORDS: Final = (0x6040, 0x6041)
 COMMUNICATION: Final = range(0x1000, 0x2000)
 """Objects that say how the others travel."""
@@ -87,11 +89,11 @@ class NodeMemory:
     def is_drive(self) -> bool:
         """Whether it is a drive of CiA 402.
 
-        Its device type says so; where that is not known, 6041h:00 with 16 bits does, which no
-        other profile has.
+        Its device type says so; where that is not known or has several profiles, 6041h:00 with
+        16 bits does.
         """
         device_type = self.number(*DEVICE_TYPE)
-        if device_type is None:
+        if device_type is None or device_type >> 16 == SEVERAL_PROFILES:
             return self._has_statusword
         return device_type & 0xFFFF == DRIVE_PROFILE
 

@@ -24,14 +24,14 @@ def decode_nmt(at_us: int, frame: CanFrame) -> Decoded:
     """Decode a command of the NMT master.
 
     >>> decode_nmt(0, CanFrame.parse("000#0105")).text
-    'start node 5'
+    'start, node 5'
     """
     data = frame.data
     if len(data) != 2 or data[1] > HIGHEST_NODE or data[0] not in _COMMANDS:
         return Decoded("nmt", None, f"no NMT command: {_dump(frame)}")
     command, node = NmtCommand(data[0]), data[1]
     whom = "all nodes" if node == ALL_NODES else f"node {node}"
-    text = f"{_words(command.name)} {whom}"
+    text = f"{_words(command.name)}, {whom}"
     return Decoded("nmt", node or None, text, (Signal("command", data[0]),))
 
 

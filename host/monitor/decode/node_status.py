@@ -8,7 +8,7 @@ from statistics import median
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.memory import NodeMemory
+from tickrig.host.monitor.decode.memory import HEARTBEAT_TIME, NodeMemory
 from tickrig.host.monitor.decode.network_services import nmt_state_name
 from tickrig.host.monitor.decode.transfer import Outcome, Transfer
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
@@ -17,7 +17,6 @@ EMCY_KEPT: Final = 16
 GAPS_KEPT: Final = 9
 LATE: Final = 1.5
 """A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
-HEARTBEAT_TIME: Final = (0x1017, 0)
 DEVICE_NAME: Final = (0x1008, 0)
 
 _TARGETS: Final = {
@@ -122,7 +121,7 @@ class NodeStatus:
         """Take its boot-up: it is pre-operational then (CiA 301, boot-up)."""
         self.boots += 1
         self.unasked_boots += self._heard and not self._reset_asked
-        self._reset_asked = False
+        self._reset_asked, self.drive_state, self.error_code = False, "", 0
         self._gaps.clear()
         self._tell(at_us, NmtState.PRE_OPERATIONAL)
 

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.host.monitor.decode.drive_trace import GOLDEN
+from tests.host.monitor.decode.traces import trace
+from tickrig.host.monitor.decode.dbc_file import DbcError
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.filter import parse_filter
+
+DBC = GOLDEN / "engine.dbc"
+
+
+def said(text: str) -> Decoded:
+    (heard,) = trace(text)
+    return Decoder(dbc=[DBC]).take(heard)
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        ("123#E8030100", "Engine Speed=500.0rpm Gear=first"),
+        ("123#E8030500", "Engine Speed=500.0rpm Gear=5"),
+        ("123#E803", "Engine Speed=500.0rpm"),
+        ("123#R", "Engine asked for by RTR"),
+        ("18FF0001#05", "Wide Mux=0 Level=5%"),
+        ("18FF0001#25", "Wide: expected multiplexer id 0, but got 2"),
+    ],
+)
+def test_a_dbc_file_names_signals(frame: str, text: str) -> None:
+    decoded = said(frame)
+    assert (decoded.kind, decoded.source, decoded.text) == ("dbc", "dbc", text)
+
+
+def test_what_a_dbc_file_does_not_name_is_decoded_as_ever() -> None:
+    assert said("705#05").kind == "heartbeat"
+    assert said("00000123#05").kind == "raw"
+
+
+def test_a_filter_asks_for_signals_of_a_dbc_file() -> None:
+    (heard,) = trace("123#E8030100")
+    assert parse_filter("dbc and Speed > 499 and Gear = first").matches(heard, said("123#E8030100"))
+
+
+def test_a_file_that_is_no_dbc_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bad.dbc"
+    path.write_text("BO_ x")
+    with pytest.raises(DbcError, match=r"bad.dbc is no DBC: DBC: \"Invalid syntax at line 1"):
+        Decoder(dbc=[path])
+
+
+def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        Decoder(dbc=[tmp_path / "none.dbc"])
+
+
+def test_without_cantools_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cantools", None)
+    with pytest.raises(DbcError, match=r"tickrig\[dbc\]"):
+        Decoder(dbc=[DBC])

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.host.monitor.decode.traces import last
+from tickrig.host.monitor.decode.eds_objects import EdsError, read_eds
+from tickrig.wire.canopen.datatypes import DataType
+
+EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
+
+
+def test_an_eds_gives_names_types_and_power_on_values() -> None:
+    eds = read_eds(EPOS, 5)
+    text = eds.texts[0x6064, 0]
+    assert (text.name, text.kind, text.source) == (
+        "position_actual_value",
+        DataType.INTEGER32,
+        "eds",
+    )
+    assert eds.values[0x1800, 1][:2] == bytes.fromhex("8501")
+    assert eds.name == "EPOS"
+
+
+def test_a_pdo_by_the_mapping_of_an_eds_is_named_and_so_is_its_source() -> None:
+    decoded = last("185#3702D2040000", {5: read_eds(EPOS, 5)})
+    assert (decoded.kind, decoded.source) == ("tpdo1", "eds")
+    assert decoded.signals[0].text == "0x0237[operation enabled]"
+
+
+def test_units_and_factors_of_an_eds_are_used(tmp_path: Path) -> None:
+    path = tmp_path / "unit.eds"
+    path.write_text(
+        "[FileInfo]\nFileName=unit.eds\n[DeviceInfo]\nProductName=\n[MandatoryObjects]\n"
+        "SupportedObjects=1\n1=0x2001\n[2001]\nParameterName=Motor speed\nObjectType=0x7\n"
+        "DataType=0x0003\nAccessType=rw\nPDOMapping=1\nFactor=0.1\nUnit=rpm\n"
+    )
+    eds = read_eds(path, 5)
+    assert eds.name == "unit"
+    assert last("585#4B01200064000000", {5: eds}).text.startswith(
+        "upload 2001h:00 motor_speed = 10rpm"
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["no EDS at all", "[DeviceInfo]\n", "[DeviceInfo]\n[2001]\nObjectType=0x7\n"]
+)
+def test_a_file_that_is_no_eds_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bad.eds"
+    path.write_text(text)
+    with pytest.raises(EdsError, match=r"bad\.eds is no EDS: "):
+        read_eds(path, 5)
+
+
+def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_eds(tmp_path / "none.eds", 5)
