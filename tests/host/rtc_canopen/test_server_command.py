@@ -1,0 +1,82 @@
+"""The command line of the server."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import can
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.host.rtc_canopen.bench import EDS
+from tickrig.host.rtc_canopen.commands.server import main
+
+PALETTE = f"nodes: [{{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}]\n"
+
+
+def run(file: Path, *words: str) -> Result:
+    return CliRunner().invoke(main, [str(file), *words])
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "robot.yaml"
+    path.write_text(PALETTE, "utf-8")
+    return path
+
+
+def test_a_file_is_checked_without_a_bus(file: Path) -> None:
+    result = run(file, "--check")
+    assert (result.exit_code, result.output) == (0, f"{file}: 1 nodes, no mistake found\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"nodes: [{id: 200, name: A, eds: a.eds}]", "line 1: id: 200 is not a whole number"),
+        (b"nodes: [{id: 1, name: A, eds: a.eds}]", "a.eds: No such file or directory"),
+        (b"\xff", "byte 0 is not UTF-8"),
+        (None, "No such file or directory"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_one_line(
+    tmp_path: Path, content: bytes | None, reason: str
+) -> None:
+    path = tmp_path / "robot.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    result = run(path, "--check")
+    assert result.exit_code == 2
+    assert reason in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--for", "soon"), "--for: 'soon' is not a time: write 1.5s, 200ms or 250us"),
+        (("-i", "carrier-pigeon"), "-i 'carrier-pigeon' is none of python-can"),
+        (("-i", "virtual", "-c", "x", "--log", "/none/x"), "--log /none/x: No such file"),
+    ],
+)
+def test_an_option_that_cannot_be_is_one_line(
+    file: Path, words: tuple[str, ...], reason: str
+) -> None:
+    result = run(file, *words)
+    assert result.exit_code == 2
+    assert reason in result.stderr
+
+
+@pytest.mark.realtime
+def test_it_looks_for_its_nodes_on_the_bus_of_the_file(file: Path, tmp_path: Path) -> None:
+    file.write_text(f"{PALETTE}bus: {{interface: virtual, channel: rtc}}\n", "utf-8")
+    log = tmp_path / "events.jsonl"
+    with can.Bus(interface="virtual", channel="rtc") as other:
+        other.send(can.Message(arbitration_id=0x77F, data=[5], is_extended_id=False))
+        result = run(file, "--for", "50ms", "--start", "--log", str(log))
+        assert result.exit_code == 0, result.output
+        heard = [other.recv(1) for _ in range(3)]
+    assert [message.arbitration_id for message in heard if message] == [0x77F, 0x610, 0x000]
+    assert "1 nodes on virtual rtc. Ctrl-C ends." in result.stderr
+    assert all(json.loads(line)["event"] for line in log.read_text("utf-8").splitlines())

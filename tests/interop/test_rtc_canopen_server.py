@@ -1,0 +1,98 @@
+"""The RTC-CANopen server in one process, its nodes in another, as users start them."""
+
+from __future__ import annotations
+
+import json
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.interop.buses import Bus
+from tests.interop.slave import Slave, running
+
+pytestmark = pytest.mark.realtime
+
+PROGRAM = (
+    "from tickrig.host.rtc_canopen.commands.server import main;"
+    " main(prog_name='rtc-canopen-server')"
+)
+EDS = Path(__file__).parents[2] / "examples" / "eds"
+DEFINITION = f"""
+nodes:
+- {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}
+- {{id: 32, name: Motor0, eds: {EDS}/motor-core-unit.eds, role: device}}
+pdo_links: [{{from: 16.tpdo2, to: 32.rpdo2}}]
+start: {{order: [32, 16], autoactivate: true}}
+"""
+PATIENCE_S = 20.0
+
+
+class Server:
+    """A running server, and the events that it tells."""
+
+    def __init__(self, bus: Bus, file: Path) -> None:
+        file.write_text(DEFINITION, "utf-8")
+        words = [str(file), *bus.arguments, "--quiet", "--log", "-"]
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", "-c", PROGRAM, *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._lines: queue.Queue[str] = queue.Queue()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def wait_for(self, kind: str, node: int, text: str | None = None) -> None:
+        while True:
+            event = json.loads(self._lines.get(timeout=PATIENCE_S))
+            if (event["event"], event["node"]) == (kind, node) and text in (None, event["text"]):
+                return
+
+    def end(self, number: signal.Signals = signal.SIGINT) -> int:
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        code = self.process.wait(PATIENCE_S)
+        self._reader.join(PATIENCE_S)
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream is not None:
+                stream.close()
+        return code
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._lines.put(line)
+
+
+@pytest.fixture
+def nodes(bus: Bus) -> Iterator[Slave]:
+    with running(bus, "--node", "16=f-palette", "--node", "32=motor-core-unit") as child:
+        yield child
+
+
+@pytest.fixture
+def server(bus: Bus, nodes: Slave, tmp_path: Path) -> Iterator[Server]:
+    server = Server(bus, tmp_path / "robot.yaml")
+    yield server
+    server.end(signal.SIGKILL)
+
+
+def test_nodes_are_set_up_started_lost_and_found(nodes: Slave, server: Server) -> None:
+    server.wait_for("PdoLinked", 32)
+    server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+    nodes.wait_for("16/state", "Operational")
+    nodes.wait_for("32/state", "Operational")
+    nodes.set("16/unplugged", 1)
+    server.wait_for("HeartbeatLost", 16)
+    server.wait_for("ProxyRemoved", 16)
+    nodes.set("16/unplugged", 0)
+    server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+    assert server.end() == 0
+    nodes.wait_for("32/state", "Pre-operational")
