@@ -14,11 +14,11 @@ VERBS: Final[dict[str, str]] = {
     "conv": "conv",
     "info": "info",
     "top": "top",
+    "check": "check",
     "nodes": "nodes",
     "send": "send",
     "seq": "seq",
     "play": "play",
-    "graph": "graph",
 }
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 
