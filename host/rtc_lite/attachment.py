@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from tickrig.host.link import NEVER, Link
@@ -115,7 +115,8 @@ class Attachment:
             self._look_us += self.settings.look_period_us
 
     def _return(self) -> None:
-        """Make a new proxy for a device that has answered."""
+        """Make a new proxy for a device that has answered, and so need not be waited for."""
+        self.settings = replace(self.settings, boot_us=0)
         try:
             self._tell(EventKind.REDISCOVERED, self.begin())
         except RtcRefused as error:

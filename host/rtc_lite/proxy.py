@@ -103,15 +103,7 @@ class RtcLiteProxy(RtComponent):
     @property
     def profile(self) -> ComponentProfile:
         """The component as it is, with the type of the one on the device."""
-        device = self.device
-        properties = (
-            {}
-            if device is None
-            else {
-                "rtc_lite.type_name": device.type_name,
-                "rtc_lite.context": f"0x{device.context:02X}",
-            }
-        )
+        properties = {} if self.device is None else self.device.properties
         return replace(super().profile, properties=properties)
 
     def tick(self) -> None:
@@ -193,7 +185,7 @@ class RtcLiteProxy(RtComponent):
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Bring the device to Inactive, from whatever state it is in."""
-        for _ in _TO_INACTIVE:  # from Active it takes two steps
+        for _ in _TO_INACTIVE:  # no state is passed twice
             state = self._known_state()
             step = None if state is None else _TO_INACTIVE.get(state)
             if step is None or self._command(step) is ReturnCode.RTC_ERROR:

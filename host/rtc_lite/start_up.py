@@ -26,6 +26,14 @@ class DeviceProfile:
     out_ports: tuple[PortProfile, ...]
     context: ContextType
 
+    @property
+    def properties(self) -> dict[str, str]:
+        """What the profile of its proxy says of it."""
+        return {
+            "rtc_lite.type_name": self.type_name,
+            "rtc_lite.context": f"0x{self.context:02X}",
+        }
+
 
 def start_up(talk: Conversation, boot_us: int) -> DeviceProfile:
     """Bring a device to Inactive, and ask what it is.

@@ -152,3 +152,14 @@ def test_a_proxy_alone_is_an_rt_component_without_pings() -> None:
     assert manager.state_of("Echo0").name == "ACTIVE"
     assert proxy.device_state is not None
     assert proxy.device_state.name == "ACTIVE"
+
+
+def test_a_board_that_is_back_has_booted() -> None:
+    bench = Bench(Echo)
+    bench.attach(0, "Echo", Settings(boot_us=3_000_000, rediscover=True))
+    bench.nodes[0].inputs.set("power_cut", 1)
+    bench.run_for(AWAY_US)
+    bench.nodes[0].inputs.set("power_cut", 0)
+    back_us = bench.rig.now_us
+    bench.run_for(AWAY_US)
+    assert bench.at_us("Rediscovered") - back_us < 1_100_000

@@ -126,3 +126,21 @@ def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], context: ContextT
     assert bench.states() == {"Echo0": "ACTIVE"}
     assert bench.nodes[0].read("state") == "Active"
     assert echoed(bench) == [42]
+
+
+def test_a_count_that_noise_made_larger_swallows_the_pings_and_the_device_is_found_again() -> None:
+    """A node waits for the rest of a frame as long as a PING for its answer (L7, L14)."""
+    bench = Bench(Echo)
+    bench.context.set_rate(1_000_000 / 100_450)  # the phase between two ticks of the node
+    proxy = bench.attach(0, "Echo", Settings(rediscover=True))
+    bench.context.start()
+    bench.manager.activate("Echo0")
+    bench.run_to(250_000)
+    out = OutPort("out", TimedLong)
+    connect(out, proxy.ports["in"])
+    out.write(TimedLong(Time(), 1))
+    bench.links[0].spoil = lambda frame: frame.replace(b"PS\x02\x04", b"PS\x02\x34")
+    bench.run_for(QUIET_US)
+    kinds = [kind for kind, _ in bench.told()]
+    assert kinds == ["FatalError", "Removed", "Rediscovered"]
+    assert bench.states() == {"Echo0": "INACTIVE"}

@@ -12,14 +12,24 @@ from tests.host.rtc_lite.experiment import ALL, JOINTS
 from tickrig.emulators.child import Child, running
 from tickrig.emulators.clock import RealClock
 from tickrig.emulators.control_client import ControlClient
+from tickrig.host.reopening_link import ReopeningLink
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.real_time import RealTime
-from tickrig.host.rtc_lite import ProxyEvent, attach
+from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
 from tickrig.host.serial_link import SerialLink
 
+EMULATOR = "tickrig.emulators.rtc_lite.cli"
 DEADLINE_S = 10.0
 TOLERANCE_US = 100_000
+
+
+def run_until(runner: RealTime, done: Callable[[], bool]) -> None:
+    """Run until something is so."""
+    deadline_s = time.monotonic() + DEADLINE_S
+    while not done():
+        assert time.monotonic() < deadline_s
+        runner.step()
 
 
 class Live:
@@ -31,7 +41,7 @@ class Live:
         self.events: list[ProxyEvent] = []
         self.nodes: list[Child] = []
         for node, name in (("lite-a", "LiteA"), ("lite-b", "LiteB")):
-            child = stack.enter_context(running("tickrig.emulators.rtc_lite.cli", "--node", node))
+            child = stack.enter_context(running(EMULATOR, "--node", node))
             link = stack.enter_context(closing(SerialLink(str(child.link), 57_600)))
             attach(self.manager, link, name, context=context, listener=self.events.append)
             self.nodes.append(child)
@@ -42,11 +52,7 @@ class Live:
         self._runner = RealTime(self.manager, RealClock())
 
     def await_(self, done: Callable[[], bool]) -> None:
-        """Run until something is so."""
-        deadline_s = time.monotonic() + DEADLINE_S
-        while not done():
-            assert time.monotonic() < deadline_s
-            self._runner.step()
+        run_until(self._runner, done)
 
     def activate(self) -> None:
         self.manager.activate(*ALL)
@@ -95,3 +101,21 @@ def test_t3_on_two_ptys(live: Live) -> None:
     fatal_us = live.await_event("FatalError")
     assert fatal_us - cut_us <= 1_400_000 + TOLERANCE_US
     assert live.events[0].instance_name == "LiteB0"
+
+
+@pytest.mark.realtime
+def test_an_emulator_that_is_started_again_is_found_again() -> None:
+    settings = Settings(
+        ping_period_us=100_000, linger_us=0, rediscover=True, look_period_us=100_000
+    )
+    manager, events, paths = Manager(), list[ProxyEvent](), list[str]()
+    runner = RealTime(manager, RealClock())
+    with running(EMULATOR) as child:
+        paths.append(str(child.link))
+        link = ReopeningLink(lambda: SerialLink(paths[-1], 57_600))
+        attach(manager, link, "Echo", settings, listener=events.append)
+    with closing(link), running(EMULATOR) as child:
+        run_until(runner, lambda: manager.components == ())
+        paths.append(str(child.link))
+        run_until(runner, lambda: manager.components != ())
+    assert [event.kind.value for event in events] == ["FatalError", "Removed", "Rediscovered"]
