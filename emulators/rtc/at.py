@@ -1,10 +1,9 @@
-"""Where a running system is asked, and the names that it knows."""
+"""Where a running system is asked."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,27 +58,3 @@ def components(socket: Path, *names: str) -> list[Any]:
     fields: Object = {"names": list(names)} if names else {}
     described: list[Any] = ask_system(socket, "describe", **fields)["components"]
     return described
-
-
-def complete_component(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Complete the name of a component."""
-    return _begun(context, begun, lambda component: [component["name"]])
-
-
-def complete_port(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Complete the full name of a port."""
-    return _begun(context, begun, lambda component: [port["name"] for port in component["ports"]])
-
-
-def _begun(context: click.Context, begun: str, names: Callable[[Any], list[str]]) -> list[str]:
-    return [name for name in _names(context, names) if name.startswith(begun)]
-
-
-def _names(context: click.Context, names: Callable[[Any], list[str]]) -> Iterator[str]:
-    socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
-    try:
-        described = components(Path(socket))
-    except Refused:
-        return
-    for component in described:
-        yield from names(component)

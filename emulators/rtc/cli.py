@@ -22,20 +22,20 @@ def rtc() -> None:
     ConsoleIn0.out or localhost/ConsoleIn0.rtc:out.
 
     \b
-    tickrig rtc run system.toml               in one terminal; in another one
-    tickrig rtc ls -l
+    tickrig rtc run system.toml                      in one terminal
+    tickrig rtc ls -l                                in another one
     tickrig rtc con ConsoleIn0.out ConsoleOut0.in
     tickrig rtc act ConsoleIn0 ConsoleOut0
     tickrig rtc print ConsoleIn0.out
     tickrig rtc inject ConsoleOut0.in 5
 
     Exit status 0; 1 where a component did not get to the state that was asked
-    for; 2 with one line where something was refused, and nothing changed.
+    for; 2 with one line where something was refused.
     """  # noqa: D301 - click wants the backspace
 
 
 @rtc.command()
-@click.argument("system", type=PATH)
+@click.argument("system", type=PATH, required=False)
 @click.option(
     "--control",
     type=PATH,
@@ -68,8 +68,9 @@ def run(lite_boot: str, **options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
     SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
-    System Editor write it. Types that are known: ConsoleIn, ConsoleOut, SeqIn,
-    SeqOut, ConfigSample. What arrives at a ConsoleOut is printed.
+    System Editor write it; without it there is no component at first. Known
+    types: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample. What arrives at
+    a ConsoleOut is printed.
 
     \b
     tickrig rtc run system.toml

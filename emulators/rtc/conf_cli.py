@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, complete_component, components
+from tickrig.emulators.rtc.at import ask_system, at, components
+from tickrig.emulators.rtc.completion import complete_component
 from tickrig.emulators.rtc.texts import configuration_lines
 from tickrig.host.cli.refused import Refused
 

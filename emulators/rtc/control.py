@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from tickrig.emulators.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
+from tickrig.emulators.user_file import told
 from tickrig.host.rtc.configuration import Configuration
 from tickrig.host.rtc.literal import literal
-from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.port import AnyPort
 from tickrig.host.rtc.probes import Probes
 from tickrig.host.rtc.real_time import RealTime
@@ -31,6 +32,7 @@ class SystemControl(Requests):
         super().__init__(
             {
                 "describe": (self._describe, ("names",)),
+                "create": (self._create, ("type", "name", "rate_hz")),
                 "connect": (self._connect, ("ports", "properties", "name")),
                 "disconnect": (self._disconnect, ("ports",)),
                 "activate": (self._move(manager.activate), ("name",)),
@@ -65,6 +67,18 @@ class SystemControl(Requests):
             "components": [describe_component(manager, component) for component in components],
             "types": list(manager.types),
         }
+
+    def _create(self, request: Object) -> Object:
+        type_name, name = text_of(request, "type"), text_of({"name": "", **request}, "name")
+        rate_hz = request.get("rate_hz", DEFAULT_RATE_HZ)
+        if not isinstance(rate_hz, int | float) or isinstance(rate_hz, bool):
+            raise ValueError(f"rate_hz is a number, not {short(rate_hz)}")
+        try:
+            return {"name": self._manager.create(type_name, name, rate_hz).instance_name}
+        except ValueError:
+            raise
+        except Exception as error:  # a user's constructor may raise anything
+            raise ValueError(f"{type_name}: {told(error)}") from error
 
     def _connect(self, request: Object) -> Object:
         first, second = _texts(request, "ports", 2)

@@ -12,7 +12,8 @@ import click
 
 from tickrig.emulators.ask import refused_by
 from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.rtc.at import SYSTEM, at, complete_port, time_us
+from tickrig.emulators.rtc.at import SYSTEM, at, time_us
+from tickrig.emulators.rtc.completion import complete_port
 from tickrig.emulators.rtc.texts import value_line
 
 POLL_S: Final = 0.02

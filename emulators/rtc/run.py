@@ -30,7 +30,7 @@ from tickrig.host.rtc.system import System, restore
 class SystemOptions:
     """The command line of `tickrig rtc run`."""
 
-    system: Path
+    system: Path | None = None
     control: Path
     components: tuple[str, ...] = ()
     lites: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ def run_system(options: SystemOptions) -> None:
     Raises:
         Refused: the command line asks for something that cannot be done.
     """
-    system = read_system(options.system)
+    system = System() if options.system is None else read_system(options.system)
     if options.save is not None:
         file_format(options.save)
     manager = Manager()

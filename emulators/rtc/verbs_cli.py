@@ -8,19 +8,14 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.rtc.at import (
-    ask_system,
-    at,
-    complete_component,
-    complete_port,
-    components,
-    time_us,
-)
+from tickrig.emulators.rtc.at import ask_system, at, components, time_us
+from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
 from tickrig.emulators.rtc.settle import settle
 from tickrig.emulators.rtc.system_file import file_format, write_system
 from tickrig.emulators.rtc.texts import component_lines, component_row
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
+from tickrig.host.rtc.manager import DEFAULT_RATE_HZ
 
 DATAPORT: Final = "dataport."
 
@@ -66,6 +61,16 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
     for component in described:
         for line in component_lines(component, long=long):
             click.echo(line)
+
+
+@click.command()
+@click.argument("type_name", metavar="TYPE", shell_complete=complete_type)
+@click.argument("name", default="")
+@click.option("--rate", "rate_hz", type=float, default=DEFAULT_RATE_HZ, help="In Hz.  [1000]")
+@at
+def create(at: Path, type_name: str, name: str, rate_hz: float) -> None:
+    """Create a component of TYPE, and print its name, such as ConsoleIn0."""
+    click.echo(ask_system(at, "create", type=type_name, name=name, rate_hz=rate_hz)["name"])
 
 
 @click.command()
@@ -195,4 +200,4 @@ def _property(word: str) -> tuple[str, str]:
     return (key if key.startswith(DATAPORT) else DATAPORT + key), value
 
 
-VERBS: Final = (ls, cat, con, dis, act, deact, reset, exit_, inject, save, status, stop)
+VERBS: Final = (ls, cat, create, con, dis, act, deact, reset, exit_, inject, save, status, stop)

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.rtc.chain import PERIOD_US, Chain
+from tests.host.rtc.chain import Chain
 from tickrig.emulators.rtc.control import SystemControl
+from tickrig.host.rtc import ModuleSpec, RtComponent
 from tickrig.host.rtc.port import ConnectorProfile
 from tickrig.host.rtc.real_time import RealTime
 
@@ -63,7 +64,8 @@ class Bench(Chain):
         ("seen", {"port": "ConsoleIn0.out", "since": "1"}, 'since is a whole number, not "1"'),
         ("inject", {"port": "ConsoleOut0.in"}, "inject needs a value"),
         ("save", {"format": "yaml"}, 'format is toml or xml, not "yaml"'),
-        ("eval", {}, 'no request "eval"; known: describe, connect, '),
+        ("create", {"type": "SeqIn", "rate_hz": True}, "rate_hz is a number, not true"),
+        ("eval", {}, 'no request "eval"; known: describe, create, connect, '),
     ],
 )
 def test_a_bad_request_is_refused(do: str, fields: dict[str, object], error: str) -> None:
@@ -112,8 +114,24 @@ def test_a_component_in_no_execution_context_is_described() -> None:
     )
 
 
+class Raises(RtComponent):
+    """A component that cannot be made."""
+
+    spec = ModuleSpec("Raises")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        raise KeyError("a\nb")
+
+
+def test_a_component_whose_constructor_raises_ends_nothing() -> None:
+    bench = Bench()
+    bench.manager.register(Raises)
+    assert bench.refused("create", type="Raises") == r"Raises: KeyError: 'a\nb'"
+
+
 VERBS = (
-    *("describe", "connect", "disconnect", "activate", "deactivate", "reset", "delete"),
+    *("create", "describe", "connect", "disconnect", "activate", "deactivate", "reset", "delete"),
     *("set_parameter", "activate_set", "seen", "inject", "save", "status", "stop"),
 )
 FIELDS: dict[str, list[Any]] = {
@@ -124,6 +142,8 @@ FIELDS: dict[str, list[Any]] = {
     "parameter": ["int_param0", "vector_param0", "str_param1"],
     "value": [5, "5", "1,2", [1], {"data": 3}],
     "set": ["default", ""],
+    "type": ["ConsoleIn", "SeqOut"],
+    "rate_hz": [10, 0.5],
     "port": ["ConsoleIn0.out", "ConsoleOut0.in", ":", "."],
     "since": [0, -1, 10**30],
     "format": ["toml", "xml"],
@@ -151,4 +171,4 @@ def test_whatever_is_asked_is_answered_and_the_others_run_on(
     for do, fields in asked:
         answer = bench.ask(do, **fields)
         assert answer["ok"] or "\n" not in answer["error"]
-    assert bench.manager.now_us == (len(asked)) * PERIOD_US or not bench.manager.components
+    assert bench.ask("describe")["ok"]

@@ -102,6 +102,13 @@ def test_act_of_a_component_that_fails_says_where_it_went(
     assert system.rtc("act", "SeqOut0", exit_code=1) == "Error: SeqOut0 is ERROR, not ACTIVE\n"
 
 
+def test_create_makes_a_component_and_prints_its_name(system: Served) -> None:
+    assert system.rtc("create", "SeqOut", "--rate", "50") == "SeqOut1\n"
+    assert system.rtc("create", "SeqIn", "Sink") == "Sink\n"
+    assert system.manager.context_of("SeqOut1").rate_hz == 50
+    system.rtc("act", "Sink")
+
+
 def test_exit_ends_a_component(system: Served) -> None:
     system.rtc("exit", "ConsoleIn0", "SeqOut0")
     assert system.rtc("ls").split() == ["ConsoleOut0", "ConfigSample0"]
@@ -175,6 +182,9 @@ def test_status_and_stop(system: Served) -> None:
     ("words", "error"),
     [
         (["cat", "Nobody0"], "no component 'Nobody0'; known: ConsoleIn0, ConsoleOut0, "),
+        (["create", "Seq"], "no component type 'Seq'; known: ConsoleIn, ConsoleOut, SeqIn, "),
+        (["create", "SeqIn", "SeqOut0"], "a component 'SeqOut0' is there already"),
+        (["create", "SeqIn", "--rate", "0"], "rate 0.0 Hz is not in 1e-06..1000000 Hz"),
         (["con", "ConsoleIn0.out", "SeqOut0.Long"], "DataOutPort ConsoleIn0.out, DataOutPort Seq"),
         (["con", "ConsoleIn0.out", "ConsoleOut0.in"], "and ConsoleOut0.in are connected"),
         (["con", "ConsoleIn0.out", "ConsoleOut0.in", "-p", "x"], "-p 'x' is not KEY=VALUE"),
@@ -219,6 +229,7 @@ def test_a_system_that_does_not_run_is_told(tmp_path: Path) -> None:
     ("words", "found"),
     [
         ("tickrig rtc act Con", "ConsoleIn0 ConsoleOut0 ConfigSample0"),
+        ("tickrig rtc create Seq", "SeqIn SeqOut"),
         ("tickrig rtc con ConsoleI", "ConsoleIn0.out"),
         ("tickrig rtc inject SeqOut0.Do", "SeqOut0.Double SeqOut0.DoubleSeq"),
     ],
