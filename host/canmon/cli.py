@@ -14,6 +14,7 @@ VERBS: Final[dict[str, str]] = {
     "conv": "conv",
     "info": "info",
     "top": "top",
+    "stats": "stats",
     "check": "check",
     "nodes": "nodes",
     "send": "send",

@@ -11,6 +11,7 @@ from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.source_word import FileWord, parse_source
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_reader import LogError
+from tickrig.host.monitor.traffic import Snapshot
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.logs.columns import Columns
@@ -45,6 +46,12 @@ class WholeLog:
     def words(self) -> list[str]:
         """Say what was no frame or got lost, one line each."""
         return self.columns.tally.words(self._name)
+
+    def snapshot(self) -> Snapshot:
+        """Return the statistics of all frames."""
+        from tickrig.host.monitor.column_traffic import snapshot_of  # noqa: PLC0415 - numpy
+
+        return snapshot_of(self.columns)
 
     def close(self) -> None:
         """Close nothing: it was read."""

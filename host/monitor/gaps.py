@@ -25,7 +25,8 @@ class GapRow(NamedTuple):
         p99_us: no more than 1 % were longer; it is at most one part in 64 too long.
         max_us: the longest.
         jitter_us: mean of how much a gap differs from the one before, rounded down.
-        cycle_us: the median if three quarters of the gaps are within a quarter of it, else None.
+        cycle_us: of frames that came and frames that missed; None unless three quarters of the
+            gaps are within a quarter of the median.
         missed: frames of that cycle that did not come, at most; None without a cycle.
     """
 
@@ -77,18 +78,19 @@ class Gaps:
         if not self.count:
             return None
         p99_us = min(self.max_us, bucket_range(quantile(self.buckets, P99))[1])
-        cycle_us = self._cycle_us()
+        about_us = self._median_if_cyclic()
+        missed = None if about_us is None else self._missed(about_us)
         return GapRow(
             self.min_us,
             self.total_us // self.count,
             p99_us,
             self.max_us,
             self.wander_us // max(1, self.count - 1),
-            cycle_us,
-            None if cycle_us is None else self._missed(cycle_us),
+            None if missed is None else self.total_us // (self.count + missed),
+            missed,
         )
 
-    def _cycle_us(self) -> int | None:
+    def _median_if_cyclic(self) -> int | None:
         cycle_us = middle_us(quantile(self.buckets, MEDIAN))
         near = sum(
             count

@@ -42,9 +42,7 @@ def test_one_long_gap_in_a_hundred_is_not_in_p99_but_two_are() -> None:
 def test_frames_that_a_cycle_misses_are_counted() -> None:
     found = row(*[10_000] * 20, 30_000, 10_000, 20_000)
     assert found is not None
-    assert found.cycle_us is not None
-    assert abs(found.cycle_us - 10_000) < 100
-    assert found.missed == 2 + 1
+    assert (found.cycle_us, found.missed) == (10_000, 2 + 1)
 
 
 def test_a_late_frame_is_not_a_missed_one() -> None:

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.host.canmon import whole_log
+from tickrig.host.canmon.cli import main
+
+LOG = "".join(
+    f"({n // 100}.{n % 100:02d}0000) can0 {0x181 + n % 2:03X}#{n:04X}\n" for n in range(150)
+)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> str:
+    path = tmp_path / "run.log"
+    path.write_text(LOG + "what?\n", "ascii")
+    return str(path)
+
+
+def stats(*words: str) -> Result:
+    return CliRunner().invoke(main, ["stats", *words])
+
+
+def test_buses_and_identifiers_are_shown(log: str) -> None:
+    result = stats(log)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("can0: 150 frames in 1.490000 s, ")
+    assert result.stdout.splitlines()[-1].split()[:4] == ["can0", "182", "75", "50.00"]
+    assert "line 151 is no frame: 'what?'" in result.stderr
+
+
+def test_nodes_are_shown(log: str) -> None:
+    lines = stats(log, "--by", "node").stdout.splitlines()
+    assert [line.split()[:4] for line in lines[-2:]] == [
+        ["can0", "1", "1", "75"],
+        ["can0", "2", "1", "75"],
+    ]
+
+
+@pytest.mark.parametrize("by", ["id", "node"])
+def test_rows_are_lines_of_json(log: str, by: str) -> None:
+    lines = stats(log, "--jsonl", "--by", by).stdout.splitlines()
+    assert [json.loads(line)["what"] for line in lines] == ["bus", by, by]
+
+
+def test_a_large_log_has_the_same_statistics(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    small = stats(log, "--jsonl")
+    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    large = stats(log, "--jsonl")
+    assert (large.stdout, large.stderr) == (small.stdout, small.stderr)
+
+
+def test_a_log_that_is_not_there_ends_with_3() -> None:
+    assert stats("none.log").exit_code == 3
