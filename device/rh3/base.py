@@ -11,9 +11,9 @@ from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
 from tickrig.device.rh3.ground import Ground
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.device.rh3.register_map import Status
 from tickrig.device.rh3.side import Side
 from tickrig.device.rh3.terminals import INPUTS, OUTPUTS, SIDES
+from tickrig.wire.rh3 import Status
 
 TICK_US: Final = 1_000
 

@@ -9,9 +9,10 @@ from typing import Final
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.device.rh3.register_map import TABLE, Command, Fault, Mode, Status
+from tickrig.device.rh3.register_map import TABLE
 from tickrig.device.rh3.side import Side
 from tickrig.device.rh3.terminals import SIDES
+from tickrig.wire.rh3 import Command, Fault, Mode, Status
 
 TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
 DELAYED: Final = TARGETS | {"mode", "command"}

@@ -1,0 +1,1 @@
+"""A Modbus RTU master over a link."""

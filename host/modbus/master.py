@@ -1,0 +1,125 @@
+"""A Modbus RTU master that waits for nothing: begin a request, look for its answer later."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.host.link import Link
+from tickrig.wire.errors import WireError
+from tickrig.wire.modbus.requests import ERROR_BIT, ExceptionCode, Request, encode_request
+from tickrig.wire.modbus.rtu import MAX_FRAME_BYTES, encode_frame, parse_frame
+
+TIMEOUT_US: Final = 20_000
+"""How long an answer may take (rh3-control, drive protocol)."""
+
+_CODES: Final = {code.value: code for code in ExceptionCode}
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a slave answered.
+
+    Attributes:
+        request: to what.
+        values: the registers that were read.
+        refusal: why it did not do it, if it did not.
+    """
+
+    request: Request
+    values: tuple[int, ...] = ()
+    refusal: ExceptionCode | int | None = None
+
+
+class ModbusMaster:
+    """Asks one slave; one request is on its way at a time.
+
+    pymodbus and minimalmodbus wait on the machine's clock and cannot wait on a rig's; so
+    the master is ours, over the codec that the slave uses too, and they judge the slave.
+
+    Args:
+        link: the line.
+        address: of the slave, 1..247.
+        timeout_us: how long an answer may take.
+        retries: how often a request is made again that had no answer.
+
+    Attributes:
+        pending: the request on its way.
+        misses: requests in a row that had no answer.
+        lost: all that had none, for statistics.
+    """
+
+    def __init__(
+        self, link: Link[bytes], address: int = 1, timeout_us: int = TIMEOUT_US, retries: int = 1
+    ) -> None:
+        self._link, self._address = link, address
+        self._timeout_us, self._retries = timeout_us, retries
+        self.pending: Request | None = None
+        self.misses = self.lost = 0
+        self._received, self._tries, self._until_us = b"", 0, 0
+
+    def begin(self, request: Request) -> None:
+        """Make a request; what was on its way is given up.
+
+        Raises:
+            LinkClosed: the line is gone.
+        """
+        self.pending, self._tries = request, 0
+        self._send(request)
+
+    def poll(self) -> Answer | None:
+        """Return the answer if it has come; make the request again if it is overdue.
+
+        Raises:
+            LinkClosed: the line is gone.
+        """
+        heard = self._link.receive(0)
+        if (request := self.pending) is None:
+            return None
+        self._received = (self._received + heard)[-MAX_FRAME_BYTES:]
+        answer = self._parse(request)
+        if answer is not None:
+            self.pending, self.misses = None, 0
+        elif self._link.now_us >= self._until_us:
+            self._miss(request)
+        return answer
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._link.close()
+
+    def _send(self, request: Request) -> None:
+        self._link.receive(0)
+        self._received = b""
+        self._link.send(encode_frame(self._address, encode_request(request)))
+        self._until_us = self._link.now_us + self._timeout_us
+
+    def _miss(self, request: Request) -> None:
+        self.lost += 1
+        if self._tries < self._retries:
+            self._tries += 1
+            self._send(request)
+        else:
+            self.pending = None
+            self.misses += 1
+
+    def _parse(self, request: Request) -> Answer | None:
+        try:
+            address, message = parse_frame(self._received)
+        except WireError:
+            return None
+        if address != self._address or message[0] & ~ERROR_BIT != request.function:
+            return None
+        if message[0] & ERROR_BIT:
+            return Answer(request, refusal=_code(message[1]))
+        if request.read is None:
+            return Answer(request)
+        count = request.read[1]
+        if len(message) != 2 + 2 * count:
+            return None
+        return Answer(request, struct.unpack_from(f">{count}H", message, 2))
+
+
+def _code(number: int) -> ExceptionCode | int:
+    return _CODES.get(number, number)

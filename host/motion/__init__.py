@@ -1,0 +1,1 @@
+"""The motion components of Reference Hardware 3: from a goal to turning wheels."""

@@ -1,0 +1,104 @@
+"""The motion chain: six components, joined as the functional specification joins them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.motion.components.navigation import Navigation
+from tickrig.host.motion.components.odometry import Odometry
+from tickrig.host.motion.components.omni_to_2wd import OmniTo2WD
+from tickrig.host.motion.components.path_follower import PathFollower
+from tickrig.host.motion.components.position_input import PositionInput
+from tickrig.host.motion.components.ref_hard import Opener, RefHardRh3
+from tickrig.host.rtc import ExecutionContext, Manager
+from tickrig.host.serial_link import SerialLink
+
+RATE_HZ: Final = 50.0
+"""1 / control_cycle."""
+
+CONNECTIONS: Final = (
+    ("RefHardRh3.OutWheelAngle", "Odometry.CurrentWheelAngle"),
+    ("Odometry.OdometryPosition", "OmniTo2WD.current_position"),
+    ("Odometry.OdometryPosition", "Navigation.position"),
+    ("Odometry.OdometryPosition", "PathFollower.position"),
+    ("PositionInput.position", "OmniTo2WD.goal"),
+    ("OmniTo2WD.min_path", "Navigation.min_path"),
+    ("Navigation.path", "PathFollower.target_path"),
+    ("PathFollower.velocity", "RefHardRh3.InTargetVelocity"),
+    ("Navigation.status", "OmniTo2WD.status"),
+    ("OmniTo2WD.status_out", "PositionInput.status"),
+)
+"""RH3 functional specification, wiring."""
+
+_WIDE: Final = {"dataport.buffer.length": "64"}
+
+
+class MotionChain:
+    """The six components in one execution context, in the order in which data flow.
+
+    Any other order works and costs periods.
+
+    Args:
+        manager: who runs them.
+        open_link: opens the line to the base.
+        suffix: behind each instance name, for several carts.
+        rate_hz: of the execution context.
+
+    Attributes:
+        position_input: where goals are entered.
+        odometry: what the pose is.
+        context: their execution context.
+    """
+
+    def __init__(
+        self,
+        manager: Manager,
+        open_link: Opener = SerialLink,
+        suffix: str = "",
+        rate_hz: float = RATE_HZ,
+    ) -> None:
+        self._manager, self._suffix = manager, suffix
+        self.ref_hard = RefHardRh3(f"RefHardRh3{suffix}", open_link)
+        self.odometry = Odometry(f"Odometry{suffix}")
+        self.position_input = PositionInput(f"PositionInput{suffix}")
+        self.omni_to_2wd = OmniTo2WD(f"OmniTo2WD{suffix}")
+        self.navigation = Navigation(f"Navigation{suffix}")
+        self.path_follower = PathFollower(f"PathFollower{suffix}")
+        self.context = ExecutionContext(rate_hz)
+        for component in self.components:
+            manager.add(component, context=self.context)
+        self.context.start()
+        for first, second in CONNECTIONS:
+            manager.connect(self._named(first), self._named(second), _WIDE)
+
+    @property
+    def components(
+        self,
+    ) -> tuple[RefHardRh3, Odometry, PositionInput, OmniTo2WD, Navigation, PathFollower]:
+        """All six, in the order of execution."""
+        return (
+            self.ref_hard,
+            self.odometry,
+            self.position_input,
+            self.omni_to_2wd,
+            self.navigation,
+            self.path_follower,
+        )
+
+    def use(self, set_id: str) -> None:
+        """Let the configuration set of a name hold in all components that have it."""
+        for component in self.components:
+            if set_id in component.configuration.sets:
+                component.configuration.activate(set_id)
+
+    def activate(self) -> None:
+        """Ask all for Active."""
+        self._manager.activate(*(component.instance_name for component in self.components))
+
+    def deactivate(self) -> None:
+        """Ask all for Inactive."""
+        self._manager.deactivate(*(component.instance_name for component in self.components))
+
+    def _named(self, port: str) -> str:
+        component, _, name = port.partition(".")
+        return f"{component}{self._suffix}.{name}"

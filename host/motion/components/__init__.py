@@ -1,0 +1,1 @@
+"""The six components of the functional specification, and what it names as options."""

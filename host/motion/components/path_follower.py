@@ -1,0 +1,153 @@
+"""PathFollower: a velocity for each period, out of a relay point and a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import isfinite
+from typing import ClassVar
+
+from tickrig.host.motion.dead_reckoning import twist_of
+from tickrig.host.motion.geometry import Pose, Twist, clip
+from tickrig.host.motion.limiter import Limits, steps
+from tickrig.host.motion.ports import newest, to_pose
+from tickrig.host.motion.regulator import Law, Regulator
+from tickrig.host.motion.turning import ReferenceSpin, TimeOptimalSpin
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rh2 import Path, RunMode
+
+Mode = Callable[[Path, Pose, Pose], Twist]
+
+TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
+"""The set `tuned` (rh3-control, J)."""
+
+
+class PathFollower(RtComponent):
+    """Runs one mode until the next message (rh3-control, control laws).
+
+    Modes: free and stop (both towards standstill), line, to-point, circle (centre x, y,
+    radius r, to the left if positive), spin, velocity (v, w), wheel velocity (v left, w
+    right, rad/s, by `tread` and `radius`). A message with a number that is none means stop.
+
+    The parameters behind `max_w` are ours: `acc_cycle` is the time for which `max_acc_*`
+    are given, `law` the way the regulator steps, `spin` the way it turns, `latency` the
+    time from a pose to the effect of the command.
+
+    Attributes:
+        twist: the command of the latest period.
+        path: what it does.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("PathFollower", "Velocity along lines and arcs")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.control_cycle = bind("control_cycle", 0.02, "x>0", unit="s")
+        self.line_c1 = bind("line_C1", 0.01, "x>=0")
+        self.line_dist = bind("line_Dist", 0.05, "x>0", unit="m")
+        self.line_k1 = bind("line_K1", 800.0, "x>=0")
+        self.line_k2 = bind("line_K2", 300.0, "x>=0")
+        self.line_k3 = bind("line_K3", 400.0, "x>0")
+        self.max_acc_v = bind("max_acc_v", 0.0003, "x>0", unit="m/s")
+        self.max_acc_w = bind("max_acc_w", 0.1, "x>0", unit="rad/s")
+        self.max_v = bind("max_v", 1.0, "x>0", unit="m/s")
+        self.max_w = bind("max_w", 0.3, "x>0", unit="rad/s")
+        self.acc_cycle = bind("acc_cycle", 0.001, "x>0", unit="s")
+        self.law = bind("law", "implicit", "(implicit, explicit)")
+        self.spin = bind("spin", "reference", "(reference, time-optimal)")
+        self.latency = bind("latency", 0.0, "x>=0", unit="s")
+        self.tread = bind("tread", 0.464, "x>0", unit="m")
+        self.radius = bind("radius", 0.0995, "x>0", unit="m")
+        self.configuration.add_set("tuned", TUNED)
+        self.configuration.on_update.append(lambda set_id: self._configure())
+        self.position = self.add_port(InPort("position", iis.TimedPose2D))
+        self.target_path = self.add_port(InPort("target_path", Path))
+        self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
+        self._configure()
+        self._forget()
+
+    def _forget(self) -> None:
+        self.path, self.twist = Path(RunMode.STOP), Twist()
+        self._pose: Pose | None = None
+
+    def _configure(self) -> None:
+        h, alpha = self.control_cycle.value, self.max_acc_w.value / self.control_cycle.value
+        self._regulator = Regulator(
+            self.line_k1.value,
+            self.line_k2.value,
+            self.line_k3.value,
+            self.line_dist.value,
+            self.line_c1.value,
+            h,
+            Law(self.law.value),
+        )
+        self._spin: ReferenceSpin | TimeOptimalSpin = ReferenceSpin(alpha)
+        if self.spin.value == "time-optimal":
+            self._spin = TimeOptimalSpin(alpha / 2, h, self.latency.value)
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at standstill."""
+        self._forget()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take one message, make a step of its mode, command the velocity."""
+        if self.target_path.is_new and (path := self.target_path.read()) is not None:
+            numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
+            sound = all(isfinite(number) for number in numbers)
+            self.path = path if sound else Path(RunMode.STOP)
+        if (latest := newest(self.position)) is not None:
+            self._pose = to_pose(latest.data) or self._pose
+        wanted = Twist() if self._pose is None else self._wanted(self.path, self._pose)
+        self.twist = self._limits(ec).smooth(wanted, self.twist)
+        data = Velocity2D(self.twist.v, 0.0, self.twist.w)
+        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        return ReturnCode.RTC_OK
+
+    def _limits(self, ec: ExecutionContext) -> Limits:
+        dv, dw = steps(
+            self.max_acc_v.value, self.max_acc_w.value, ec.period_us / 1e6, self.acc_cycle.value
+        )
+        return Limits(self.max_v.value, self.max_w.value, dv, dw)
+
+    def _wanted(self, path: Path, pose: Pose) -> Twist:
+        mode = self._modes.get(path.type)
+        return Twist() if mode is None else mode(path, Pose(path.x, path.y, path.theta), pose)
+
+    @property
+    def _modes(self) -> Mapping[int, Mode]:
+        """What each mode makes of a message, its target and the pose; the others mean stop."""
+        follow = self._regulator
+        return {
+            RunMode.LINEFOLLOW: lambda path, target, pose: follow.follow_line(
+                target, pose, path.v, self.twist
+            ),
+            RunMode.TO_POINT: self._to_point,
+            RunMode.CIRCLEFOLLOW: self._circle,
+            RunMode.SPIN: self._turn,
+            RunMode.VEL: lambda path, target, pose: Twist(path.v, path.w),
+            RunMode.WHEEL_VEL: self._wheels,
+        }
+
+    def _circle(self, path: Path, centre: Pose, pose: Pose) -> Twist:
+        if not path.r:
+            return Twist()
+        return self._regulator.follow_circle(centre, path.r, pose, path.v, self.twist)
+
+    def _turn(self, path: Path, target: Pose, pose: Pose) -> Twist:
+        most = min(abs(path.w), self.max_w.value)
+        return self._spin.turn(target.heading, pose.heading, most, self.twist)
+
+    def _wheels(self, path: Path, target: Pose, pose: Pose) -> Twist:
+        radius = self.radius.value
+        return twist_of(path.v * radius, path.w * radius, self.tread.value)
+
+    def _to_point(self, path: Path, target: Pose, pose: Pose) -> Twist:
+        """Follow the line and slow down towards its end, as fast as it is far in metres."""
+        if target.along(pose) > 0:
+            return Twist()
+        v = clip(path.v, pose.distance(target))
+        return self._regulator.follow_line(target, pose, v, self.twist)

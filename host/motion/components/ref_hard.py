@@ -1,0 +1,238 @@
+"""RefHardRh3: the cart's velocity becomes wheel speeds on an RS485 line."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from math import isfinite, tau
+from typing import ClassVar, Final, Protocol
+
+from tickrig.host.errors import LinkError
+from tickrig.host.link import Link
+from tickrig.host.modbus.master import Answer, ModbusMaster
+from tickrig.host.motion.dead_reckoning import wheel_speeds
+from tickrig.host.motion.geometry import Twist
+from tickrig.host.motion.ports import newest
+from tickrig.host.rtc import (
+    ExecutionContext,
+    InPort,
+    ModuleSpec,
+    OutPort,
+    Provider,
+    ReturnCode,
+    RtComponent,
+    ServicePort,
+)
+from tickrig.host.serial_link import SerialLink
+from tickrig.wire.modbus.requests import READ_WRITE, WRITE, Request
+from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
+
+MISSES: Final = 3
+"""Unanswered requests in a row that are an error (rh3-control, drive protocol)."""
+
+GAINS: Final = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
+"""Of position and of velocity."""
+
+WATCHDOG_MS: Final = 500
+"""Silence after which the base stops by itself."""
+
+_TURN: Final = 2**32  # counts after which a counter begins again
+
+_LOG: Final = logging.getLogger(__name__)
+
+Opener = Callable[[str], Link[bytes]]
+"""Opens the line that DeviceFileName names."""
+
+
+class RefHard(Protocol):
+    """The service of RefHardRh3Pro.idl."""
+
+    def Stop(self) -> None:  # noqa: N802 - as in the IDL
+        """Stop a running cart."""
+
+    def Go(self) -> None:  # noqa: N802
+        """Make a stopped cart run."""
+
+
+class RefHardRh3(RtComponent):
+    """Talks with the base: wheel angles out, speeds in, one exchange each period.
+
+    In on_execute it takes the answer of the period before and gives the wheel angles; in
+    on_state_update, when all others have executed, it sends the speeds of this period. So
+    nothing waits, and a command is on the line in the period in which it was made.
+
+    It goes into Error when the base has a fault, refuses, answers three times in a row
+    not at all, or the line is gone; the base then stops by its own watchdog. While the
+    bumper is pressed or after `Stop` it commands standstill.
+
+    Not there: the library libsvm and its protocol, whose texts are not public.
+
+    Args:
+        instance_name: of the component.
+        open_link: opens the line; by pyserial unless given.
+
+    Attributes:
+        report: what the base said last.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")
+
+    def __init__(self, instance_name: str, open_link: Opener = SerialLink) -> None:
+        super().__init__(instance_name)
+        self._open_link = open_link
+        self._master: ModbusMaster | None = None
+        self._bind()
+        self.velocity = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
+        self.angles = self.add_port(OutPort("OutWheelAngle", TimedDoubleSeq))
+        for port_name, service in (("InventGUIRefHard", "service"), ("BumpRefHard", "service")):
+            port = self.add_port(ServicePort(port_name))
+            port.provide(Provider[RefHard](service, "RefHard", self))
+        self._forget()
+
+    def _bind(self) -> None:
+        bind = self.configuration.bind
+        self.device = bind("DeviceFileName", "/dev/ttyUSB0")
+        self.gains = tuple(
+            bind(f"gain_{name}", default, "0<=x<=32767")
+            for name, default in zip(
+                ("P", "I", "D", "VP", "VI", "VD"), (10, 0, 0, 10, 0, 1), strict=True
+            )
+        )
+        self.velocity_limit = bind("Velocity_limit", 10.0, "x>0", unit="rad/s")
+        self.acceleration_limit = bind("Acceleration_limit", 50.0, "x>0", unit="rad/s2")
+        self.tread = bind("WheelTread", 0.441, "x>0", unit="m")
+        self.radius_left = bind("WheelRadiusLeft", 0.1, "x>0", unit="m")
+        self.radius_right = bind("WheelRadiusRight", 0.1, "x>0", unit="m")
+        self.gear = bind("GearRatio", 74.91, "x>0")
+        self.encoder = bind("EncoderCount", 2_000, "x>0")
+        self.constants = (bind("EncoderConstant_L", 1.0), bind("EncoderConstant_R", 1.0))
+
+    def _forget(self) -> None:
+        self._orders: deque[Request] = deque()
+        self._twist, self._stopped = Twist(), False
+        self._counts: tuple[int, int] | None = None
+        self._angles = [0.0, 0.0]
+        self.report: Report | None = None
+
+    @property
+    def lost(self) -> int:
+        """Requests that had no answer since the line was opened."""
+        return self._master.lost if self._master else 0
+
+    def Stop(self) -> None:  # noqa: N802 - as in the IDL
+        """Command standstill until `Go`."""
+        self._stopped = True
+
+    def Go(self) -> None:  # noqa: N802
+        """Let the velocity at the port hold again."""
+        self._stopped = False
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Open the line, and order settings and power."""
+        self._forget()
+        self.velocity.clear()
+        try:
+            self._master = ModbusMaster(self._open_link(self.device.value))
+        except LinkError as error:
+            return self._failed(str(error))
+        per_rad = self._counts_per_rad
+        limits = (self.velocity_limit.value * per_rad, self.acceleration_limit.value * per_rad)
+        gains = (gain.value for gain in self.gains)
+        settings = (*gains, *(word for limit in limits for word in wide(round(limit))))
+        self._orders.append(_write(Address.GAIN_P, *settings))
+        self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
+        self._orders.append(_write(Address.COMMAND, Command.ENABLE))
+        return ReturnCode.RTC_OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Stop the base, take its power, and give the line back."""
+        if self._master is not None:
+            try:
+                self._master.begin(_write(Address.COMMAND, Command.STOP))
+            except LinkError as error:
+                _LOG.warning("%s: %s", self.instance_name, error)
+            self._master.close()
+        self._master = None
+        return ReturnCode.RTC_OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Leave Error; `on_activated` clears the fault in the base."""
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take the answer of the period before."""
+        if self._master is None:
+            return self._failed("no line")
+        try:
+            answer = self._master.poll()
+        except LinkError as error:
+            return self._failed(str(error))
+        if answer is not None:
+            return self._take(ec, answer)
+        if self._master.misses >= MISSES:
+            return self._failed(f"no answer to {MISSES} requests in a row")
+        return ReturnCode.RTC_OK
+
+    def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
+        """Send what is to be sent in this period."""
+        if (latest := newest(self.velocity)) is not None:
+            data = latest.data
+            sound = isfinite(data.vx) and isfinite(data.va)
+            self._twist = Twist(data.vx, data.va) if sound else Twist()
+        if self._master is None or self._master.pending:
+            return ReturnCode.RTC_OK
+        try:
+            self._master.begin(self._orders[0] if self._orders else self._cycle())
+        except LinkError as error:
+            return self._failed(str(error))
+        return ReturnCode.RTC_OK
+
+    @property
+    def _counts_per_rad(self) -> float:
+        return self.gear.value * self.encoder.value / tau
+
+    def _cycle(self) -> Request:
+        """Return the exchange of a period: speeds there, report back."""
+        bumped = self.report is not None and bool(self.report.status & Status.BUMPER)
+        twist = Twist() if self._stopped or bumped else self._twist
+        speeds = wheel_speeds(
+            twist, self.tread.value, self.radius_left.value, self.radius_right.value
+        )
+        words: list[int] = []
+        for speed, constant in zip(speeds, self.constants, strict=True):
+            words += wide(round(speed * self._counts_per_rad * constant.value))
+        return Request(READ_WRITE, REPORT, (Address.TARGET_SPEED_LEFT, tuple(words)))
+
+    def _take(self, ec: ExecutionContext, answer: Answer) -> ReturnCode:
+        if answer.refusal is not None:
+            return self._failed(f"the base refuses {answer.request}: {answer.refusal!r}")
+        if self._orders:
+            self._orders.popleft()
+            return ReturnCode.RTC_OK
+        self.report = report = Report.parse(answer.values)
+        self._turn(report)
+        now = Time.from_us(ec.now_us)
+        self.angles.write(TimedDoubleSeq(now, tuple(self._angles)))
+        if report.status & Status.FAULT:
+            return self._failed(f"fault of the base: {report.fault_left!r}, {report.fault_right!r}")
+        return ReturnCode.RTC_OK
+
+    def _turn(self, report: Report) -> None:
+        """Add what the counters counted; they begin again after 2**32."""
+        counts = (report.left, report.right)
+        before = self._counts or (0, 0)
+        for place, constant in enumerate(self.constants):
+            change = (counts[place] - before[place] + _TURN // 2) % _TURN - _TURN // 2
+            self._angles[place] += change / (self._counts_per_rad * constant.value)
+        self._counts = counts
+
+    def _failed(self, why: str) -> ReturnCode:
+        _LOG.error("%s: %s", self.instance_name, why)
+        return ReturnCode.RTC_ERROR
+
+
+def _write(address: Address, *values: int) -> Request:
+    return Request(WRITE, write=(address, tuple(int(value) for value in values)))

@@ -1,0 +1,57 @@
+"""Poses on a plane: metres, and radians from x towards y."""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, pi, remainder, sin, tau
+from typing import NamedTuple
+
+
+class Pose(NamedTuple):
+    """A place, and the way to look."""
+
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+    def along(self, point: Pose) -> float:
+        """Return how far a point is ahead of the line through here."""
+        return (point.x - self.x) * cos(self.heading) + (point.y - self.y) * sin(self.heading)
+
+    def left(self, point: Pose) -> float:
+        """Return how far a point is to the left of the line through here."""
+        return (point.y - self.y) * cos(self.heading) - (point.x - self.x) * sin(self.heading)
+
+    def distance(self, point: Pose) -> float:
+        """Return how far a point is."""
+        return hypot(point.x - self.x, point.y - self.y)
+
+    def bearing(self, point: Pose) -> float:
+        """Return the heading towards a point."""
+        return atan2(point.y - self.y, point.x - self.x)
+
+
+class Twist(NamedTuple):
+    """A velocity: forward in m/s, to the left in rad/s."""
+
+    v: float = 0.0
+    w: float = 0.0
+
+
+def wrap(angle: float) -> float:
+    """Return an angle in -pi..pi, pi itself for half a turn.
+
+    >>> wrap(3 * pi) == wrap(-pi) == pi
+    True
+    """
+    wrapped = remainder(angle, tau)
+    return pi if wrapped == -pi else wrapped
+
+
+def positive(angle: float) -> float:
+    """Return an angle in 0..2 pi, as the IIS interfaces recommend."""
+    return angle % tau
+
+
+def clip(value: float, limit: float) -> float:
+    """Return a value within a limit to both sides."""
+    return min(max(value, -limit), limit)

@@ -1,0 +1,63 @@
+# ruff: noqa: RUF009 - defaults are frozen
+"""Types of the reference hardware's own components (RH3 functional specification, data types)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
+
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.idl import Double, Long, Short, Struct
+
+
+class NavigationState(IntEnum):
+    """What `TimedState.data` says of a navigation."""
+
+    FINISH = 0
+    ANGLE_CHECK = 1
+    TURNING = 2
+    TURNING2 = 3
+    GOAL_CHECK = 4
+    SPEED_DOWN = 5
+    STOPPING = 6
+
+
+class RunMode(IntEnum):
+    """What `Path.type` asks for."""
+
+    FREE = 0
+    STOP = 1
+    LINEFOLLOW = 2
+    TO_POINT = 3
+    CIRCLEFOLLOW = 4
+    SPIN = 5
+    VEL = 6
+    WHEEL_VEL = 7
+
+
+@dataclass(frozen=True, slots=True)
+class TimedState(Struct):
+    """A navigation's state; OpenRTM's own TimedState has a short."""
+
+    idl_module: ClassVar[str] = "RH"
+
+    tm: Time = Time()
+    data: Long = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Path(Struct):
+    """One relay point for the follower; `coordinate` and `r` are unused but for circles."""
+
+    idl_module: ClassVar[str] = "RH"
+
+    type: Short = RunMode.FREE
+    coordinate: Short = 0
+    x: Double = 0.0
+    y: Double = 0.0
+    theta: Double = 0.0
+    v: Double = 0.0
+    w: Double = 0.0
+    r: Double = 0.0
+    tm: Time = Time()
