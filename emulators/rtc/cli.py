@@ -59,7 +59,7 @@ def rtc() -> None:
     help="A device of RTC-Lite at a pyserial URL; its proxy is NAME0. May be repeated.",
 )
 @click.option(
-    "--lite-boot", default="0s", metavar="TIME", help="Silence before it is asked, as 3s."
+    "--lite-boot", default="0s", metavar="TIME", help="Silence once a line is open, as 3s."
 )
 @click.option("--rate", "rate_hz", type=float, metavar="HZ", help="Rate of all components.")
 @click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
