@@ -21,8 +21,9 @@ from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
 
 SO_RXQ_OVFL: Final = 40
 SO_TIMESTAMPNS: Final = 35
-RECEIVE_BYTES: Final = 8 << 20
-"""Asked of the kernel for its queue; it gives what net.core.rmem_max allows."""
+SO_RCVBUFFORCE: Final = 33
+RECEIVE_BYTES: Final = 4 << 20
+"""Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
 
 BATCH: Final = 1_024
 
@@ -56,7 +57,7 @@ class SocketReader:
         self._socket: socket.socket = bus.socket
         self.lost, self.tally = 0, Tally()
         self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+        _enlarge(self._socket)
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Heard]:
@@ -92,6 +93,13 @@ class SocketReader:
             return ()
         sent = bool(flags & socket.MSG_CONFIRM)  # by this very socket (linux, networking/can)
         return (Heard(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
+
+
+def _enlarge(sock: socket.socket) -> None:
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)
+    except PermissionError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
 
 
 def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:
