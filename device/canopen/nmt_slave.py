@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.device.canopen.service import Handler, Service
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import (
     ALL_NODES,
@@ -33,6 +34,8 @@ class NmtSlave(Service):
 
     def booted(self) -> None:
         """Send the boot-up message and enter Pre-operational, or Operational by itself."""
+        if not self.node.boots():
+            return
         self.node.send(ERROR_CONTROL_COB_ID + self.node.node_id, bytes([NmtState.INITIALISING]))
         self.node.enter(NmtState.PRE_OPERATIONAL)
         startup = self.node.dictionary.find(NMT_STARTUP)
@@ -40,8 +43,8 @@ class NmtSlave(Service):
             self.node.enter(NmtState.OPERATIONAL)
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Listen to the NMT master, but not while initialising."""
-        if state is not NmtState.INITIALISING:
+        """Listen to the NMT master; a node without node-ID waits for LSS alone."""
+        if self.node.node_id != UNCONFIGURED:
             yield NMT_COB_ID, self._receive
 
     def _receive(self, frame: CanFrame) -> None:
@@ -52,10 +55,10 @@ class NmtSlave(Service):
             command = NmtCommand(frame.data[0])
         except ValueError:
             return
-        self.obey(command)
+        if self.node.admits(command):
+            self._obey(command)
 
-    def obey(self, command: NmtCommand) -> None:
-        """Carry out a command."""
+    def _obey(self, command: NmtCommand) -> None:
         match command:
             case NmtCommand.RESET_NODE:
                 self.node.reset_node()

@@ -13,7 +13,7 @@ from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
-from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.canopen.time_of_day import TimeOfDay
 
 TICK_US: Final = 1_000
@@ -56,6 +56,8 @@ class CanopenSlave:
         on_state: told of each change of the NMT state, old and new.
         on_sync: told the counter of each SYNC, 0 if it has none: RPDOs, TPDOs, then others.
         on_bit_rate: told the bit rate in bit/s that LSS has switched to.
+        boots: asked at the end of Initialising whether the node boots or stays there.
+        admits: asked before each NMT command whether it is carried out.
     """
 
     def __init__(
@@ -73,6 +75,8 @@ class CanopenSlave:
         self.on_state: list[Callable[[NmtState, NmtState], None]] = []
         self.on_sync: list[Callable[[int], None]] = []
         self.on_bit_rate: list[Callable[[int], None]] = []
+        self.boots: Callable[[], bool] = _boots
+        self.admits: Callable[[NmtCommand], bool] = _admits
         self.time_of_day: TimeOfDay | None = None
         self.silent_until_us = 0
         self._powered = False
@@ -242,6 +246,16 @@ class CanopenSlave:
                 service.tick(now_us)
         if self._powered:
             self._due_us = min(dues)
+
+
+def _boots() -> bool:
+    """Boot, as CiA 301 has it."""
+    return True
+
+
+def _admits(command: NmtCommand) -> bool:
+    """Carry out each command, as CiA 301 has it."""
+    return True
 
 
 def _both(first: Handler | None, second: Handler) -> Handler:

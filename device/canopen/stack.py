@@ -50,7 +50,6 @@ def make_slave(
     node_id: int,
     nonvolatile: Nonvolatile | None = None,
     application: ServiceMaker = Application,
-    nmt: ServiceMaker = NmtSlave,
 ) -> CanopenSlave:
     """Make a slave with every service that its dictionary has objects for.
 
@@ -59,8 +58,6 @@ def make_slave(
         node_id: 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: what it kept from an earlier life.
         application: what the device does with its objects: a device profile, or nothing.
-        nmt: how it follows the NMT master.
     """
-    own: dict[ServiceMaker, ServiceMaker] = {Application: application, NmtSlave: nmt}
-    services = tuple(own.get(make, make) for make in SERVICES)
+    services = tuple(application if make is Application else make for make in SERVICES)
     return CanopenSlave(dictionary, node_id, services, nonvolatile)

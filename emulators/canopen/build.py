@@ -80,9 +80,7 @@ def make_nodes(
         description = item.description
         dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
-        slave = make_slave(
-            dictionary, item.node_id, memory, description.application, description.nmt
-        )
+        slave = make_slave(dictionary, item.node_id, memory, description.application)
         nodes.append(Node(item.name, slave, wire))
     return nodes
 

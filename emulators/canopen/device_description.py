@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.wire.canopen.device_info import DeviceInfo
 
@@ -22,7 +21,6 @@ class DeviceDescription:
         node_id: of a DCF or model, None if it gives none.
         bit_rate: of a DCF in bit/s, None if it gives none.
         application: what the device does with its objects.
-        nmt: how it follows the NMT master.
     """
 
     file: str
@@ -31,7 +29,6 @@ class DeviceDescription:
     node_id: int | None = None
     bit_rate: int | None = None
     application: ServiceMaker = Application
-    nmt: ServiceMaker = NmtSlave
 
     def make_dictionary(self) -> Dictionary:
         """Make the dictionary of one more slave."""

@@ -8,11 +8,9 @@ from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.device_rtc.make import application_of, make_dictionary
-from tickrig.device.canopen.device_rtc.nmt import RtcNmt
 from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
-from tickrig.device.canopen.nmt_slave import NmtSlave
 from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.wire.canopen.device_info import BIT_RATES, DeviceInfo
@@ -31,7 +29,6 @@ class Model:
         node_id: its node-ID unless told otherwise.
         dictionary: makes the objects with default values.
         application: what it does with them.
-        nmt: how it follows the NMT master.
     """
 
     name: str
@@ -39,7 +36,6 @@ class Model:
     node_id: int
     dictionary: Callable[[], Dictionary]
     application: ServiceMaker
-    nmt: ServiceMaker = NmtSlave
 
     def describe(self) -> DeviceDescription:
         """Return what an EDS would say, and what none can."""
@@ -50,7 +46,6 @@ class Model:
             template,
             self.node_id,
             application=self.application,
-            nmt=self.nmt,
         )
 
 
@@ -82,7 +77,6 @@ _MODELS: Final = (
         48,
         partial(make_dictionary, Echo),
         application_of(Echo),
-        RtcNmt,
     ),
 )
 

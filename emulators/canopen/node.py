@@ -30,6 +30,9 @@ ERROR_STATE_NAMES: Final = {
 }
 OFF: Final = "Off"
 
+NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
+"""Every node has these beside those of its device."""
+
 NODE_OUTPUTS: Final = (
     Output("state", "NMT state, or Off"),
     Output("node_id", "active node-ID, 255 while it has none"),

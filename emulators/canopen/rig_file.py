@@ -12,9 +12,11 @@ from tickrig.emulators.canopen.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
 from tickrig.emulators.canopen.profiles import CHOICES
+from tickrig.emulators.user_file import SUFFIX
 from tickrig.host.cli.refused import Refused, refuse_path
 
-NODE_KEYS: Final = ("id", "eds", "model", "profile")
+NODE_KEYS: Final = ("id", "eds", "model", "rtc", "profile")
+DEVICE_KEYS: Final = ("eds", "model", "rtc")
 TABLES: Final = "it consists of tables [[node]] and perhaps one table [body]"
 
 
@@ -72,15 +74,19 @@ def _read_node(path: Path, place: str, table: object) -> Iterator[NodeSpec]:
 
 
 def _device(path: Path, place: str, table: dict[str, Any]) -> Path | str:
-    file, model = table.get("eds"), table.get("model")
-    if (file is None) == (model is None):
-        raise Refused(f"{place}: give eds, the name of an EDS or DCF file, or model")
-    if model is not None:
-        if not isinstance(model, str) or model not in MODELS:
-            raise Refused(f"{place}: model {model!r} is not one of {', '.join(MODELS)}")
-        if "profile" in table:
-            raise Refused(f"{place}: profile belongs to eds; a model has its own")
-        return model
-    if not isinstance(file, str) or not file:
-        raise Refused(f"{place}: eds {file!r} is not the name of an EDS or DCF file")
-    return path.parent / file
+    """Return what the node is made of; files are looked for beside the rig file."""
+    given = [key for key in DEVICE_KEYS if key in table]
+    if len(given) != 1:
+        raise Refused(f"{place}: give eds, the name of an EDS or DCF file, or model, or rtc")
+    key, name = given[0], table[given[0]]
+    if key != "eds" and "profile" in table:
+        raise Refused(f"{place}: profile belongs to eds; each {key} has its own")
+    if key == "model" and (not isinstance(name, str) or name not in MODELS):
+        raise Refused(f"{place}: model {name!r} is not one of {', '.join(MODELS)}")
+    if key == "rtc" and not (isinstance(name, str) and f"{SUFFIX}:" in name):
+        raise Refused(f"{place}: rtc {name!r} is not FILE{SUFFIX}:Class")
+    if not isinstance(name, str) or not name:
+        raise Refused(f"{place}: eds {name!r} is not the name of an EDS or DCF file")
+    if key == "model":
+        return name
+    return path.parent / name if key == "eds" else str(path.parent / name)

@@ -12,8 +12,8 @@ import click
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.make import application_of, make_device_rtc, make_dictionary
-from tickrig.device.canopen.device_rtc.nmt import RtcNmt
 from tickrig.emulators.canopen.device_description import DeviceDescription
+from tickrig.emulators.canopen.node import NODE_INPUTS
 from tickrig.emulators.user_file import find_class, told
 from tickrig.host.cli.refused import Refused
 from tickrig.wire.rtc_canopen.objects import device_info
@@ -28,6 +28,9 @@ def describe_rtc(spec: str) -> DeviceDescription:
         ValueError: its file cannot be run, or it cannot be a DeviceRTC.
     """
     kind: type[Component] = find_class(spec, Component)
+    for item in kind.physical:
+        if item.name in NODE_INPUTS:
+            raise ValueError(f"{spec}: input {item.name!r} is one that every node has")
     try:
         make_device_rtc(kind, ANY_ID)
     except Exception as error:  # a user's constructor may raise anything
@@ -37,7 +40,6 @@ def describe_rtc(spec: str) -> DeviceDescription:
         device_info(kind.profile()),
         make_dictionary(kind),
         application=application_of(kind),
-        nmt=RtcNmt,
     )
 
 

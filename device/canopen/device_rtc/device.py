@@ -41,6 +41,7 @@ class DeviceRtc(Application):
         self.outputs = outputs_of(self.life.component)
         self._timer = Timer(kind.rate_hz)
         node.on_state.append(self._moved)
+        node.boots, node.admits = self.life.boots, self.life.admits
 
     def read(self, name: str) -> float | str:
         """Return the present value of a physical output."""

@@ -6,7 +6,6 @@ from functools import partial
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.device_rtc.nmt import RtcNmt
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.objects import dictionary_of
@@ -21,7 +20,7 @@ def make_dictionary(kind: type[Component]) -> Dictionary:
 
 
 def application_of(kind: type[Component]) -> ServiceMaker:
-    """Return what makes the application of a component; it wants `RtcNmt` as NMT slave."""
+    """Return what makes the application of a component."""
     return partial(DeviceRtc, kind=kind)
 
 
@@ -38,4 +37,4 @@ def make_device_rtc(
     Raises:
         ValueError: a component or a node-ID that cannot be.
     """
-    return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind), RtcNmt)
+    return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind))

@@ -19,6 +19,7 @@ GRIPPER = "examples/device_rtc_gripper.py:Gripper"
 COMPONENT = """
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.ports import InPort
+from tickrig.device.physical import Input
 from tickrig.wire.rtc_canopen.port_types import CHARACTER, STRING
 
 class Mine(Component):
@@ -30,6 +31,10 @@ class Mine(Component):
 class Wordy(Component):
     type_name = "Wordy"
     words = InPort("words", STRING)
+
+class Greedy(Component):
+    type_name = "Greedy"
+    physical = (Input("power_off", "mine"),)
 
 class Broken(Component):
     type_name = "Broken"
@@ -124,15 +129,16 @@ def test_an_eds_that_derives_a0h_keeps_its_own_type(tmp_path: Path, mine: Path) 
 def test_a_callback_that_raises_is_one_line(mine: Path) -> None:
     result = run("--rtc", f"{mine}:Mine", "--node-id", "5", scenario="10ms send 000#0105\n1s end\n")
     assert result.exit_code == 2
-    assert result.stderr.splitlines()[-1] == f"Error: {mine}:Mine: line 10: RuntimeError: no idea"
+    assert result.stderr.splitlines()[-1] == f"Error: {mine}:Mine: line 11: RuntimeError: no idea"
 
 
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
         ("Wordy", "mine.py:Wordy: Wordy: port words: String does not fit a PDO; use an SDO"),
-        ("Broken", "line 20: AttributeError: 'Broken' object has no attribute 'nothing'"),
-        ("Other", "has no component 'Other'; it has Mine, Wordy, Broken"),
+        ("Greedy", "input 'power_off' is one that every node has"),
+        ("Broken", "line 25: AttributeError: 'Broken' object has no attribute 'nothing'"),
+        ("Other", "has no component 'Other'; it has Mine, Wordy, Greedy, Broken"),
     ],
 )
 def test_a_component_that_cannot_be_is_one_line(mine: Path, name: str, reason: str) -> None:
@@ -146,3 +152,10 @@ def test_what_is_no_file_with_a_class_is_one_line() -> None:
     assert (result.exit_code, result.stderr.splitlines()[-1]) == (
         *(2, "Error: 'gripper' is not FILE.py:Class"),
     )
+
+
+def test_a_rig_file_names_components_beside_it(tmp_path: Path, mine: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[[node]]\nid = 5\nrtc = "mine.py:Mine"\n[[node]]\nmodel = "rtc-echo"\n')
+    result = run("--rig", rig, scenario="20ms end\n")
+    assert (result.exit_code, frames(result)) == (0, ["705#00", "730#00"])
