@@ -13,7 +13,7 @@ from tickrig.wire.canopen.emcy import describe
 VERSION: Final = 1
 GAP: Final = "  "
 BAR_CELLS: Final = 5
-HEADS: Final = ("NODE", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", "EMCY", "SDO ERROR", "NAME")
+HEADS: Final = ("NODE", "NAME", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", "EMCY", "SDO ERROR")
 
 
 def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list[str]:
@@ -46,13 +46,13 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
     boots = f"{row.boots} ({row.unasked_boots} unasked)" if row.unasked_boots else f"{row.boots}"
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
+        row.name,
         row.state_text,
         _heartbeat(row, now_us),
         boots if row.boots else "",
         row.drive_state,
         _emcy(row),
         f"{row.sdo_error} [{row.sdo_errors}]" if row.sdo_errors else "",
-        row.name,
     )
 
 

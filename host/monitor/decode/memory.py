@@ -74,6 +74,10 @@ class NodeMemory:
         data = self._now.get((index, sub), self.eds.values.get((index, sub)))
         return None if data is None else int.from_bytes(data, "little")
 
+    def was_heard(self, entry: Entry) -> bool:
+        """Say whether traffic told a value."""
+        return entry in self._now
+
     def source(self, index: int) -> str:
         """Say where the values of an object come from: traffic, where it told any."""
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]

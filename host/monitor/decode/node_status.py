@@ -83,10 +83,13 @@ class NodeStatus:
 
     @property
     def period_us(self) -> int | None:
-        """The heartbeat period: by 1017h, else as learnt from the gaps; None for none."""
+        """The heartbeat period: by 1017h, else as learnt from the gaps; None for none.
+
+        A 0 of an EDS is not believed: heartbeats that are heard count more.
+        """
         told = self.memory.number(*HEARTBEAT_TIME)
-        if told:
-            return told * 1_000
+        if told or self.memory.was_heard(HEARTBEAT_TIME):
+            return told * 1_000 if told else None
         return round(median(self._gaps)) if self._gaps else None
 
     @property
