@@ -6,34 +6,27 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.decode_options import eds_option, make_decoder
+from tickrig.host.canmon.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.ending import report, until_interrupted
-from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.graph_file import write_graph
 from tickrig.host.canmon.graph_request import GraphRequest
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
-from tickrig.host.canmon.source_word import FileWord, parse_source
 from tickrig.host.canmon.stopwatch import Stopwatch
+from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.collector import Collector
-from tickrig.host.monitor.graph.frame_slice import FrameSlice
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
+from tickrig.host.monitor.graph.signal_word import ObjectName, parse_signal
 from tickrig.host.monitor.graph.view import View
-from tickrig.host.monitor.logs.log_reader import LogError
-
-if TYPE_CHECKING:
-    from tickrig.host.monitor.logs.columns import Columns
 
 POLL_US: Final = 20_000
 PAINT_US: Final = 100_000
@@ -47,7 +40,7 @@ SIZE: Final = (100, 28)
 @click.command(cls=BusCommand)
 @click.argument("source")
 @click.argument("signals", nargs=-1, required=True, metavar="SIGNAL...")
-@eds_option
+@decode_options
 @click.option("-o", "files", multiple=True, type=PATH, metavar="FILE", help=".svg .html .png .csv")
 @click.option("--from", "from_", metavar="TIME", help="Begin 3s after the first sample.")
 @click.option("--to", metavar="TIME", help="End 9s after the first sample.")
@@ -62,7 +55,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """Draw curves of SOURCE: in the terminal, or to files.
 
     A SIGNAL is an object, as 3.velocity_actual_value or 3.statusword.fault
-    (names of the EDS, or of what SDO traffic told), or a slice of a frame, as
+    (names of the EDS or DBC file, or of what SDO traffic told), or a slice, as
     ID[BYTES]TYPE*FACTOR+OFFSET: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5; TYPE
     is u, s or f, with b behind it big-endian. LABEL= before it names it, @2
     behind it takes another axis. A spike never vanishes: each column shows its
@@ -82,15 +75,11 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
         words = [parse_signal(text) for text in signals]
     except ValueError as error:
         raise Refused(str(error)) from None
-    decoder, strict = make_decoder(options.pop("eds")), options.pop("strict")
-    columns = _columns(source, words)
-    if columns is not None:
-        collector = Collector(words)
-        collector.take_columns(columns)
-        click.echo("".join(f"{word}\n" for word in columns.tally.words(source)), err=True, nl=False)
-        _show(collector.series, request)
-        return
-    frames = open_source([source], BusOptions(**options))
+    eds, dbc, strict = (options.pop(name) for name in ("eds", "dbc", "strict"))
+    objects = any(isinstance(word.source, ObjectName) for word in words)
+    decoder = make_decoder(eds, dbc) if objects or eds or dbc else None
+    whole = None if objects else whole_log([source])
+    frames = whole or open_source([source], BusOptions(**options))
     collector = Collector(words, decoder, MOST if frames.live else 0)
     try:
         with until_interrupted():
@@ -101,24 +90,10 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     report(frames, strict)
 
 
-def _columns(source: str, words: Sequence[SignalWord]) -> Columns | None:
-    """Return the log as columns where that is all it takes: slices, and numpy."""
-    log = parse_source(source)
-    slices = all(isinstance(word.source, FrameSlice) for word in words)
-    if not (slices and isinstance(log, FileWord) and log.chosen is None and find_spec("numpy")):
-        return None
-    from tickrig.host.monitor.logs.column_reader import read_columns  # noqa: PLC0415 - an extra
-
-    try:
-        return read_columns(log.path)
-    except OSError as error:
-        raise SourceFailed(f"{log.path}: {error.strerror}") from error
-    except LogError as error:
-        raise SourceFailed(str(error)) from error
-
-
-def _collect(frames: Source, collector: Collector, request: GraphRequest) -> None:
+def _collect(frames: Source | WholeLog, collector: Collector, request: GraphRequest) -> None:
     """Take what comes; live, paint it where there is a terminal."""
+    if isinstance(frames, WholeLog):
+        collector.take_columns(frames.columns)
     if frames.live and sys.stdout.isatty():
         with Screen() as screen:
             _watch(frames, collector, request, screen)

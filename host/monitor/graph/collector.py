@@ -6,8 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tickrig.host.monitor.decode.decoded import Signal
-from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.graph.frame_slice import EXTENDED, FrameSlice
 from tickrig.host.monitor.graph.series import Series
 from tickrig.host.monitor.graph.signal_word import ObjectName, SignalWord
@@ -15,6 +14,7 @@ from tickrig.host.monitor.heard import Heard
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoder import Decoder
     from tickrig.host.monitor.logs.columns import Columns
 
 
@@ -25,7 +25,7 @@ class Collector:
 
     Args:
         words: the signals.
-        decoder: for objects.
+        decoder: for objects; without one they have no values.
         most: as `Series.most`.
 
     Attributes:
@@ -36,15 +36,14 @@ class Collector:
         self, words: Sequence[SignalWord], decoder: Decoder | None = None, most: int = 0
     ) -> None:
         self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
-        self._decoder = decoder or Decoder()
+        self._decoder = decoder
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
-        self._objects: defaultdict[int, list[_Object]] = defaultdict(list)
+        self._objects: list[_Object] = []
         for word, series in zip(words, self.series, strict=True):
             if isinstance(word.source, FrameSlice):
                 self._slices[word.source.key].append((word.source, series))
             else:
-                named = bool(word.label)
-                self._objects[word.source.node].append(_Object(word.source, series, named))
+                self._objects.append(_Object(word, word.source, series))
 
     def take(self, heard: Heard) -> None:
         """Take the values in a frame."""
@@ -55,12 +54,11 @@ class Collector:
                 value = cut.value(frame.data)
                 if value is not None:
                     series.append(at_us, value)
-        if self._objects:
+        if self._objects and self._decoder is not None:
             decoded = self._decoder.take(heard)
-            if decoded.signals and decoded.node is not None:
-                for wanted in self._objects.get(decoded.node, ()):
-                    for signal in decoded.signals:
-                        wanted.take(at_us, signal)
+            if decoded.signals:
+                for wanted in self._objects:
+                    wanted.take(at_us, decoded)
 
     def take_columns(self, columns: Columns) -> None:
         """Take the values of slices in a whole log at once."""
@@ -75,24 +73,28 @@ class Collector:
 class _Object:
     """An object that is waited for."""
 
-    def __init__(self, wanted: ObjectName, series: Series, named: bool) -> None:
-        self._wanted, self._series, self._named = wanted, series, named
-        self._name = ""
+    def __init__(self, word: SignalWord, wanted: ObjectName, series: Series) -> None:
+        self._word, self._wanted, self._series = word, wanted, series
+        self._found: tuple[int | None, str] | None = None
 
-    def take(self, at_us: int, signal: Signal) -> None:
-        """Take its value, if that is what the signal is."""
-        name = signal.name
-        if name != self._name and not self._is_first(name):
+    def take(self, at_us: int, decoded: Decoded) -> None:
+        """Take its value, if it is among the signals."""
+        if self._wanted.node not in (None, decoded.node):
             return
-        value = self._wanted.value(signal)
-        if value is not None:
-            self._series.append(at_us, value)
-            self._series.unit = signal.unit
+        for signal in decoded.signals:
+            place = decoded.node, signal.name
+            if self._found is None and signal.name.lower().startswith(self._wanted.name):
+                self._find(place, signal.unit)
+            if place == self._found and (value := self._wanted.value(signal)) is not None:
+                self._series.append(at_us, value)
 
-    def _is_first(self, name: str) -> bool:
-        if self._name or not name.startswith(self._wanted.name):
-            return False
-        self._name = name
-        if not self._named:
-            self._series.label = self._series.label.replace(self._wanted.name, name, 1)
-        return True
+    def _find(self, place: tuple[int | None, str], unit: str) -> None:
+        """Keep to the first that fits, and call the curve so."""
+        self._found = place
+        if self._wanted.bit is None:
+            self._series.unit = unit
+        if not self._word.label:
+            node, name = place
+            begun = self._word.text.lower().rfind(self._wanted.name)
+            bit = self._word.text[begun + len(self._wanted.name) :]
+            self._series.label = f"{'' if node is None else f'{node}.'}{name}{bit}"

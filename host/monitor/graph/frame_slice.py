@@ -88,7 +88,9 @@ class FrameSlice:
             numbers = (raw.view(np.int64) >> np.int64(64 - self.bits)).astype(np.float64)
         elif self.kind == "f":
             size = self.bits // 8
-            numbers = (raw >> drop).astype(f"u{size}").view(f"f{size}").astype(np.float64)
+            floats = (raw >> drop).astype(f"u{size}").view(f"f{size}")
+            with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+                numbers = floats.astype(np.float64)
         else:
             numbers = (raw >> drop).astype(np.float64)
         numbers *= self.factor

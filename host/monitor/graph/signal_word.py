@@ -17,7 +17,9 @@ from tickrig.host.monitor.decode.drive_state import BITS
 from tickrig.host.monitor.graph.frame_slice import FrameSlice, parse_slice
 
 _WORD: Final = re.compile(r"(?:([^=\[\]@]+)=)?([^=@]+)(?:@([1-9]))?")
-_OBJECT: Final = re.compile(r"([0-9]{1,3})\.([a-z0-9_.:]+)", re.ASCII | re.IGNORECASE)
+_OBJECT: Final = re.compile(
+    r"(?:([0-9]{1,3})\.)?([a-z_][a-z0-9_.]*|[0-9a-f]{4}h[0-9a-f:]*)", re.ASCII | re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +27,12 @@ class ObjectName:
     """An object of a node, or one bit of it.
 
     Attributes:
-        node: node-ID.
-        name: as the decoder names it, or how that begins.
+        node: node-ID, None for any: a signal of a DBC file has none.
+        name: as the decoder names it, or how that begins; in lower case.
         bit: which bit, None for the whole value.
     """
 
-    node: int
+    node: int | None
     name: str
     bit: int | None = None
 
@@ -77,11 +79,9 @@ def parse_signal(text: str) -> SignalWord:
 
 def _object(text: str) -> ObjectName:
     match = _OBJECT.fullmatch(text)
-    if match is None or not 1 <= int(match[1]) <= 127:
-        raise ValueError(
-            f"{text!r} is neither NODE.OBJECT, as 3.position, nor a slice, as 181[2:6]s"
-        )
-    node, name = int(match[1]), match[2].lower()
+    if match is None or not 1 <= int(match[1] or 1) <= 127:
+        raise ValueError(f"{text!r} is neither an object, as 3.position, nor a slice, as 181[2:6]s")
+    node, name = int(match[1]) if match[1] else None, match[2].lower()
     base, _, bit = name.rpartition(".")
     shift = BITS.get(base, {}).get(bit)
     return ObjectName(node, name) if shift is None else ObjectName(node, base, shift)

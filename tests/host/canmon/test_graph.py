@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import re
 import struct
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -65,10 +64,11 @@ def test_an_object_is_drawn_like_the_slice_that_it_is(log: str) -> None:
     assert by_name.stdout.startswith("━ a 1600\n")
 
 
-def test_a_log_is_drawn_without_numpy(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    with_numpy = canmon(log, "185[2:6]s")
-    monkeypatch.setitem(sys.modules, "numpy", None)
-    assert canmon(log, "185[2:6]s").stdout == with_numpy.stdout
+def test_a_large_log_is_drawn_like_a_small_one(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one_by_one = canmon(log, "185[2:6]s")
+    monkeypatch.setattr("tickrig.host.canmon.whole_log.SMALL_BYTES", 0)
+    at_once = canmon(log, "185[2:6]s")
+    assert (at_once.stdout, at_once.stderr) == (one_by_one.stdout, "")
 
 
 def test_files_are_written_as_their_names_say(log: str, tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_a_signal_without_samples_is_told(log: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["185"], "'185' is neither NODE.OBJECT"),
+        (["185"], "'185' is neither an object, as 3.position, nor a slice"),
         (["185[0]", "-o", "a.gif"], "-o a.gif: a graph is written as .svg, .html, .png, .csv"),
         (["185[0]", "--size", "9x9"], "--size '9x9' is not WIDTHxHEIGHT"),
         (["185[0]", "--range", "1=5..5"], "--range '1=5..5' is not AXIS=LOW..HIGH"),

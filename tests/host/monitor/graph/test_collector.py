@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.signal_word import parse_signal
@@ -14,6 +15,7 @@ from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
 
+DBC = GOLDEN / "engine.dbc"
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 LOG = """\
 (1600000000.000000) can0 181#3702FEFFFFFF
@@ -69,6 +71,24 @@ def test_a_name_that_began_with_one_object_keeps_to_it() -> None:
     assert (target.label, list(target.values)) == ("5.target_velocity", [1_000, 1_000])
 
 
+def test_a_name_alone_means_the_first_node_that_has_it() -> None:
+    collector = collected("position", "statusword.fault", eds={5: EPOS, 6: EPOS})
+    for frame in heard("185#37020A000000", "186#37020B000000"):
+        collector.take(frame)
+    assert [(one.label, list(one.values)) for one in collector.series] == [
+        ("5.position_actual_value", [10]),
+        ("5.statusword.fault", [0]),
+    ]
+
+
+def test_a_signal_of_a_dbc_file_has_a_curve_with_its_unit() -> None:
+    collector = Collector([parse_signal("speed")], Decoder(dbc=[DBC]))
+    for frame in heard("123#E8030100", "123#E803"):
+        collector.take(frame)
+    (speed,) = collector.series
+    assert (speed.label, speed.unit, list(speed.values)) == ("Speed", "rpm", [500, 500])
+
+
 def test_a_log_as_columns_gives_the_same(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     path.write_text(LOG)
@@ -94,8 +114,8 @@ def test_what_is_no_number_has_no_curve() -> None:
     [
         ("", "is not [LABEL=]SIGNAL[@AXIS]"),
         ("181[0]@0", "is not [LABEL=]SIGNAL[@AXIS]"),
-        ("position", "'position' is neither NODE.OBJECT, as 3.position, nor a slice"),
-        ("200.position", "'200.position' is neither NODE.OBJECT"),
+        ("3.", "'3.' is neither an object, as 3.position, nor a slice"),
+        ("200.position", "'200.position' is neither an object"),
         ("a=181[9]", "'181[9]' is not ID[BYTES]TYPE"),
     ],
 )

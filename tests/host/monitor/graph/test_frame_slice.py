@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.graph.frame_slice import FrameSlice, parse_slice
@@ -84,6 +84,7 @@ def test_many_payloads_at_once_give_the_same(cut: FrameSlice, data: bytes) -> No
     assert cut.values(payload)[0] == pytest.approx(cut.value(data), rel=1e-15)
 
 
+@example(bytes.fromhex("000000007F800001"), "[4:8]fb")
 @given(st.binary(min_size=8, max_size=8), st.sampled_from(["[0:4]f", "[4:8]fb", "[0:8]f"]))
 def test_many_floats_at_once_give_the_same(data: bytes, field: str) -> None:
     cut = parse_slice(f"181{field}")
