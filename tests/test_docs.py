@@ -25,6 +25,7 @@ def blocks(page: str, language: str) -> list[str]:
     [
         "README.md",
         "docs/canopen.md",
+        "docs/device-rtc.md",
         "docs/rtc-lite.md",
         "docs/rtc.md",
         "docs/canopen-io-module.md",
