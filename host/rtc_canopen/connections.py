@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc.port import ConnectorProfile
 from tickrig.host.rtc_canopen.definition import RtConnection
-from tickrig.host.rtc_canopen.events import EventKind
-
-Note = Callable[[EventKind, str], None]
+from tickrig.host.rtc_canopen.events import EventKind, Note
 
 
 class Connections:
@@ -59,9 +55,9 @@ class Connections:
         try:
             self._manager.connect(entry.source, entry.target, entry.properties)
         except RtcRefused as error:
-            self._note(EventKind.CONNECTION_REFUSED, str(error))
+            self._note(EventKind.CONNECTION_REFUSED, 0, str(error))
         else:
-            self._note(EventKind.CONNECTED, ends)
+            self._note(EventKind.CONNECTED, 0, ends)
 
 
 def _entry(profile: ConnectorProfile) -> RtConnection:

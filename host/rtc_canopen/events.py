@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Final, Protocol
 
 KEPT: Final = 10_000
 """Events that a log keeps; older ones are dropped."""
@@ -70,6 +70,13 @@ class Event:
 
 
 Listener = Callable[[Event], None]
+
+
+class Note(Protocol):
+    """Takes an event, at the present time."""
+
+    def __call__(self, kind: EventKind, node: int, text: str = "", /) -> None:
+        """Take it; node 0 stands for none."""
 
 
 class EventLog:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from tickrig.host.rtc_canopen.boot import set_pdo
 from tickrig.host.rtc_canopen.definition import PdoEntry, PdoLink, PdoName
 from tickrig.host.rtc_canopen.dialogue import Failure, Job
 from tickrig.host.rtc_canopen.errors import ServerRefused
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
-
-Note = Callable[[EventKind, int, str], None]
 
 
 class Links:

@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Final
+from collections.abc import Mapping
 
 from tickrig.host.link import NEVER
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 from tickrig.host.rtc_canopen.connections import Connections
+from tickrig.host.rtc_canopen.data_flow import DataFlow
 from tickrig.host.rtc_canopen.definition import NodeEntry, SystemDefinition
 from tickrig.host.rtc_canopen.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import EventKind, EventLog
 from tickrig.host.rtc_canopen.links import Links
-from tickrig.host.rtc_canopen.pdo_ports import PdoSink, PdoSource
 from tickrig.host.rtc_canopen.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.receiver import Receiver
+from tickrig.host.rtc_canopen.served_node import ServedNode
+from tickrig.host.rtc_canopen.start_order import StartOrder
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
-from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
 from tickrig.wire.canopen.nmt import (
-    ALL_NODES,
     ERROR_CONTROL_COB_ID,
     NMT_COB_ID,
     NmtCommand,
     NmtState,
 )
-from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_types.idl import Struct
-
-EMERGENCY: Final = range(0x081, 0x100)
-SDO_RESPONSES: Final = range(0x581, 0x600)
-ERROR_CONTROL: Final = range(0x701, 0x780)
-QUIET_US: Final = 1_000_000
-"""Another master that was not heard for so long is told of anew."""
 
 
 class Server:
@@ -70,16 +62,15 @@ class Server:
         self.definition, self.manager = definition, manager or Manager()
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
-        self._started, self._heartbeat_us, self._foreign_us = False, NEVER, -QUIET_US
+        self._started, self._heartbeat_us = False, NEVER
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
-        self._sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
-        self._sinks: tuple[tuple[ServedNode, PdoSink], ...] = ()
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
         self.links = Links(self.nodes, definition.pdo_links, self.note)
-        self.connections = Connections(
-            self.manager, definition.rt_connections, lambda kind, text: self.note(kind, 0, text)
-        )
+        self.connections = Connections(self.manager, definition.rt_connections, self.note)
+        self._receiver = Receiver(self.nodes, definition.master.node, self.note)
+        self._data = DataFlow(self.nodes, self.send, self.note)
+        self._start_order = StartOrder(self.nodes, definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
@@ -89,8 +80,8 @@ class Server:
             self._start()
         self._hear_bus()
         for frame in rx:
-            if not (frame.remote or frame.extended):
-                self._hear(frame)
+            if not (frame.remote or frame.extended or self._data.receive(now_us, frame)):
+                self._receiver.receive(now_us, frame)
         if self._nodes_due_us <= now_us:
             self._tick_nodes()
         begins = self._context.due_us <= now_us
@@ -99,8 +90,8 @@ class Server:
         self.manager.tick(now_us)
         if begins:
             self._carry_out()
-            self._start_next()
-        self._send_values()
+            self._start_order.go_on()
+        self._data.send_values()
         self._send_heartbeat()
         self.due_us = min(self._nodes_due_us, self.manager.due_us, self._heartbeat_us)
         out, self._out = tuple(self._out), []
@@ -130,16 +121,11 @@ class Server:
             BAD_PARAMETER if there is no such port or the value does not fit,
             PRECONDITION_NOT_MET while its proxy is not Active or another device sends it.
         """
-        for node, sink in self._all_sinks():
-            for port in sink.ports:
-                if port.full_name == name:
-                    return self._send_value(node, sink, port.name, value)
-        return ReturnCode.BAD_PARAMETER
+        return self._data.put(name, value)
 
     def start(self) -> None:
         """Activate all nodes in the start order, each when those before it are Active."""
-        for node in self.nodes.values():
-            node.to_start = True
+        self._start_order.start()
 
     def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
         """Take an event."""
@@ -165,12 +151,12 @@ class Server:
         """Remove the proxy of a node."""
         if (proxy := node.proxy) is None:
             return
-        node.proxy = None
+        node.operations.proxy = None
         if self.definition.master.reconnect:
             self.connections.keep(proxy)
         self.manager.delete(proxy.instance_name)
         self._states.pop(node.entry.id, None)
-        self._route()
+        self._data.route()
         self.note(EventKind.PROXY_REMOVED, node.entry.id, proxy.instance_name)
 
     def _node(self, entry: NodeEntry, files: Mapping[str, DeviceFile]) -> ServedNode:
@@ -190,7 +176,7 @@ class Server:
             node.look(self.now_us)
 
     def _make_proxy(self, node: ServedNode) -> None:
-        proxy = node.proxy = ProxyRtc(node.entry, node.layouts)
+        proxy = node.operations.proxy = ProxyRtc(node.entry, node.layouts)
         self.manager.add(proxy, context=self._context)
         for layout in node.layouts:
             if layout.unknown:
@@ -198,81 +184,7 @@ class Server:
                 text = f"{layout.name}: no port has the type of {mapped}"
                 self.note(EventKind.PORT_REFUSED, node.entry.id, text)
         self.note(EventKind.PROXY_MADE, node.entry.id, proxy.instance_name)
-        for sink in proxy.sinks:
-            for port in sink.ports:
-                port.on_connect.append(lambda _: self._route())
-                port.on_disconnect.append(lambda _: self._route())
-        self._route()
-
-    def _route(self) -> None:
-        """Collect which PDO goes to which OutPorts, and which InPorts have connectors."""
-        sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
-        for node in self.nodes.values():
-            for source in node.proxy.sources if node.proxy else ():
-                cob_id = source.layout.cob_id
-                sources[cob_id] = (*sources.get(cob_id, ()), (node, source))
-        self._sources = sources
-        self._sinks = tuple(
-            (node, sink)
-            for node, sink in self._all_sinks()
-            if any(port.connectors for port in sink.ports)
-        )
-
-    def _all_sinks(self) -> Iterator[tuple[ServedNode, PdoSink]]:
-        for node in self.nodes.values():
-            for sink in node.proxy.sinks if node.proxy else ():
-                yield node, sink
-
-    def _hear(self, frame: CanFrame) -> None:
-        can_id, node = frame.can_id, self.nodes.get(frame.can_id & 0x7F)
-        if can_id in self._sources:
-            self._hear_pdo(frame)
-        elif can_id == NMT_COB_ID:
-            self._hear_command(frame.data)
-        elif can_id == ERROR_CONTROL_COB_ID + self.definition.master.node:
-            self._hear_master()
-        elif node is None:
-            return
-        elif can_id in ERROR_CONTROL:
-            node.hear_error_control(self.now_us, frame.data)
-        elif can_id in SDO_RESPONSES:
-            node.hear_sdo(self.now_us, frame.data)
-        elif can_id in EMERGENCY:
-            self._hear_emergency(node, frame.data)
-
-    def _hear_pdo(self, frame: CanFrame) -> None:
-        for node, source in self._sources[frame.can_id]:
-            if len(frame.data) < source.layout.size:
-                text = f"{source.layout.name}: {len(frame.data)} of {source.layout.size} bytes"
-                self.note(EventKind.PDO_TOO_SHORT, node.entry.id, text)
-            elif node.proxy is not None and node.proxy.passing:
-                source.receive(self.now_us, frame.data)
-
-    def _hear_command(self, data: bytes) -> None:
-        if len(data) != 2:
-            return
-        command, node_id = data
-        known = command in tuple(NmtCommand)
-        text = NmtCommand(command).name if known else f"{command:02X}h"
-        self.note(EventKind.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
-        for node in self.nodes.values():
-            if node_id in (ALL_NODES, node.entry.id):
-                node.hear_foreign(self.now_us, command)
-
-    def _hear_master(self) -> None:
-        if self.now_us - self._foreign_us >= QUIET_US:
-            node_id = self.definition.master.node
-            self.note(EventKind.FOREIGN_MASTER, node_id, "another node has the node-ID of ours")
-        self._foreign_us = self.now_us
-
-    def _hear_emergency(self, node: ServedNode, data: bytes) -> None:
-        try:
-            emcy = Emcy.parse(data)
-        except WireError:
-            return
-        text = f"{emcy.code:04X}h {describe(emcy.code)}, error register {emcy.register:02X}h"
-        back = emcy.code == EmcyCode.BUS_OFF_RECOVERED
-        self.note(EventKind.BUS_OFF if back else EventKind.EMERGENCY, node.entry.id, text)
+        self._data.watch(node)
 
     def _hear_bus(self) -> None:
         """See to what the CAN controller reported: bus-off leaves all proxies in Error."""
@@ -281,7 +193,7 @@ class Server:
             if state is ErrorState.BUS_OFF:
                 self.note(EventKind.BUS_OFF, 0, "the server can neither hear nor send")
                 for node in self.nodes.values():
-                    node.fail(self.now_us)
+                    node.operations.abort()
             elif state is ErrorState.ACTIVE:
                 self.note(EventKind.BUS_ON, 0)
 
@@ -308,35 +220,6 @@ class Server:
             self.note(EventKind.STATE_CHANGED, node.entry.id, text)
         if state is not LifeCycleState.ERROR:
             proxy.ready = False
-
-    def _start_next(self) -> None:
-        """Activate the first node of the order that is not, if it is its turn."""
-        for node_id in self.definition.start_order:
-            node = self.nodes[node_id]
-            if node.proxy is None or not node.proxy.confirmed:
-                if node.to_start and node.phase is Phase.READY and node.proxy is not None:
-                    node.to_start = False
-                    self._context.activate_component(node.proxy)
-                return
-
-    def _send_values(self) -> None:
-        for node, sink in self._sinks:
-            for port, value in sink.take():
-                if node.proxy is None or not node.proxy.confirmed or sink.linked:
-                    continue
-                if self._send_value(node, sink, port, value) is ReturnCode.BAD_PARAMETER:
-                    text = f"{node.entry.name}.{port}: {value}"
-                    self.note(EventKind.VALUE_REFUSED, node.entry.id, text)
-
-    def _send_value(self, node: ServedNode, sink: PdoSink, port: str, value: Struct) -> ReturnCode:
-        if node.proxy is None or not node.proxy.confirmed or sink.linked:
-            return ReturnCode.PRECONDITION_NOT_MET
-        try:
-            data = sink.encode(port, value)
-        except (ValueError, TypeError):
-            return ReturnCode.BAD_PARAMETER
-        self.send(sink.layout.cob_id, data)
-        return ReturnCode.RTC_OK
 
     def _send_heartbeat(self) -> None:
         if self.now_us >= self._heartbeat_us:

@@ -7,16 +7,20 @@ from typing import Final
 from tickrig.host.link import NEVER
 from tickrig.wire.canopen.nmt import NmtState
 
-SURE: Final = 5
-"""Sum of short intervals, each 2, and of others, each -1, at which there are two."""
+WINDOW: Final = 10
+"""Producer heartbeat times in which heartbeats are counted."""
+
+TOO_MANY: Final = 16
+"""So many are of two nodes: one sends 10, and up to 5 that came late are read at once."""
 
 
 class TwinWatch:
     """Listens to the error control messages of a node-ID.
 
-    Two nodes at once show by intervals that are too short. A node that boots while
-    another of its node-ID is there shows by a heartbeat of the other: it comes too
-    soon after the boot-up, or tells another state than Pre-operational.
+    Two nodes at once show by too many heartbeats; their times say little, as a host
+    that was busy reads several at once. A node that boots while another of its
+    node-ID is there shows by a heartbeat of the other: it comes too soon after the
+    boot-up, or tells another state than Pre-operational.
 
     Not seen: nodes that send the very same frames at the very same time.
 
@@ -29,12 +33,12 @@ class TwinWatch:
 
     def __init__(self, period_us: int) -> None:
         self._period_us, self._count = period_us, 0
-        self._booted_us = self._heard_us = -period_us
+        self._booted_us = self._begin_us = 0
         self.sure_us = NEVER
 
-    def forget(self) -> None:
-        """Begin anew: a node that was away sends at once what it could not."""
-        self._count = 0
+    def forget(self, now_us: int) -> None:
+        """Begin anew, after what a node that was away now sends at once."""
+        self._begin_us, self._count = now_us + self._period_us, 0
 
     def hear(self, now_us: int, state: NmtState, *, listening: bool) -> bool:
         """Take a boot-up or heartbeat; True if it shows that there are two nodes.
@@ -44,14 +48,17 @@ class TwinWatch:
             state: what it says.
             listening: whether nothing was said to the node since it booted.
         """
-        before_us, self._heard_us = self._heard_us, now_us
         if state is NmtState.INITIALISING:
-            self._booted_us, self._count = now_us, 0
+            self._booted_us = now_us
             self.sure_us = now_us + self._period_us * 5 // 4
             return False
         if listening:
             soon = now_us - self._booted_us < self._period_us * 3 // 4
             return soon or state is not NmtState.PRE_OPERATIONAL
-        short = now_us - before_us < self._period_us // 2
-        self._count = max(0, self._count + (2 if short else -1))
-        return self._count >= SURE
+        return self._too_many(now_us)
+
+    def _too_many(self, now_us: int) -> bool:
+        if now_us - self._begin_us >= WINDOW * self._period_us:
+            self._begin_us, self._count = now_us, 0
+        self._count += now_us >= self._begin_us
+        return self._count >= TOO_MANY

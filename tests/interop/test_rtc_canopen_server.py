@@ -50,8 +50,13 @@ class Server:
         self._reader.start()
 
     def wait_for(self, kind: str, node: int, text: str | None = None) -> None:
+        seen: list[str] = []
         while True:
-            event = json.loads(self._lines.get(timeout=PATIENCE_S))
+            try:
+                seen.append(self._lines.get(timeout=PATIENCE_S))
+            except queue.Empty:
+                pytest.fail(f"no {kind} of node {node} in {seen}")
+            event = json.loads(seen[-1])
             if (event["event"], event["node"]) == (kind, node) and text in (None, event["text"]):
                 return
 

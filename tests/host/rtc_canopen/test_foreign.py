@@ -33,7 +33,7 @@ def test_another_master_is_told_of_once_while_it_is_heard() -> None:
     for _ in range(5):
         foreign(bench, "77F#05", 100)
     assert bench.events(EventKind.FOREIGN_MASTER) == [
-        "ForeignMaster 127 another node has the node-ID of ours"
+        "ForeignMaster 127 another node has the node-ID of the server"
     ]
     bench.run_ms(1_500)
     foreign(bench, "77F#05")
@@ -110,10 +110,18 @@ def test_a_second_node_of_the_same_node_id_is_found_and_both_are_stopped(active:
 def test_heartbeats_that_come_twice_as_often_show_a_second_node() -> None:
     bench = running()
     bench.run_ms(30)
-    for _ in range(5):
+    for _ in range(20):
         bench.other.send(frames("710#7F"))
         bench.run_ms(100)
     assert len(bench.events(EventKind.DUPLICATE_NODE)) == 1
+
+
+def test_heartbeats_that_are_read_at_once_show_no_second_node() -> None:
+    bench = running()
+    for _ in range(20):
+        bench.rig.run_for(250_000)  # the server was busy
+        bench.run_ms(50)
+    assert bench.events(EventKind.DUPLICATE_NODE, EventKind.HEARTBEAT_LOST) == []
 
 
 def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:
