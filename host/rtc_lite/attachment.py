@@ -6,15 +6,14 @@ import logging
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from tickrig.host.link import NEVER, Link
+from tickrig.host.link import Link
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc_lite.conversation import POLL_US, Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
+from tickrig.host.rtc_lite.lookout import Lookout
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 from tickrig.host.rtc_lite.settings import Settings
-from tickrig.wire.rtc_lite.codes import Command
 
 RATE_HZ: Final = 10.0
 """A period that two round trips at 57600 bit/s do not fill."""
@@ -36,7 +35,11 @@ class Attachment:
         listener: told of events.
         context: execution context of the proxy; None for one of its own.
         rate_hz: of its own one.
-        proxy: None while the device is away.
+        proxy: the latest one.
+
+    Raises:
+        RtcRefused: the device does not start up.
+        ValueError: a rate that no execution context can have.
     """
 
     manager: Manager
@@ -46,48 +49,41 @@ class Attachment:
     listener: Listener | None = None
     context: ExecutionContext | None = None
     rate_hz: float = RATE_HZ
-    proxy: RtcLiteProxy | None = field(default=None, init=False)
-    _talk: Conversation | None = field(default=None, init=False)  # with a device that is away
-    _look_us: int = field(default=NEVER, init=False)
+    proxy: RtcLiteProxy = field(init=False)
+    _lookout: Lookout | None = field(default=None, init=False)  # for a device that is away
+
+    def __post_init__(self) -> None:
+        """Make the first proxy, and have the manager tick this."""
+        self.proxy = self._add_proxy()
+        self.manager.run_item(self)
 
     @property
     def due_us(self) -> int:
         """When `tick` has something to do, as the manager counts time; its clock may be another."""
-        link_due_us = self._link_due_us
-        if link_due_us == NEVER:
-            return NEVER
-        return self.manager.now_us + max(0, link_due_us - self.link.now_us)
-
-    def begin(self) -> RtcLiteProxy:
-        """Make a proxy and add it; RtcRefused if its device does not start up."""
-        name = self.manager.free_name(self.base_name)
-        proxy = RtcLiteProxy(name, self.link, self.settings, self.listener)
-        self.manager.add(proxy, self.rate_hz, self.context)
-        self.proxy, self._talk = proxy, None
-        return proxy
+        return self.manager.now_us + max(0, self._link_due_us - self.link.now_us)
 
     def tick(self, now_us: int) -> None:
         """Mind the proxy, or look for the device."""
-        if self.proxy is not None:
+        if self._lookout is not None:
+            if self._lookout.tick():
+                self.manager.put_off(self._return)
+        else:
             self._mind(self.proxy)
-        elif self._talk is not None:
-            self._look(self._talk)
 
     @property
     def _link_due_us(self) -> int:
-        proxy, talk = self.proxy, self._talk
-        if proxy is not None:
-            fatal_us = proxy.fatal_us
-            return proxy.due_us if fatal_us is None else fatal_us + self.settings.linger_us
-        if talk is None:
-            return NEVER
-        looked_us = self._look_us - self.settings.look_period_us
-        waits = self.link.now_us < looked_us + self.settings.reply_us
-        return min(self._look_us, self.link.now_us + POLL_US) if waits else self._look_us
+        if self._lookout is not None:
+            return self._lookout.due_us
+        fatal_us = self.proxy.fatal_us
+        return self.proxy.due_us if fatal_us is None else fatal_us + self.settings.linger_us
+
+    def _add_proxy(self) -> RtcLiteProxy:
+        name = self.manager.free_name(self.base_name)
+        proxy = RtcLiteProxy(name, self.link, self.settings, self.listener)
+        return self.manager.add(proxy, self.rate_hz, self.context)
 
     def _mind(self, proxy: RtcLiteProxy) -> None:
         if not proxy.alive:
-            self.proxy = None
             self.manager.drop_item(self)
             return
         proxy.tick()
@@ -95,33 +91,26 @@ class Attachment:
             self.manager.put_off(lambda: self._remove(proxy))
 
     def _remove(self, proxy: RtcLiteProxy) -> None:
-        """Take a proxy out of the system (DECISION L15)."""
-        if proxy.alive:
-            self.manager.delete(proxy.instance_name)
-        self.proxy = None
+        """Take a proxy out of the system (DECISION L15), unless somebody just did."""
+        if not proxy.alive:
+            return
+        self.manager.delete(proxy.instance_name)
         self._tell(EventKind.REMOVED, proxy)
         if self.settings.rediscover:
-            self._talk = Conversation(self.link, self.settings)
-            self._look_us = self.link.now_us
+            self._lookout = Lookout(self.link, self.settings)
         else:
             self.manager.drop_item(self)
-
-    def _look(self, talk: Conversation) -> None:
-        talk.poll()
-        if talk.state is not None:
-            self.manager.put_off(self._return)
-        elif self.link.now_us >= self._look_us:
-            talk.post(Command.STATE)
-            self._look_us += self.settings.look_period_us
 
     def _return(self) -> None:
         """Make a new proxy for a device that has answered, and so need not be waited for."""
         self.settings = replace(self.settings, boot_us=0)
         try:
-            self._tell(EventKind.REDISCOVERED, self.begin())
+            self.proxy, self._lookout = self._add_proxy(), None
         except RtcRefused as error:
             _LOG.info("%s answers, but: %s", self.base_name, error)
-            self._talk = Conversation(self.link, self.settings)
+            self._lookout = Lookout(self.link, self.settings)
+        else:
+            self._tell(EventKind.REDISCOVERED, self.proxy)
 
     def _tell(self, kind: EventKind, proxy: RtcLiteProxy) -> None:
         tell(self.listener, ProxyEvent(self.link.now_us, kind, proxy.instance_name))
@@ -153,6 +142,4 @@ def attach(  # noqa: PLR0913 - options, by keyword
         ValueError: a rate that no execution context can have.
     """
     place = Attachment(manager, link, base_name, settings or Settings(), listener, context, rate_hz)
-    proxy = place.begin()
-    manager.run_item(place)
-    return proxy
+    return place.proxy

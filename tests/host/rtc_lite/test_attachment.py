@@ -11,7 +11,7 @@ from tickrig.host.link import NEVER
 from tickrig.host.rtc import Manager, RtcRefused
 from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
 
-AWAY_US = 3_000_000
+AWAY_US = 3_500_000
 """Long enough for a device to be found lost and for its proxy to be removed."""
 
 
@@ -163,3 +163,31 @@ def test_a_board_that_is_back_has_booted() -> None:
     back_us = bench.rig.now_us
     bench.run_for(AWAY_US)
     assert bench.at_us("Rediscovered") - back_us < 1_100_000
+
+
+class Deleter:
+    """Deletes a proxy in the tick in which it is to be removed."""
+
+    due_us = NEVER
+    proxy: RtcLiteProxy | None = None
+    deleted = 0
+
+    def __init__(self, manager: Manager) -> None:
+        self._manager = manager
+
+    def tick(self, now_us: int) -> None:
+        if self.proxy and self.proxy.fatal_us and now_us >= self.proxy.fatal_us + 1_000_000:
+            self._manager.delete("Echo0")
+            self.proxy, self.deleted = None, self.deleted + 1
+
+
+def test_a_proxy_that_is_deleted_as_it_is_to_be_removed_is_not_looked_for() -> None:
+    bench = Bench(Echo)
+    deleter = Deleter(bench.manager)
+    bench.manager.run_item(deleter)
+    deleter.proxy = bench.attach(0, "Echo", Settings(rediscover=True))
+    bench.nodes[0].inputs.set("power_cut", 1)
+    bench.run_to(AWAY_US)
+    assert deleter.deleted == 1
+    assert bench.told() == [("FatalError", "Echo0")]
+    assert bench.manager.due_us == NEVER

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
+from tests.device.rtc_lite.bench import Recorder
+from tests.host.rtc_lite.bench import Bench
 from tests.host.rtc_lite.scripted_node import ScriptedNode
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
 from tickrig.host.rtc_lite import RtcLiteProxy
@@ -190,3 +192,18 @@ def test_a_device_that_did_not_follow_into_error_is_aborted_in_the_next_period()
     assert proxy.on_error(EC) is OK
     assert link.taken() == ["CX", "AB", "AC"]
     assert link.recorder.called[-3:] == ["on_deactivated", "on_aborting", "on_error"]
+
+
+def test_a_rate_is_none_of_the_business_of_a_device_that_is_told_to_execute() -> None:
+    proxy, link = made("Active")
+    assert proxy.on_rate_changed(EC) is OK
+    assert link.taken() == []
+
+
+def test_a_line_that_goes_while_a_ping_is_under_way_is_not_waited_for() -> None:
+    bench = Bench(Recorder)
+    proxy = bench.attach(0, "Echo")
+    bench.rig.run_to(proxy.due_us)
+    proxy.tick()
+    bench.links[0].close()
+    assert proxy.on_activated(EC) is ERROR

@@ -114,6 +114,17 @@ def test_two_ports_of_one_name_are_refused(caplog: pytest.LogCaptureFixture) -> 
     assert bench.manager.components == ()
 
 
+def test_ports_of_a_failed_start_up_are_made_anew() -> None:
+    link = ScriptedNode()
+    port = Frame(Command.IN_PROFILE, b"\3lin")
+    link.answers[Command.PROFILE] = [port, port, Frame(Command.PROFILE, b"@\2\0\1E")]
+    proxy = RtcLiteProxy("Echo0", link)
+    assert proxy.initialize() is ReturnCode.RTC_ERROR
+    link.answers.clear()
+    assert proxy.initialize() is ReturnCode.RTC_OK
+    assert list(proxy.ports) == ["in", "out"]
+
+
 def test_a_board_that_boots_is_waited_for() -> None:
     bench = Bench(Echo)
     bench.attach(0, "Echo", Settings(boot_us=3_000_000))
