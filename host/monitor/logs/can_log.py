@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 import can
 from can.io.blf import BLFParseError
@@ -72,7 +72,7 @@ class CanLogReader:
         with open_log(self._path) as file:
             try:
                 if self._kind in _TEXT:
-                    yield from self._text(WatchedLines(_decoded(file), self._kind, self.tally))
+                    yield from self._text(file)
                 elif self._kind is LogFormat.BLF:
                     yield from self._blf(can.BLFReader(file))
                 else:
@@ -81,15 +81,17 @@ class CanLogReader:
                 reason = " ".join(str(error).split()) or type(error).__name__
                 raise LogError(f"{self._path} is no {self._kind} log: {reason}") from error
 
-    def _text(self, lines: WatchedLines) -> Iterator[can.Message]:
-        reader = _TEXT[self._kind](lines)
-        while not lines.ended:
-            try:
-                for message in reader:
-                    lines.taken()
-                    yield message
-            except BROKEN as error:
-                lines.refused(error)
+    def _text(self, file: BinaryIO) -> Iterator[can.Message]:
+        with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
+            lines = WatchedLines(text, self._kind, self.tally)
+            reader = _TEXT[self._kind](lines)
+            while not lines.ended:
+                try:
+                    for message in reader:
+                        lines.taken()
+                        yield message
+                except BROKEN as error:
+                    lines.refused(error)
 
     def _blf(self, reader: can.BLFReader) -> Iterator[can.Message]:
         count = 0
@@ -105,7 +107,3 @@ def channel_name(channel: object) -> str:
     if channel is None or not name:
         return UNNAMED
     return f"can{name}" if name.isdecimal() else name
-
-
-def _decoded(file: Any) -> io.TextIOWrapper:
-    return io.TextIOWrapper(file, "utf-8", errors="replace")

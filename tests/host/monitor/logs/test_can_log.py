@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.host.monitor.logs.test_log_lines import FRAMES
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.log_format import LogFormatError, log_format
+from tickrig.host.monitor.logs.log_reader import LogError, read_log
+from tickrig.host.monitor.logs.log_writer import write_log
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+START_US = 1_436_509_052_249_713
+GAPS = st.integers(0, 100_000_000)
+
+ASC = """\
+date Fri Jul 10 06:17:32.249 AM 2015
+base hex  timestamps absolute
+internal events logged
+Begin Triggerblock Fri Jul 10 06:17:32.249 AM 2015
+   0.000000 Start of measurement
+   0.000100 1  705             Rx   d 1 7F
+   0.000200 CAN 1 Status:chip status error active
+   0.000300 1  705             Rx   d 1 ZZ
+   0.000400 2  605x            Tx   d 2 01 02
+   0.000500 CANFD   1 Rx        123                                  1 0 9 12 00 01 02 03 04 05 06 07 08 09 0A 0B        0    0     1000        0        0        0        0        0
+   0.000600 1  123             Rx   r 5
+End TriggerBlock
+"""  # noqa: E501 - as python-can writes it
+TRC = """\
+;$FILEVERSION=1.1
+;$STARTTIME=43474.9876543210
+;   Message Number
+     1)      1841.0  Rx         0705  1  7F
+     2)      1842.0  Warng  FFFFFFFF  4  00 00 00 04
+     3)      1843.0  Rx         0705  Z
+     4)      1844.0  Tx     00000605  2  01 02
+"""
+CSV = """\
+timestamp,arbitration_id,extended,remote,error,dlc,data
+1.5,0x705,0,0,0,1,fw==
+oops
+1.6,0x605,1,0,0,2,AQI=
+"""
+
+
+def log(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, "ascii")
+    return path
+
+
+def heards(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> list[Heard]:
+    at_us, found = START_US, []
+    for gap_us, frame, sent in gaps:
+        at_us += gap_us
+        found.append(Heard(at_us, "can0", frame, sent))
+    return found
+
+
+@given(st.lists(st.tuples(GAPS, FRAMES, st.booleans()), min_size=1, max_size=8))
+def test_blf_holds_all_there_is(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> None:
+    with TemporaryDirectory() as folder:
+        writer = write_log(path := Path(folder, "all.blf"))
+        for heard in heards(gaps):
+            writer.write(heard)
+        writer.close()
+        kept = [one._replace(sent=False) if error(one) else one for one in heards(gaps)]
+        assert list(read_log(path)) == kept
+
+
+def error(heard: Heard) -> bool:
+    """BLF does not say who made an error frame."""
+    return isinstance(heard.frame, ErrorFrame)
+
+
+@pytest.mark.parametrize("name", ["run.asc", "run.asc.gz", "run.trc", "run.csv"])
+def test_text_formats_hold_data_frames(name: str, tmp_path: Path) -> None:
+    frames = [
+        Heard(START_US, "can0", CanFrame.parse("705#7F")),
+        Heard(START_US + 1, "can1", CanFrame.parse("00000605#0011223344556677")),
+        Heard(START_US + 2_000_000, "can0", CanFrame.parse("123#")),
+    ]
+    path = tmp_path / name
+    writer = write_log(path)
+    for heard in frames:
+        writer.write(heard)
+    writer.close()
+    writer.close()
+    read = list(read_log(path))
+    assert [heard.frame for heard in read] == [heard.frame for heard in frames]
+    assert all(abs(a.at_us - b.at_us) <= 1 for a, b in zip(read, frames, strict=True))
+    channels = ["can0"] * 3 if name == "run.csv" else ["can0", "can1", "can0"]
+    assert [heard.channel for heard in read] == channels
+
+
+def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
+    reader = read_log(log(tmp_path, "run.asc", ASC))
+    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102", "123#R5"]
+    assert reader.bad_lines.first == [(8, "   0.000300 1  705             Rx   d 1 ZZ")]
+    assert reader.tally.passed_over == {"lines with other events": 1, "CAN FD frames": 1}
+
+
+def test_bad_lines_of_trc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
+    reader = read_log(log(tmp_path, "run.trc", TRC))
+    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
+    assert [number for number, _ in reader.bad_lines.first] == [6]
+    assert reader.tally.passed_over == {"lines with other events": 1}
+
+
+def test_bad_lines_of_csv_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
+    reader = read_log(log(tmp_path, "run.csv", CSV))
+    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
+    assert reader.bad_lines.first == [(3, "oops")]
+
+
+def test_a_reader_reads_from_the_beginning_each_time(tmp_path: Path) -> None:
+    reader = read_log(log(tmp_path, "run.csv", CSV))
+    assert list(reader) == list(reader)
+    assert reader.bad_lines.count == 1
+
+
+def test_objects_of_blf_that_are_no_frames_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "run.blf"
+    with can.BLFWriter(path) as writer:
+        writer.log_event("a marker", 1_436_509_052.0)
+        writer.on_message_received(can.Message(timestamp=1_436_509_053, arbitration_id=1))
+    reader = read_log(path)
+    assert len(list(reader)) == 1
+    assert reader.tally.words("run.blf") == ["run.blf: 1 objects that are no frames passed over"]
+
+
+@pytest.mark.parametrize("content", [b"", b"LOGG", b"x" * 400, b"LOGG" + bytes(300)])
+def test_what_is_no_blf_says_so(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "run.blf"
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=r"run\.blf is no blf log"):
+        list(read_log(path))
+
+
+@given(st.binary(max_size=400))
+def test_noise_never_raises_anything_else(noise: bytes) -> None:
+    with TemporaryDirectory() as folder:
+        for suffix in ("asc", "blf", "trc", "csv", "log", "jsonl", "log.gz"):
+            path = Path(folder, f"noise.{suffix}")
+            path.write_bytes(noise)
+            with suppress(LogError, OSError):
+                list(read_log(path))
+
+
+def test_mf4_without_its_library_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.mf4"
+    with pytest.raises(LogError, match="asammdf"):
+        write_log(path)
+    assert not path.exists()
+    path.write_bytes(b"MDF     4.10")
+    with pytest.raises(LogError, match="asammdf"):
+        list(read_log(path))
+
+
+def test_blf_is_not_compressed_twice(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"not written with \.gz"):
+        write_log(tmp_path / "run.blf.gz")
+
+
+def test_a_name_without_a_format_is_refused() -> None:
+    with pytest.raises(LogFormatError, match=r"\.log, \.candump"):
+        log_format(Path("run.dat"))
