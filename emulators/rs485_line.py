@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 from tickrig.device.core import NEVER
 
 
-@dataclass(slots=True)
-class _Byte:
-    """A byte on the wires, from its start bit to the end of its stop bit."""
+class _Burst:
+    """Bytes that one end sends back to back.
 
-    sender: Rs485End
-    start_us: int
-    end_us: int
-    value: int
+    Attributes:
+        sender: who sends it.
+        start_us: when it begins.
+        end_us: when it ends.
+        data: as it arrives.
+    """
+
+    __slots__ = ("data", "end_us", "sender", "start_us")
+
+    def __init__(self, sender: Rs485End, start_us: int, end_us: int, data: bytearray) -> None:
+        self.sender, self.start_us, self.end_us, self.data = sender, start_us, end_us, data
 
 
 class Rs485Line:
@@ -38,7 +44,7 @@ class Rs485Line:
 
     Attributes:
         ends: the stations' ends.
-        collisions: bytes that overlapped another end's.
+        collisions: pairs of bytes that overlapped.
 
     >>> line = Rs485Line(baud=115_200)
     >>> line.a.send(0, b"who?")
@@ -60,7 +66,7 @@ class Rs485Line:
         self._baud, self._byte_cost, self._echo = baud, frame_bits * 1_000_000, echo
         self.ends = tuple(Rs485End(self, buffer_bytes) for _ in range(ends))
         self.collisions = 0
-        self._air: deque[_Byte] = deque()
+        self._air: list[_Burst] = []
 
     @property
     def a(self) -> Rs485End:
@@ -74,34 +80,44 @@ class Rs485Line:
 
     def put(self, sender: Rs485End, start_us: int, data: bytes) -> int:
         """Put bytes on the wires back to back; return when the last has passed."""
-        sent = [
-            _Byte(sender, start_us + self._after(at), start_us + self._after(at + 1), value)
-            for at, value in enumerate(data)
-        ]
-        self._collide(sent)
+        end_us = start_us + self.after(len(data))
+        burst = _Burst(sender, start_us, end_us, bytearray(data))
+        self._air = [other for other in self._air if other.end_us > start_us]
+        for other in self._air:
+            if other.sender is not sender:
+                self._collide(burst, other)
+        self._air.append(burst)
         for end in self.ends:
             if end is not sender or self._echo:
-                end.hear(sent)
-        return sent[-1].end_us
+                end.hear(burst)
+        return end_us
+
+    def after(self, count: int) -> int:
+        """Return how long so many bytes take."""
+        return -(-count * self._byte_cost // self._baud)
+
+    def passed(self, burst: _Burst, now_us: int) -> int:
+        """Return how many bytes of a burst have passed."""
+        if now_us >= burst.end_us:
+            return len(burst.data)
+        return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
 
     def unsent(self, duration_us: int) -> int:
         """Return how many bytes are still to be sent for so long."""
         return -(-max(0, duration_us) * self._baud // self._byte_cost)
 
-    def _after(self, count: int) -> int:
-        return -(-count * self._byte_cost // self._baud)
-
-    def _collide(self, sent: list[_Byte]) -> None:
-        """Garble what overlaps what another end is still sending."""
-        start_us = sent[0].start_us
-        self._air = deque(byte for byte in self._air if byte.end_us > start_us)
-        for other in self._air:
-            for byte in sent:
-                apart = byte.end_us <= other.start_us or other.end_us <= byte.start_us
-                if byte.sender is not other.sender and not apart:
-                    byte.value = other.value = byte.value & other.value
+    def _collide(self, burst: _Burst, other: _Burst) -> None:
+        """Garble the bytes of both that overlap."""
+        for mine, start_us, end_us in self._bytes(burst):
+            for theirs, from_us, to_us in self._bytes(other):
+                if start_us < to_us and from_us < end_us:
+                    both = burst.data[mine] & other.data[theirs]
+                    burst.data[mine] = other.data[theirs] = both
                     self.collisions += 1
-        self._air.extend(sent)
+
+    def _bytes(self, burst: _Burst) -> Iterator[tuple[int, int, int]]:
+        for at in range(len(burst.data)):
+            yield at, burst.start_us + self.after(at), burst.start_us + self.after(at + 1)
 
 
 class Rs485End:
@@ -111,22 +127,27 @@ class Rs485End:
         lost: bytes that found this end's buffer full, or came in more than it could queue.
     """
 
-    __slots__ = ("_buffer_bytes", "_busy_us", "_inbox", "_line", "lost")
+    __slots__ = ("_buffer_bytes", "_busy_us", "_inbox", "_line", "_taken", "lost")
 
     def __init__(self, line: Rs485Line, buffer_bytes: int) -> None:
         self._line, self._buffer_bytes = line, buffer_bytes
-        self._inbox: deque[_Byte] = deque()
+        self._inbox: deque[_Burst] = deque()
+        self._taken: deque[int] = deque()  # bytes of each burst that were taken
         self._busy_us = self.lost = 0
 
     @property
     def due_us(self) -> int:
         """When the next byte will have arrived here."""
-        return self._inbox[0].end_us if self._inbox else NEVER
+        after = self._line.after
+        return min(
+            (b.start_us + after(n + 1) for b, n in zip(self._inbox, self._taken, strict=True)),
+            default=NEVER,
+        )
 
     @property
     def idle_us(self) -> int:
         """When the last byte that is on its way here will have arrived."""
-        return self._inbox[-1].end_us if self._inbox else NEVER
+        return max((burst.end_us for burst in self._inbox), default=NEVER)
 
     def room(self, now_us: int) -> int:
         """Return how many bytes `send` takes at `now_us` without loss."""
@@ -134,11 +155,11 @@ class Rs485End:
 
     def poll(self, now_us: int, /) -> bytes:
         """Take the bytes that have arrived by `now_us`."""
-        inbox, out = self._inbox, bytearray()
-        while inbox and inbox[0].end_us <= now_us:
-            out.append(inbox.popleft().value)
+        if not self._inbox:
+            return b""
+        out = self._take(now_us) if len(self._inbox) == 1 else self._merge(now_us)
         self.lost += max(0, len(out) - self._buffer_bytes)
-        return bytes(out[: self._buffer_bytes])
+        return out[: self._buffer_bytes]
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Queue bytes behind those that this end is still sending."""
@@ -147,10 +168,34 @@ class Rs485End:
         if accepted:
             self._busy_us = self._line.put(self, max(now_us, self._busy_us), accepted)
 
-    def hear(self, sent: list[_Byte]) -> None:
-        """Have bytes on their way here, in the order in which they end."""
-        inbox = self._inbox
-        unordered = inbox and inbox[-1].end_us > sent[0].end_us
-        inbox.extend(sent)
-        if unordered:
-            self._inbox = deque(sorted(inbox, key=lambda byte: byte.end_us))
+    def hear(self, burst: _Burst) -> None:
+        """Have a burst on its way here."""
+        self._inbox.append(burst)
+        self._taken.append(0)
+
+    def _take(self, now_us: int) -> bytes:
+        """Take what has passed of the only burst."""
+        burst, taken = self._inbox[0], self._taken[0]
+        passed = self._line.passed(burst, now_us)
+        if passed == len(burst.data):
+            self._inbox.clear()
+            self._taken.clear()
+        else:
+            self._taken[0] = passed
+        return bytes(burst.data[taken:passed])
+
+    def _merge(self, now_us: int) -> bytes:
+        """Take what has passed of several bursts, in the order in which the bytes ended."""
+        ended: list[tuple[int, int]] = []
+        after, left = self._line.after, list[tuple[_Burst, int]]()
+        for burst, taken in zip(self._inbox, self._taken, strict=True):
+            passed = self._line.passed(burst, now_us)
+            ended += [
+                (burst.start_us + after(at + 1), burst.data[at]) for at in range(taken, passed)
+            ]
+            if passed < len(burst.data):
+                left.append((burst, passed))
+        self._inbox = deque(burst for burst, _ in left)
+        self._taken = deque(taken for _, taken in left)
+        ended.sort(key=lambda byte: byte[0])
+        return bytes(value for _, value in ended)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from tickrig.device.body.contact import Contact
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
 from tickrig.device.rh3.ground import Ground
+from tickrig.device.rh3.look import READ, Look
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.device.rh3.side import Side
-from tickrig.device.rh3.terminals import INPUTS, OUTPUTS, SIDES
-from tickrig.wire.rh3 import Status
+from tickrig.device.rh3.terminals import INPUTS, OUTPUTS
 
 TICK_US: Final = 1_000
 
@@ -50,7 +48,7 @@ class Rh3Base:
         self.sides = driver.sides
         self.slave = ModbusSlave(driver.registers, driver.written, self.parameters.address)
         self._on, self._moving, self._unseen, self._now_us = True, False, True, 0
-        self._seen = {name: read(self) for name, read in _READ.items()}
+        self._seen = self._look()
 
     @property
     def tick_us(self) -> int:
@@ -73,9 +71,9 @@ class Rh3Base:
         return _OUTPUTS
 
     @property
-    def status(self) -> Status:
+    def status(self) -> int:
         """What the driver says of itself; nothing without supply."""
-        return self._driver.status if self._on else Status(0)
+        return self._driver.status if self._on else 0
 
     def reset(self) -> None:
         """Begin as after power-up, where it stands."""
@@ -85,7 +83,7 @@ class Rh3Base:
 
     def read(self, name: str, /) -> float:
         """Return one of `outputs`; KeyError if unknown."""
-        return self._seen[name]
+        return READ[name](self._seen)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Let time pass up to now."""
@@ -98,9 +96,20 @@ class Rh3Base:
             sent = self.slave.tick(now_us, rx)
         self._step()
         if now_us % LOOK_US == 0:
-            self._seen = {name: read(self) for name, read in _READ.items()}
-            self._unseen = self._moving
+            self._seen, self._unseen = self._look(), self._moving
         return sent
+
+    def _look(self) -> Look:
+        ground, (left, right) = self.ground, self.sides
+        return Look(
+            ground.pose,
+            (ground.speed_m_s, ground.turn_rad_s),
+            (left.wheel.travel, right.wheel.travel),
+            (ground.left.slip_m_s, ground.right.slip_m_s),
+            (left.torque, right.torque),
+            self.status,
+            (self.slave.served, self.slave.garbled),
+        )
 
     def _catch_up(self, now_us: int) -> None:
         """Make the steps of the milliseconds before this one."""
@@ -134,27 +143,3 @@ class Rh3Base:
 
 
 _OUTPUTS: Final = {output.name: output for output in OUTPUTS}
-
-Reading = Callable[[Rh3Base], float]
-
-
-def _of_sides(pattern: str, read: Callable[[Side, Contact], float]) -> dict[str, Reading]:
-    def of(place: int) -> Reading:
-        return lambda base: read(base.sides[place], base.ground.contacts[place])
-
-    return {pattern.format(name): of(place) for place, name in enumerate(SIDES)}
-
-
-_READ: Final[Mapping[str, Reading]] = {
-    "x_m": lambda base: base.ground.pose.x_m,
-    "y_m": lambda base: base.ground.pose.y_m,
-    "heading_rad": lambda base: base.ground.pose.heading_rad,
-    "speed_m_s": lambda base: base.ground.speed_m_s,
-    "turn_rad_s": lambda base: base.ground.turn_rad_s,
-    **_of_sides("angle_{}_rad", lambda side, contact: side.wheel.angle_rad),
-    **_of_sides("slip_{}_m_s", lambda side, contact: contact.slip_m_s),
-    **_of_sides("torque_{}_pm", lambda side, contact: side.torque),
-    "status": lambda base: int(base.status),
-    "served": lambda base: base.slave.served,
-    "garbled": lambda base: base.slave.garbled,
-}

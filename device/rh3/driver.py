@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Final
 
+from tickrig.device.core import NEVER
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import BaseParameters
@@ -15,6 +16,9 @@ from tickrig.device.rh3.terminals import SIDES
 from tickrig.wire.rh3 import Command, Fault, Mode, Status
 
 TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
+ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)
+"""Plain numbers: a flag takes ten times as long."""
+
 DELAYED: Final = TARGETS | {"mode", "command"}
 """What takes effect after the delay."""
 
@@ -40,7 +44,7 @@ class Driver:
     def __init__(self, parameters: BaseParameters, inputs: QuantityBank) -> None:
         self._inputs, self._delay_us = inputs, parameters.delay_ms * 1_000
         self.now_us = self._start_us = 0
-        measured = {"status": lambda: int(self.status), "sample": lambda: self._sample}
+        measured = {"status": lambda: self.status, "sample": lambda: self._sample}
         self.registers = Registers(TABLE, measured)
         self.sides = tuple(
             Side(name, bit, parameters, self.registers) for bit, name in enumerate(SIDES)
@@ -56,32 +60,34 @@ class Driver:
         self._waiting: deque[tuple[int, Mapping[str, int]]] = deque()
         self._enabled = self._powered = self._tripped = self._stopped = False
         self._mode, self._faulty = Mode.FREE, False
+        self._watch_us = self.registers["watchdog_ms"] * 1_000
         for side in self.sides:
             side.power_up()
 
     @property
-    def status(self) -> Status:
+    def status(self) -> int:
         """What the driver says of itself."""
-        bits = {
-            Status.ENABLED: self._enabled,
-            Status.MOVING: any(side.wheel.speed for side in self.sides),
-            Status.FAULT: self._faulty,
-            Status.WATCHDOG: self._tripped,
-            Status.CLIPPED: any(side.clipped for side in self.sides),
-            Status.EMERGENCY_STOP: bool(self._inputs["emergency_stop"]),
-            Status.BUMPER: bool(self._inputs["bumper"]),
-        }
-        return Status(sum(bit for bit, is_set in bits.items() if is_set))
+        left, right = self.sides
+        status = ENABLED * self._enabled | FAULT * self._faulty | WATCHDOG * self._tripped
+        if left.wheel.speed or right.wheel.speed:
+            status |= MOVING
+        if left.clipped or right.clipped:
+            status |= CLIPPED
+        if self._inputs["emergency_stop"]:
+            status |= EMERGENCY_STOP
+        if self._inputs["bumper"]:
+            status |= BUMPER
+        return status
 
     @property
     def resting(self) -> bool:
         """Whether a step would change nothing."""
-        return not self._waiting and all(side.resting for side in self.sides)
+        left, right = self.sides
+        return not self._waiting and left.resting and right.resting
 
     def written(self, values: Mapping[str, int]) -> None:
         """Take what a master wrote, at once or after the delay."""
-        for side in self.sides:
-            side.configure()
+        self._configure()
         if values.keys() & DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
@@ -91,17 +97,20 @@ class Driver:
         Args:
             heard_us: when the master was heard last.
         """
-        while self._waiting and self._waiting[0][0] <= self.now_us:
-            self._obey(self._waiting.popleft()[1])
-        self._watch(heard_us)
-        if any(side.stalled for side in self.sides):
+        if self._waiting:
+            self._take_waiting()
+        if self.now_us - heard_us >= self._watch_us:
+            self._watch()
+        left, right = self.sides
+        if left.stalled or right.stalled:
             self.find_faults()
-        powered, stop = self._power(), self._stopped
-        for side in self.sides:
-            if powered:
-                side.drive(stop=stop, to_position=self._mode is Mode.POSITION)
-            else:
-                side.coast(shorted=self._faulty)
+        if self._power():
+            stop, to_position = self._stopped, self._mode is Mode.POSITION
+            left.drive(stop=stop, to_position=to_position)
+            right.drive(stop=stop, to_position=to_position)
+        else:
+            left.coast(shorted=self._faulty)
+            right.coast(shorted=self._faulty)
 
     def coast(self) -> None:
         """Let a millisecond pass without supply: a relay shorts the motors."""
@@ -119,6 +128,10 @@ class Driver:
         self._faulty = any(side.fault for side in self.sides)
         if self._faulty:
             self._enabled = False
+
+    def _take_waiting(self) -> None:
+        while self._waiting and self._waiting[0][0] <= self.now_us:
+            self._obey(self._waiting.popleft()[1])
 
     def _obey(self, values: Mapping[str, int]) -> None:
         if values.keys() & TARGETS:
@@ -151,14 +164,16 @@ class Driver:
         for side in self.sides:
             side.stop(quick=quick)
 
-    def _watch(self, heard_us: int) -> None:
-        """Stop when the master is silent."""
-        limit_us = self.registers["watchdog_ms"] * 1_000
-        if not limit_us or self.now_us - heard_us < limit_us:
-            return
+    def _watch(self) -> None:
+        """Stop: the master is silent."""
         if self._powered and not self._stopped and not self.resting:
             self._stop(quick=False)
             self._tripped = True
+
+    def _configure(self) -> None:
+        self._watch_us = self.registers["watchdog_ms"] * 1_000 or NEVER
+        for side in self.sides:
+            side.configure()
 
     def _power(self) -> bool:
         """Return whether the wheels have power."""

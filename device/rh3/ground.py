@@ -49,8 +49,9 @@ class Ground:
 
     def step(self, left_rad: float, right_rad: float) -> None:
         """Let a millisecond pass in which the wheels turned by so much."""
-        left_m = self._roughened(self.left.roll(left_rad, STEP_S))
-        right_m = self._roughened(self.right.roll(right_rad, STEP_S))
+        left_m, right_m = self.left.roll(left_rad, STEP_S), self.right.roll(right_rad, STEP_S)
+        if self._noise:
+            left_m, right_m = self._roughened(left_m), self._roughened(right_m)
         if left_m or right_m:
             self.pose = self.pose.moved(left_m, right_m, self._tread_m)
         self.speed_m_s = (left_m + right_m) / 2 / STEP_S
@@ -58,6 +59,6 @@ class Ground:
 
     def _roughened(self, way_m: float) -> float:
         """Return a way with the noise of the ground: uniform, from one step to the next anew."""
-        if not self._noise or not way_m:
-            return way_m
+        if not way_m:
+            return 0.0
         return way_m * (1 + self._noise * (self._chance.draw() / HALF - 1))

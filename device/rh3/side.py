@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from math import floor
 from typing import Final
 
 from tickrig.device.modbus.registers import Registers
@@ -33,6 +34,7 @@ class Side:
         wheel: the mechanics.
         fault: why it has no power.
         clipped: its target was above the speed limit.
+        stalled: full torque has turned nothing for long, and nobody has looked yet.
     """
 
     def __init__(
@@ -42,12 +44,12 @@ class Side:
         self._registers, self._backward_bit = registers, backward_bit
         self._speed_loop = SpeedLoop(registers, self.wheel.friction)
         self._position_loop = PositionLoop(registers)
-        self._rated_ma, self._zero = parameters.rated_ma, 0
+        self._rated_ma, self._per_mille, self._zero = parameters.rated_ma, parameters.per_mille, 0
         self.power_up()
 
     def power_up(self) -> None:
         """Count from 0, without a fault."""
-        self.fault, self.clipped = Fault(0), False
+        self.fault, self.clipped, self.stalled = Fault(0), False, False
         self._counted = self._stalled_ms = 0
         self._speed, self._goal = 0.0, 0
         self.configure()
@@ -105,7 +107,7 @@ class Side:
 
     def touched(self, inputs: QuantityBank) -> None:
         """Take over what the world does to the wheel."""
-        self.wheel.load_nm = inputs[f"load_{self.name}_nm"]
+        self.wheel.load = self._per_mille(inputs[f"load_{self.name}_nm"])
         self.wheel.jammed = bool(inputs[f"jam_{self.name}"])
 
     def find_faults(self, inputs: QuantityBank, *, powered: bool) -> None:
@@ -118,11 +120,7 @@ class Side:
             self.fault |= Fault.OVER_CURRENT
         if self.stalled:
             self.fault |= Fault.STALL
-
-    @property
-    def stalled(self) -> bool:
-        """Whether full torque has turned nothing for long."""
-        return self._stalled_ms >= STALL_MS
+            self.stalled = False
 
     def drive(self, *, stop: bool, to_position: bool) -> None:
         """Turn for a millisecond as the targets say."""
@@ -138,11 +136,14 @@ class Side:
         if self.clipped:
             wanted = limit if wanted > 0 else -limit
         torque = self._speed_loop.step(wanted, self._counted)
-        before = wheel.counts
+        before = floor(wheel.travel)
         wheel.step(torque)
-        self._counted = wheel.counts - before
-        stalled = not self._counted and abs(torque) >= PER_MILLE
-        self._stalled_ms = self._stalled_ms + 1 if stalled else 0
+        self._counted = floor(wheel.travel) - before
+        if self._counted or abs(torque) < PER_MILLE:
+            self._stalled_ms = 0
+        else:
+            self._stalled_ms += 1
+            self.stalled = self._stalled_ms >= STALL_MS
 
     def coast(self, *, shorted: bool) -> None:
         """Turn for a millisecond without power, or with the motor shorted."""

@@ -26,15 +26,15 @@ class Wheel:
     Attributes:
         travel: counts since the start of the rig, with fractions.
         speed: counts/ms.
-        load_nm: torque against forward motion.
+        load: torque against forward motion, per mille.
         jammed: something holds the wheel.
         friction: per mille of torque that it takes to turn it.
     """
 
     def __init__(self, parameters: BaseParameters) -> None:
-        self._agility, self._per_mille = parameters.agility, parameters.per_mille
+        self._agility = parameters.agility
         self.friction = parameters.per_mille(parameters.friction_nm)
-        self.travel = self.speed = self.load_nm = 0.0
+        self.travel = self.speed = self.load = 0.0
         self.jammed = False
 
     @property
@@ -54,24 +54,19 @@ class Wheel:
 
     def held(self, torque: float) -> bool:
         """Whether it stands and stays so under a torque."""
-        return not self.speed and (self.jammed or self._gripped(self._net(torque)))
+        return not self.speed and (self.jammed or abs(torque - self.load) <= self.friction)
 
     def step(self, torque: float) -> None:
         """Turn for a millisecond with a torque in per mille."""
-        net = self._net(torque)
-        if self.jammed or (abs(self.speed) < SLOW and self._gripped(net)):
+        speed, friction, net = self.speed, self.friction, torque - self.load
+        if self.jammed or (-SLOW < speed < SLOW and -friction <= net <= friction):
             self.speed = 0.0
             return
-        self.speed += (net - copysign(self.friction, self.speed or net)) * self._agility
-        self.travel += self.speed
+        against = friction if (speed or net) > 0 else -friction
+        self.speed = speed = speed + (net - against) * self._agility
+        self.travel += speed
 
     def brake(self) -> None:
         """Turn for a millisecond with the motor shorted."""
         most = min(BRAKE, abs(self.speed) / self._agility)
         self.step(-copysign(most, self.speed) if self.speed else 0.0)
-
-    def _net(self, torque: float) -> float:
-        return torque - self._per_mille(self.load_nm)
-
-    def _gripped(self, net: float) -> bool:
-        return abs(net) <= self.friction

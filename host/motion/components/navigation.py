@@ -18,7 +18,7 @@ TUNED = {
     "align_angle": "0.01",
     "turn_angle": "0.01",
     "goal_angle": "0.003",
-    "goal_distance": "0.004",
+    "goal_distance": "0.002",
     "braking": "0.24",
     "creep_vel": "0.01",
     "latency": "0.08",
