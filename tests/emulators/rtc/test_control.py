@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.host.rtc.chain import Chain
@@ -163,6 +163,7 @@ def requests(draw: st.DrawFn) -> tuple[str, dict[str, object]]:
     return draw(st.sampled_from(VERBS)), {name: draw(known[name] | JSON) for name in fields}
 
 
+@settings(max_examples=50)
 @given(st.lists(requests(), max_size=12))
 def test_whatever_is_asked_is_answered_and_the_others_run_on(
     asked: list[tuple[str, dict[str, object]]],

@@ -10,8 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.emulators.rtc.served import Served
+from tests.host.rtc.spy import ERROR
 from tickrig.emulators.cli import main
-from tickrig.host.rtc import ExecutionContext, ReturnCode
+from tickrig.host.rtc import Provider, ServicePort
 from tickrig.host.rtc.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system import describe
 from tickrig.host.rtc.system_toml import parse_toml
@@ -49,6 +50,13 @@ def test_cat_shows_the_configuration(system: Served) -> None:
     assert "  Parameter     int_param0 = 0  [0<=x<=150]\n" in text
     assert "  Set           default *\n    int_param0 = 0\n" in text
     assert text.endswith("  Set           fast\n    int_param0 = 9\n")
+
+
+def test_cat_shows_the_interfaces_of_a_service_port(system: Served) -> None:
+    port = system.manager.find("SeqOut0").add_port(ServicePort("cart"))
+    port.provide(Provider("cart0", "Cart", None))
+    text = system.rtc("cat", "SeqOut0")
+    assert "  CorbaPort     SeqOut0.cart\n    provided cart0 (Cart)\n" in text
 
 
 @pytest.mark.parametrize("verb", ["ls", "cat"])
@@ -95,11 +103,15 @@ def test_reset_brings_a_component_out_of_error(system: Served) -> None:
 def test_act_of_a_component_that_fails_says_where_it_went(
     system: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(ec: ExecutionContext) -> ReturnCode:
-        return ReturnCode.RTC_ERROR
-
-    monkeypatch.setattr(system.manager.find("SeqOut0"), "on_activated", fails)
+    monkeypatch.setattr(system.manager.find("SeqOut0"), "on_activated", lambda ec: ERROR)
     assert system.rtc("act", "SeqOut0", exit_code=1) == "Error: SeqOut0 is ERROR, not ACTIVE\n"
+
+
+def test_act_that_waits_for_nothing_only_asks(
+    system: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(system.manager.find("SeqOut0"), "on_activated", lambda ec: ERROR)
+    system.rtc("act", "SeqOut0", "--wait", "0")
 
 
 def test_create_makes_a_component_and_prints_its_name(system: Served) -> None:
