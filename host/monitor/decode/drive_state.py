@@ -45,9 +45,13 @@ BITS: Final = {"statusword": STATUSWORD_BITS, "controlword": CONTROLWORD_BITS}
 """Bits by name, of the objects whose bits have names."""
 
 
+def _find(bits: int) -> str:
+    return next((state for mask, value, state in _STATES if bits & mask == value), "")
+
+
+_BY_BITS: Final = tuple(_find(bits) for bits in range(0x80))
+
+
 def drive_state(statusword: int) -> str:
     """Return the state; empty for bits that are none."""
-    for mask, value, state in _STATES:
-        if statusword & mask == value:
-            return state
-    return ""
+    return _BY_BITS[statusword & 0x7F]
