@@ -36,16 +36,27 @@ def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
     return sorted(parts, key=lambda part: part[0])
 
 
-def heard_at(columns: Columns, row: int) -> Heard:
-    """Return a row as it was heard; who sent it is not in it."""
-    name = columns.channels[columns.channel[row]]
-    return Heard(int(columns.at_us[row]), name, frame_at(columns, row))
+def heards(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Heard]:
+    """Return rows as they were heard; who sent them is not in them."""
+    names = columns.channels
+    parts = zip(
+        columns.at_us[rows].tolist(),
+        columns.channel[rows].tolist(),
+        columns.ident[rows].tolist(),
+        columns.dlc[rows].tolist(),
+        columns.payload[rows].tolist(),
+        strict=True,
+    )
+    return [Heard(at_us, names[channel], _frame(*frame)) for at_us, channel, *frame in parts]
 
 
-def frame_at(columns: Columns, row: int) -> CanFrame | ErrorFrame:
-    """Return the frame of a row."""
-    ident, dlc = int(columns.ident[row]), int(columns.dlc[row])
-    data = int(columns.payload[row]).to_bytes(8, "little")
+def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[CanFrame | ErrorFrame]:
+    """Return the frames of rows."""
+    return [heard.frame for heard in heards(columns, rows)]
+
+
+def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
+    data = payload.to_bytes(8, "little")
     if ident & ERROR:
         return ErrorFrame(ident & ERROR_CLASS_MASK, data)
     extended = bool(ident & EXTENDED)

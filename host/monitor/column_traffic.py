@@ -7,7 +7,7 @@ import numpy as np
 from tickrig.host.monitor.column_bits import column_bits
 from tickrig.host.monitor.column_changes import column_changes
 from tickrig.host.monitor.column_gaps import column_gaps
-from tickrig.host.monitor.column_rows import by_channel, frame_at, select
+from tickrig.host.monitor.column_rows import by_channel, frames_of, heards, select
 from tickrig.host.monitor.controller import Controller
 from tickrig.host.monitor.ident import ERROR
 from tickrig.host.monitor.load import WINDOW_US, Load, Window
@@ -57,8 +57,7 @@ def _take_errors(frames: Columns) -> tuple[Controller, Columns]:
     is_error = frames.ident & ERROR != 0
     if not is_error.any():
         return errors, frames
-    for row in np.flatnonzero(is_error):
-        frame = frame_at(frames, row)
+    for frame in frames_of(frames, np.flatnonzero(is_error)):
         assert isinstance(frame, ErrorFrame)
         errors.take(frame)
     return errors, select(frames, np.flatnonzero(~is_error))
@@ -83,21 +82,22 @@ def _id_rows(channel: str, frames: Columns, bits: Ints) -> list[IdRow]:
     gaps_us = runs.gaps_us(frames.at_us)
     changes = column_changes(runs, frames.payload)
     run_bits = runs.sums(bits[runs.order]).tolist()
+    firsts_us = frames.at_us[runs.order[runs.begins]].tolist()
+    latest = heards(frames, runs.order[runs.ends - 1])
+    last_gaps_us = gaps_us[runs.ends - 1].tolist()
     rows = []
     for run, gaps in enumerate(column_gaps(runs, gaps_us)):
-        first, last = runs.order[runs.begins[run]], runs.order[runs.ends[run] - 1]
-        ident = int(runs.idents[run])
-        frame = frame_at(frames, last)
+        frame = latest[run].frame
         assert isinstance(frame, CanFrame)
         rows.append(
             IdRow(
                 channel,
-                ident,
+                int(runs.idents[run]),
                 gaps.count + 1,
-                int(frames.at_us[first]),
-                int(frames.at_us[last]),
+                firsts_us[run],
+                latest[run].at_us,
                 frame,
-                int(gaps_us[runs.ends[run] - 1]) if gaps.count else None,
+                last_gaps_us[run] if gaps.count else None,
                 gaps.row(),
                 run_bits[run],
                 changes[run],

@@ -6,18 +6,16 @@ from collections.abc import Iterable
 from itertools import zip_longest
 
 import numpy as np
-import numpy.typing as npt
 
 from tickrig.host.monitor.check.checker import ended
 from tickrig.host.monitor.check.finding import Finding
-from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.sorted_log import SortedLog
 from tickrig.host.monitor.column_bits import column_bits
-from tickrig.host.monitor.column_rows import heard_at
 from tickrig.host.monitor.column_traffic import windows_of
 from tickrig.host.monitor.ident import ERROR
 from tickrig.host.monitor.logs.columns import Columns
-from tickrig.host.monitor.runs import Ints, Runs
+from tickrig.host.monitor.runs import Ints
 
 Placed = tuple[int, int, Finding]
 """A finding with its row, and its place among those of the row: the order of `Checker`."""
@@ -41,7 +39,7 @@ def check_columns(
     placed, at_end = _loads(columns, rules, bit_rate)
     if not len(columns):
         return ended(rules, made, {}, 0, lost)
-    log = _Log(columns)
+    log = SortedLog(columns)
     for place, rule in enumerate(made, 1):
         placed += [(row, place, finding) for row, finding in log.judged(rule)]
     placed.sort(key=lambda one: one[:2])
@@ -77,88 +75,3 @@ def _rows_by_channel(columns: Columns) -> list[tuple[str, Ints]]:
     return sorted(
         (columns.channels[place], found) for place, found in enumerate(rows) if len(found)
     )
-
-
-def _keys(columns: Columns, rows: Ints) -> npt.NDArray[np.uint32] | npt.NDArray[np.uint64]:
-    """Return the identifiers of some rows, with the bus above them where there are several."""
-    ident = columns.ident[rows]
-    if len(columns.channels) == 1:
-        return ident
-    return columns.channel[rows].astype(np.uint64) << np.uint64(32) | ident
-
-
-class _Log:
-    """A log by bus and identifier, with the gap before each frame."""
-
-    def __init__(self, columns: Columns) -> None:
-        self._columns = columns
-        errors = columns.ident & ERROR != 0
-        self._errors = np.flatnonzero(errors)
-        self._plain = np.flatnonzero(~errors)
-        self._runs: Runs | None = None
-        if len(self._plain):
-            self._runs = Runs.of(_keys(columns, self._plain))
-            self._gaps_us = self._runs.gaps_us(columns.at_us[self._plain])
-
-    def latest_us(self) -> dict[int, int]:
-        """Return when each identifier was heard last."""
-        latest: dict[int, int] = {}
-        for ident, _, end in self._idents():
-            at_us = int(self._columns.at_us[self._row(end - 1)])
-            latest[ident] = max(at_us, latest.get(ident, at_us))
-        return latest
-
-    def judged(self, rule: Rule) -> list[tuple[int, Finding]]:
-        """Let a rule see what it suspects; return rows and findings."""
-        found = []
-        for row, gap_us in self._suspects(rule):
-            heard = heard_at(self._columns, row)
-            text = rule.judge(heard, gap_us)
-            if text:
-                found.append((row, Finding(heard.at_us, rule.name, text, heard)))
-        return found
-
-    def _suspects(self, rule: Rule) -> list[tuple[int, int | None]]:
-        """Return rows and gaps in the order of the log."""
-        suspects: list[tuple[int, int | None]] = []
-        if rule.wants(ERROR):
-            suspects += [(row, None) for row in self._errors.tolist()]
-        for ident, begin, end in self._idents():
-            if rule.wants(ident):
-                places = begin + np.flatnonzero(self._suspected(rule, begin, end))
-                gaps: list[int | None] = self._gaps_us[places].tolist()
-                if len(places) and places[0] == begin:
-                    gaps[0] = None
-                suspects += zip(self._row(places).tolist(), gaps, strict=True)
-        suspects.sort(key=lambda one: one[0])
-        return suspects
-
-    def _suspected(self, rule: Rule, begin: int, end: int) -> npt.NDArray[np.bool_]:
-        below_us, above_us, first_bytes, firsts = rule.suspects
-        if rule.suspects == type(rule.suspects)():
-            return np.ones(end - begin, np.bool_)
-        gaps_us = self._gaps_us[begin:end]
-        suspected = np.zeros(end - begin, np.bool_)
-        suspected[0] = firsts
-        if below_us is not None:
-            suspected |= gaps_us < below_us
-        if above_us is not None:
-            suspected |= gaps_us > above_us
-        if first_bytes:
-            low = self._columns.payload[self._row(slice(begin, end))] & np.uint64(0xFF)
-            suspected |= np.isin(low, np.array(sorted(first_bytes), np.uint64))
-        return suspected
-
-    def _idents(self) -> Iterable[tuple[int, int, int]]:
-        """Give each identifier with begin and end of its run."""
-        if self._runs is not None:
-            idents = (self._runs.idents & 0xFFFF_FFFF).tolist()
-            yield from zip(
-                idents, self._runs.begins.tolist(), self._runs.ends.tolist(), strict=True
-            )
-
-    def _row(self, places: Ints | slice | int) -> Ints:
-        """Return the rows at places of the runs."""
-        assert self._runs is not None
-        rows: Ints = self._plain[self._runs.order[places]]
-        return rows

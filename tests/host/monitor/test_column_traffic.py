@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import given
 
 from tests.host.monitor.column_log import columns
 from tests.host.monitor.heard_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
-from tickrig.host.monitor.column_rows import heard_at
+from tickrig.host.monitor.column_rows import heards as rows_of
 from tickrig.host.monitor.column_traffic import snapshot_of
 from tickrig.host.monitor.heard import Heard
 
@@ -18,7 +19,7 @@ def test_a_log_at_once_gives_the_same_as_frame_by_frame(heards: list[Heard]) -> 
 @given(traffic())
 def test_a_row_of_columns_is_the_frame_that_it_was(heards: list[Heard]) -> None:
     log = columns(heards)
-    assert [heard_at(log, row) for row in range(len(heards))] == heards
+    assert rows_of(log, np.arange(len(heards))) == heards
 
 
 def test_a_log_of_error_frames_alone_has_no_rows() -> None:

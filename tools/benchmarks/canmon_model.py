@@ -1,0 +1,216 @@
+"""canmon's statistics, checks and `top`, beside python-can's reader, Notifier and can_viewer."""
+
+from __future__ import annotations
+
+import random
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import pexpect
+
+from benchmarks.table import rates, row
+from tickrig.host.can_message import to_message
+from tickrig.host.canmon.source import open_source
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.words import parse_rules
+from tickrig.host.monitor.column_traffic import snapshot_of
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.column_reader import read_columns
+from tickrig.host.monitor.top_model import TopModel
+from tickrig.host.monitor.top_table import View, render
+from tickrig.host.monitor.traffic import Traffic
+from tickrig.wire.can import CanFrame
+
+FRAMES = 1_000_000
+DIRTY = 10
+"""Each tenth frame of the dirty log breaks a rule."""
+LIVE = 100_000
+IDS = 50
+RUNS = 5
+BIT_RATE = 1_000_000
+RULES = parse_rules(
+    {
+        "max_load": 100,
+        "no_emcy": True,
+        "no_sdo_abort": True,
+        "no_error_frames": True,
+        "no_reboot": True,
+        "nodes": "1-50",
+        "heartbeat": [f"{node}=750ms±50%" for node in range(1, 51)],
+        "max_gap": [f"{0x180 + node:03X}=100ms" for node in range(1, 51)],
+    }
+)
+
+
+def run(seconds: float) -> None:
+    """Print the rows of this suite."""
+    del seconds
+    with tempfile.TemporaryDirectory() as folder:
+        clean, dirty = Path(folder, "clean.log"), Path(folder, "dirty.log")
+        write_log(clean, dirty=False)
+        write_log(dirty, dirty=True)
+        whole("clean", clean)
+        whole("dirty", dirty)
+        python_can_reader(clean)
+    live()
+    painting()
+    first_paint()
+
+
+def write_log(path: Path, *, dirty: bool) -> None:
+    """Write PDOs of 50 nodes at about 10,000 frames/s, a heartbeat each 750 ms."""
+    chance, at_us = random.Random(1), 1_700_000_000_000_000
+    with path.open("w", encoding="ascii") as file:
+        for n in range(FRAMES):
+            at_us += chance.randrange(50, 150)
+            node = n % IDS + 1
+            text = f"{0x180 + node:03X}#{n:08X}{chance.randrange(1 << 32):08X}"
+            if n % 150 == 0:
+                text = f"{0x700 + n // 150 % IDS + 1:03X}#05"
+            if dirty and n % DIRTY == 0:
+                text = f"{0x080 + node:03X}#3081110000000000"
+            file.write(f"({at_us // 1_000_000}.{at_us % 1_000_000:06d}) can0 {text}\n")
+
+
+def whole(what: str, path: Path) -> None:
+    """Read, count and check a log of a million frames."""
+    columns = read_columns(path)
+    found = check_columns(columns, RULES, BIT_RATE)
+    row(f"{what} log of 1 M frames: statistics", _s(lambda: snapshot_of(columns)), "s")
+    row(
+        f"{what} log of 1 M frames: checks, {len(found):,} findings",
+        _s(lambda: check_columns(columns, RULES, BIT_RATE)),
+        "s",
+    )
+
+    def all_of_it() -> None:
+        found = read_columns(path)
+        snapshot_of(found)
+        check_columns(found, RULES, BIT_RATE)
+
+    row(f"{what} log of 1 M frames: reading, statistics and checks", _s(all_of_it), "s")
+
+
+def python_can_reader(path: Path) -> None:
+    """Read the same with python-can, which counts nothing; once, for it takes long."""
+    start = time.perf_counter()
+    with can.LogReader(path) as reader:
+        count = sum(1 for _ in reader)
+    assert count == FRAMES
+    row("python-can: reading alone", [time.perf_counter() - start], "s")
+
+
+def live() -> None:
+    """Count frames as they come."""
+    chance = random.Random(2)
+    heards = [
+        Heard(
+            n * 100, "can0", CanFrame(0x181 + n % IDS, n.to_bytes(4, "big") + chance.randbytes(4))
+        )
+        for n in range(LIVE)
+    ]
+
+    def model() -> None:
+        traffic = Traffic()
+        for heard in heards:
+            traffic.take(heard)
+
+    rates("model, frame by frame, payloads that change", LIVE, "frames/s", model)
+    messages = [to_message(heard.frame) for heard in heards if isinstance(heard.frame, CanFrame)]
+    rates("bus of python-can, thread, queue, statistics", LIVE, "frames/s", _through_us(messages))
+    rates("python-can Notifier, a listener that counts", LIVE, "frames/s", _notified(messages))
+
+
+def _through_us(messages: list[can.Message]) -> Callable[[], None]:
+    def work() -> None:
+        source = open_source(["virtual:bench-model"], BusOptions())
+        model, sender = TopModel(), _sender(messages)
+        count = 0
+        while count + source.lost < LIVE:
+            heards = source.poll(100_000)
+            count += len(heards)
+            model.take(heards)
+        sender.join()
+        source.close()
+        assert source.lost == 0
+
+    return work
+
+
+def _notified(messages: list[can.Message]) -> Callable[[], None]:
+    def work() -> None:
+        count, done = [0], threading.Event()
+
+        def listener(message: can.Message) -> None:
+            count[0] += 1
+            if count[0] == LIVE:
+                done.set()
+
+        with can.Bus(interface="virtual", channel="bench-model") as bus:
+            notifier = can.Notifier(bus, [listener])
+            sender = _sender(messages)
+            done.wait()
+            sender.join()
+            notifier.stop()
+
+    return work
+
+
+def _sender(messages: list[can.Message]) -> threading.Thread:
+    def send() -> None:
+        with can.Bus(interface="virtual", channel="bench-model") as bus:
+            for message in messages:
+                bus.send(message)
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    return thread
+
+
+def painting() -> None:
+    """Make a screen of 50 identifiers."""
+    traffic = Traffic()
+    for n in range(20_000):
+        traffic.take(Heard(n * 100, "can0", CanFrame(0x181 + n % IDS, n.to_bytes(8, "big"))))
+
+    def work() -> None:
+        for _ in range(100):
+            render(traffic.snapshot(), View(styled=True), 0, 160, 60)
+
+    rates("snapshot and screen of 50 identifiers", 100, "/s", work)
+
+
+def first_paint() -> None:
+    """Start in a terminal until the first screen is there."""
+    top = [sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()", "top"]
+    row("canmon top: first paint", _painted([*top, "virtual:bench"], "lost 0"), "s")
+    viewer = [sys.executable, "-m", "can.viewer", "-i", "virtual", "-c", "bench"]
+    row("can_viewer: first paint", _painted(viewer, "Count"), "s")
+
+
+def _painted(command: list[str], text: str) -> list[float]:
+    values = []
+    for _ in range(RUNS):
+        start = time.perf_counter()
+        child = pexpect.spawn(command[0], command[1:], dimensions=(40, 120), encoding="utf-8")
+        child.expect_exact(text, timeout=20)
+        values.append(time.perf_counter() - start)
+        child.sendintr()
+        child.expect(pexpect.EOF, timeout=20)
+        child.close()
+    return values
+
+
+def _s(work: Callable[[], object]) -> list[float]:
+    values = []
+    for _ in range(RUNS):
+        start = time.perf_counter()
+        work()
+        values.append(time.perf_counter() - start)
+    return values
