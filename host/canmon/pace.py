@@ -18,8 +18,8 @@ class Pace:
     """
 
     def __init__(self) -> None:
-        _wake_on_time()
         self._start_ns = time.monotonic_ns()
+        _wake_on_time()
 
     @property
     def now_us(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import can
@@ -23,6 +24,7 @@ from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.wire.can import CanFrame
 
 FRAMES_S = 2_600
+SETTLE_S = 0.5
 RUNS = 5
 FOREVER = '[[step]]\nrepeat = "forever"\nsteps = [{ send = "080#" }, { wait = "1ms" }]\n'
 
@@ -35,32 +37,35 @@ def run(seconds: float) -> None:
 
 
 def replays(seconds: float) -> None:
-    """Replay a log as `canmon play` does, and as python-can does."""
+    """Replay a log as `canmon play` does, and at the same time as python-can does."""
+    with ProcessPoolExecutor(len(PEERS)) as pool:
+        replayed = list(pool.map(replay, PEERS, [seconds] * len(PEERS)))
+    for who, (late_us, cpu) in zip(PEERS, replayed, strict=True):
+        percentiles(f"{who}, {FRAMES_S} frames/s for {seconds:.0f} s: late", late_us, "us")
+        ends = [sum(part) / len(part) for part in (late_us[:1_000], late_us[-1_000:])]
+        row(f"{who}: drift, last 1,000 frames against the first", [ends[1] - ends[0]], "us")
+        row(f"{who}: processor", [100 * cpu], "% of a core")
+
+
+def replay(who: str, seconds: float) -> tuple[list[float], float]:
+    """Return how late the frames of a log go out on a bus that nobody hears, and the load.
+
+    Time counts from when the first frame is asked for: then the clocks of both start.
+    """
     log = [
         Heard(n * 1_000_000 // FRAMES_S, "can0", CanFrame(0x181 + n % 50, n.to_bytes(8, "little")))
         for n in range(int(FRAMES_S * seconds))
     ]
-    replay("canmon play", log, _planned)
-    replay("python-can MessageSync", log, _synced)
-
-
-def replay(
-    who: str, log: list[Heard], paced: Callable[[list[Heard]], Iterator[can.Message]]
-) -> None:
-    """Print how late the frames of a log go out, on a bus that nobody hears."""
     late_us: list[float] = []
-    with can.Bus(interface="virtual", channel=f"bench-{who}") as bus:
-        messages = paced(log)
+    with can.Bus(interface="virtual", channel="bench") as bus:
+        messages = PEERS[who](log)
+        time.sleep(SETTLE_S)
         cpu_s, start_ns = time.process_time(), time.monotonic_ns()
         for message in messages:
             late_us.append((time.monotonic_ns() - start_ns) / 1_000 - log[len(late_us)].at_us)
             bus.send(message)
         span_s = (time.monotonic_ns() - start_ns) / 1e9
-        cpu_s = time.process_time() - cpu_s
-    percentiles(f"{who}, {FRAMES_S} frames/s for {log[-1].at_us / 1e6:.0f} s: late", late_us, "us")
-    ends = [sum(part) / len(part) for part in (late_us[:1_000], late_us[-1_000:])]
-    row(f"{who}: drift, last 1,000 frames against the first", [ends[1] - ends[0]], "us")
-    row(f"{who}: processor", [100 * cpu_s / span_s], "% of a core")
+    return late_us, (time.process_time() - cpu_s) / span_s
 
 
 def _planned(log: list[Heard]) -> Iterator[can.Message]:
@@ -73,6 +78,12 @@ def _planned(log: list[Heard]) -> Iterator[can.Message]:
 def _synced(log: list[Heard]) -> Iterator[can.Message]:
     """Return its iterator; the messages are made before its clock starts."""
     return iter(can.MessageSync([to_message(heard.frame, heard.at_us) for heard in log]))
+
+
+PEERS: dict[str, Callable[[list[Heard]], Iterator[can.Message]]] = {
+    "canmon play": _planned,
+    "python-can MessageSync": _synced,
+}
 
 
 def sequences() -> None:
