@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
+from tickrig.wire.rtc_lite.framing import Framing
 
 RATE_HZ: Final = range(1, 1_001)
 """Rates that a tick of 1 ms can hold."""
 DEFAULT_RATE_HZ: Final = 10
-
-
-class Framing(StrEnum):
-    """What goes over the line."""
-
-    LITE = "lite"  # the frames of RTC-Lite
-    RTNO = "rtno"  # packets of RTno, and initialized at power-up as RTno is
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.core import NEVER
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.life_cycle import LifeCycle
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
 from tickrig.device.rtc_lite.server import Server
@@ -18,6 +18,7 @@ from tickrig.device.timer import Timer
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame, fault_frame
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_lite.layout import REQUESTS
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 

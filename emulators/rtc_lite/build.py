@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rtc_lite.components import find_component
 from tickrig.emulators.trace import Config
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
+from tickrig.wire.rtc_lite.framing import Framing
 
 NAME: Final = "rtc-lite"
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, Framing, NodeConfig
+from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.emulator import LineKind
 from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
@@ -21,6 +21,7 @@ from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.refused import Refused
 from tickrig.wire.rtc_lite.codes import Command, ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
+from tickrig.wire.rtc_lite.framing import Framing
 
 ROUTINE: Final = tuple(
     command.value

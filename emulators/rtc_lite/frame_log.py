@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, Receiver
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.wire_log import Splitter
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.decoder import Decoder
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
 from tickrig.wire.rtc_lite.rtno import PacketDecoder
 

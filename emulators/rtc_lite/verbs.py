@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.byte_text import unescape
 from tickrig.emulators.names import known
 from tickrig.emulators.scenario import Send, Sender, parse_raw
@@ -15,6 +15,7 @@ from tickrig.host.cli.setting import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import HEADER
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_lite.messages import PortData
 from tickrig.wire.rtc_lite.values import PortType
 

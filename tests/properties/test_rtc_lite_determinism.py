@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.rtc_lite.reference_model import checked
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.relays import Echo, LiteA, LiteB
 from tickrig.emulators.faults import FaultyPort
@@ -19,6 +19,7 @@ from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import ContextType
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_lite.values import LONG
 
 ROOT = Path(__file__).parents[2]

@@ -11,11 +11,12 @@ from tests.wire.rtc_lite_vectors import raw
 from tickrig.device.core import NEVER
 from tickrig.device.physical import Input
 from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.ports import InPort, OutPort
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_lite.values import BOOLEAN, LONG, LONG_SEQ, OCTET_SEQ
 
 WRITE_42 = "PS\x02\x04in*\0\0\0"

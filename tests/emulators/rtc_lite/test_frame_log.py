@@ -4,9 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.wire.rtc_lite_vectors import REPLIES, REQUESTS, raw
-from tickrig.device.rtc_lite.config import Framing, NodeConfig
+from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.trace import Mark
+from tickrig.wire.rtc_lite.framing import Framing
 
 
 def test_frames_of_both_directions_are_shown_without_header_and_checksum() -> None:
