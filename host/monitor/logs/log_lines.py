@@ -11,9 +11,9 @@ from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 
 _USUAL: Final = re.compile(
-    r"\(([0-9]{1,12})\.([0-9]{6})\) ([!-~]{1,32}) ([0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7})"
-    r"#((?:[0-9A-Fa-f]{2}){0,8})(?: ([RT]))?\r?",
-    re.ASCII,
+    r"^\(([0-9]{1,12})\.([0-9]{6})\) ([!-~]{1,32}) ([0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7})"
+    r"#((?:[0-9A-Fa-f]{2}){0,8})(?: ([RT]))?\r?$",
+    re.ASCII | re.MULTILINE,
 )
 """A line with a data frame, as candump writes it: nearly all are so."""
 
@@ -33,27 +33,36 @@ class LogLines:
 
     def push(self, data: bytes, /) -> list[Heard]:
         """Return the frames of the lines that end in these bytes."""
-        lines = (self._rest + data.decode("latin-1")).split("\n")
-        self._rest = lines.pop()
-        return self._parse(lines)
+        lines, end, self._rest = (self._rest + data.decode("latin-1")).rpartition("\n")
+        return self._frames(lines) if end else []
 
     def finish(self) -> list[Heard]:
         """Return the frame of a last line without LF."""
         rest, self._rest = self._rest, ""
-        return self._parse([rest]) if rest else []
+        return self._frames(rest) if rest else []
 
-    def _parse(self, lines: list[str]) -> list[Heard]:
-        heard: list[Heard] = []
-        usual, new, unhex, first = _USUAL.fullmatch, tuple.__new__, bytes.fromhex, self._number
-        for number, line in enumerate(lines, first + 1):
-            match = usual(line)
-            if match is None:
-                other = parse_log_line(line, number, self.tally)
-                heard += (other,) if other else ()
-                continue
-            seconds, micros, channel, ident, data, direction = match.groups()
-            extended = len(ident) == 8
-            frame = new(CanFrame, (int(ident, 16), unhex(data), False, extended, 0))
-            heard.append(new(Heard, (int(seconds + micros), channel, frame, direction == "T")))
-        self._number = first + len(lines)
-        return heard
+    def _frames(self, text: str) -> list[Heard]:
+        count, begin = text.count("\n") + 1, self._number
+        self._number += count
+        usual = _USUAL.findall(text)
+        if len(usual) == count:
+            return _usual_frames(usual)
+        lines = enumerate(text.split("\n"), begin + 1)
+        frames = (parse_log_line(line, number, self.tally) for number, line in lines)
+        return [heard for heard in frames if heard]
+
+
+def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Heard]:
+    """Return the frames of what `_USUAL` found; made without the constructors, for speed."""
+    heard: list[Heard] = []
+    add, new, unhex = heard.append, tuple.__new__, bytes.fromhex
+    second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()
+    for seconds, micros, channel, ident, data, direction in lines:
+        if seconds != second:
+            second, second_us = seconds, int(seconds) * 1_000_000
+        if ident not in idents:
+            idents[ident] = int(ident, 16), len(ident) == 8
+        can_id, extended = idents[ident]
+        frame = new(CanFrame, (can_id, unhex(data), False, extended, 0))
+        add(new(Heard, (second_us + int(micros), channel, frame, direction == "T")))
+    return heard

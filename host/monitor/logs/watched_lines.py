@@ -14,7 +14,7 @@ OTHER_LINES: Final = "lines with other events"
 
 _EVENTS: Final = {
     LogFormat.ASC: re.compile(r"\s*[0-9]+\.[0-9]+\s+(?!Start of measurement|//)\S"),
-    LogFormat.TRC: re.compile(r"\s*[0-9]+\)?\s"),
+    LogFormat.TRC: re.compile(r"\s*[^;\s]"),
     LogFormat.CSV: re.compile(r"\s*[0-9]"),
 }
 """Lines that carry something: neither header nor comment."""
