@@ -24,6 +24,7 @@ def blocks(page: str, language: str) -> list[str]:
     "page",
     [
         "README.md",
+        "docs/canmon-decode.md",
         "docs/canopen.md",
         "docs/device-rtc.md",
         "docs/rtc-lite.md",

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from tests.host.monitor.decode.traces import decode, last, trace
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.eds_objects import EdsObjects
@@ -39,6 +41,18 @@ def test_a_mapping_that_was_written_names_the_signals() -> None:
     decoded = last(f"{WRITTEN} 185#3702D2040000")
     assert (decoded.kind, decoded.node, decoded.source) == ("tpdo1", 5, "seen")
     assert decoded.text == "statusword=0x0237[operation enabled] position_actual_value=1234"
+
+
+@pytest.mark.parametrize(
+    ("device_type", "text"),
+    [
+        ("91010200", "6041h:00=0x0237 6064h:00=0x000004D2"),
+        ("92010200", "statusword=0x0237[operation enabled] position_actual_value=1234"),
+        ("9101FFFF", "statusword=0x0237[operation enabled] position_actual_value=1234"),
+    ],
+)
+def test_another_device_type_has_no_statusword(device_type: str, text: str) -> None:
+    assert last(f"{WRITTEN} 585#43001000{device_type} 185#3702D2040000").text == text
 
 
 def test_a_mapping_that_was_read_counts_as_well() -> None:
