@@ -142,8 +142,6 @@ class ServedNode:
         elif self.phase is Phase.ABSENT:
             self._found()
         elif self.phase is Phase.READY:
-            if self.lost:
-                self._twins.forget(now_us)
             self.lost = False
             operations.follow(state, changed=changed)
         self._plan()

@@ -11,7 +11,10 @@ WINDOW: Final = 10
 """Producer heartbeat times in which heartbeats are counted."""
 
 TOO_MANY: Final = 16
-"""So many are of two nodes: one sends 10, and up to 5 that came late are read at once."""
+"""So many are of two nodes: one sends 10, and some that came late are read at once."""
+
+PAUSE: Final = 3
+"""Producer heartbeat times of silence, after which late ones may come."""
 
 
 class TwinWatch:
@@ -33,11 +36,11 @@ class TwinWatch:
 
     def __init__(self, period_us: int) -> None:
         self._period_us, self._count = period_us, 0
-        self._booted_us = self._begin_us = 0
+        self._booted_us = self._begin_us = self._heard_us = 0
         self.sure_us = NEVER
 
     def forget(self, now_us: int) -> None:
-        """Begin anew, after what a node that was away now sends at once."""
+        """Begin anew, behind what is heard at once after a pause of the node or of ours."""
         self._begin_us, self._count = now_us + self._period_us, 0
 
     def hear(self, now_us: int, state: NmtState, *, listening: bool) -> bool:
@@ -48,6 +51,9 @@ class TwinWatch:
             state: what it says.
             listening: whether nothing was said to the node since it booted.
         """
+        if now_us - self._heard_us > PAUSE * self._period_us:
+            self.forget(now_us)
+        self._heard_us = now_us
         if state is NmtState.INITIALISING:
             self._booted_us = now_us
             self.sure_us = now_us + self._period_us * 5 // 4

@@ -6,7 +6,7 @@ import json
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tickrig.host.rtc_canopen.definition import (
@@ -216,6 +216,7 @@ def definitions(draw: st.DrawFn) -> SystemDefinition:
     )
 
 
+@settings(max_examples=40)
 @given(definitions())
 def test_what_is_written_is_read_again(definition: SystemDefinition) -> None:
     assert parse_definition(write_definition(definition)) == definition
