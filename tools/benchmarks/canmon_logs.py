@@ -1,0 +1,97 @@
+"""canmon's log readers beside python-can's, and how fast its verbs start."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import can
+
+from benchmarks.table import RUNS, rates, row
+from tickrig.host.monitor.logs.column_reader import read_columns
+from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_writer import write_log
+
+FRAMES = 1_000_000
+PEER_FRAMES = 100_000
+START_US = 1_436_509_052_000_000
+CAN_IDS = (0x080, 0x181, 0x185, 0x281, 0x582, 0x602, 0x701)
+LENGTHS = (0, 1, 2, 6, 8, 8, 8, 8)
+CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
+
+
+def run(seconds: float) -> None:
+    """Print the rows of this suite."""
+    del seconds
+    with TemporaryDirectory() as folder:
+        log, part = Path(folder, "run.log"), Path(folder, "part.log")
+        write(log, FRAMES)
+        write(part, PEER_FRAMES)
+        rates(
+            "candump log, columns with numpy", FRAMES, "frames/s", lambda: taken(read_columns(log))
+        )
+        rates("candump log, frame by frame", FRAMES, "frames/s", lambda: taken(read_log(log)))
+        rates(
+            "candump log, python-can's reader",
+            PEER_FRAMES,
+            "frames/s",
+            lambda: taken(can.CanutilsLogReader(part)),
+        )
+        others(part)
+        starts(log)
+
+
+def others(part: Path) -> None:
+    """Read other formats: python-can's readers alone, and below ours."""
+    readers = {"blf": can.BLFReader, "asc": can.ASCReader}
+    for suffix, reader in readers.items():
+        log = part.with_suffix(f".{suffix}")
+        writer = write_log(log)
+        for heard in read_log(part):
+            writer.write(heard)
+        writer.close()
+        rates(f"{suffix} log", PEER_FRAMES, "frames/s", lambda log=log: taken(read_log(log)))
+        rates(
+            f"{suffix} log, python-can's reader alone",
+            PEER_FRAMES,
+            "frames/s",
+            lambda log=log, reader=reader: taken(reader(log)),
+        )
+
+
+def starts(log: Path) -> None:
+    """Start verbs on a log of a million frames."""
+    row("python -c pass", [start("-c", "pass") for _ in range(RUNS)], "ms")
+    for words in (("info",), ("dump", "-n", "1", "--raw"), ("dump", "-n", "1")):
+        times = [start(*CANMON[1:], *words, str(log)) for _ in range(RUNS)]
+        row(f"canmon {' '.join(words)}, start to end", times, "ms")
+
+
+def start(*words: str) -> float:
+    """Run Python with these words; return milliseconds."""
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=True)
+    return (time.perf_counter() - begin) * 1e3
+
+
+def write(path: Path, frames: int) -> None:
+    """Write a log of a busy bus."""
+    chance, at_us = random.Random(1), START_US
+    with path.open("w", encoding="ascii") as file:
+        for _ in range(frames):
+            at_us += chance.randrange(50, 400)
+            data = chance.randbytes(chance.choice(LENGTHS)).hex().upper()
+            stamp = f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d})"
+            file.write(f"{stamp} can0 {chance.choice(CAN_IDS):03X}#{data}\n")
+
+
+def taken(frames: Iterable[object] | object) -> None:
+    """Take all frames; columns have them at once."""
+    if isinstance(frames, Iterable):
+        for _ in frames:
+            pass
