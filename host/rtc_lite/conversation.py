@@ -7,11 +7,14 @@ from typing import Final
 
 from tickrig.host.link import Link
 from tickrig.host.rtc_lite.frame_link import FrameLink
+from tickrig.host.rtc_lite.rtno_link import RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, State
+from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame
-from tickrig.wire.rtc_lite.layout import WITH_STATE
+from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     PortData,
     PortProfile,
@@ -55,7 +58,7 @@ class Conversation:
     """
 
     def __init__(self, link: Link[bytes], settings: Settings) -> None:
-        self._line, self._settings = FrameLink(link, settings.checksum), settings
+        self._line, self._settings = _frames_over(link, settings), settings
         self.watch = Watch(settings.ping_period_us, settings.reply_us, settings.pings, link.now_us)
         self.state: State | None = None
         self.pushed: list[tuple[int, PortData]] = []
@@ -180,6 +183,13 @@ class Conversation:
             self.state = _state(reply.fields[0])
         if command is self._awaited:
             self._reply = reply
+
+
+def _frames_over(link: Link[bytes], settings: Settings) -> FrameLink:
+    if settings.framing is Framing.RTNO:
+        return RtnoLink(link)
+    checksum = settings.checksum
+    return FrameLink(link, lambda frame: frame.encode(checksum), Decoder(REPLIES, checksum))
 
 
 def _state(code: int) -> State | None:

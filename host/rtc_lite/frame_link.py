@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import logging
-from typing import Final
+from collections.abc import Callable
+from typing import Final, Protocol
 
 from tickrig.host.errors import LinkError
 from tickrig.host.link import Link
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Checksum, Frame
-from tickrig.wire.rtc_lite.layout import REPLIES
+from tickrig.wire.rtc_lite.codes import LinkFault
+from tickrig.wire.rtc_lite.frame import Frame
 
 SILENCE_US: Final = 20_000
 """Silence after which the rest of a broken frame is not waited for."""
 
 _LOG: Final = logging.getLogger(__name__)
+
+
+class FrameDecoder(Protocol):
+    """`Decoder` or `RtnoReplies`."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether all is thrown away until `clear`."""
+        ...
+
+    def clear(self) -> None:
+        """Look for a header again."""
+
+    def push(self, data: bytes, /) -> list[Frame | LinkFault]:
+        """Take bytes in; give frames and faults out."""
+        ...
 
 
 class FrameLink:
@@ -26,12 +42,14 @@ class FrameLink:
 
     Args:
         link: the line.
-        checksum: how frames are summed up.
+        encode: writes a request.
+        decoder: reads the replies.
     """
 
-    def __init__(self, link: Link[bytes], checksum: Checksum) -> None:
-        self._link, self._checksum = link, checksum
-        self._decoder = Decoder(REPLIES, checksum)
+    def __init__(
+        self, link: Link[bytes], encode: Callable[[Frame], bytes], decoder: FrameDecoder
+    ) -> None:
+        self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
 
     @property
@@ -45,7 +63,7 @@ class FrameLink:
             self._decoder.clear()
         _LOG.debug("> %s", frame.body)
         try:
-            self._link.send(frame.encode(self._checksum))
+            self._link.send(self._encode(frame))
         except LinkError as error:
             _LOG.debug("not sent: %s", error)
 

@@ -54,8 +54,7 @@ class RtcLiteProxy(RtComponent):
     Somebody calls `tick` when `due_us` has come, so that PINGs are sent;
     `attach` sees to that.
 
-    Not emulated: service ports and configuration sets, which RTC-Lite has not;
-    packets of RTno.
+    Not emulated: service ports and configuration sets, which RTC-Lite has not.
 
     Args:
         instance_name: unique in a system.

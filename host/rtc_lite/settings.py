@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tickrig.wire.rtc_lite.frame import Checksum
+from tickrig.wire.rtc_lite.framing import Framing
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,7 +13,8 @@ class Settings:
     """How a proxy talks to its device, and what becomes of it when the device is lost.
 
     Attributes:
-        checksum: how frames are summed up (DECISION L5).
+        framing: frames of RTC-Lite, or packets of RTno (bridge mode).
+        checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
         boot_us: silence after the link was opened; 3 s for boards that an open port resets.
         reply_us: how long a reply may take, 1 us or more (DECISION L13).
         ping_period_us: from the last correct frame to a PING, 1 us or more (DECISION L14).
@@ -22,9 +24,10 @@ class Settings:
         look_period_us: how often, 1 us or more.
 
     Raises:
-        ValueError: a number that is too small.
+        ValueError: a number that is too small, or another sum for packets of RTno.
     """
 
+    framing: Framing = Framing.LITE
     checksum: Checksum = Checksum.SUM8
     boot_us: int = 0
     reply_us: int = 100_000
@@ -35,7 +38,9 @@ class Settings:
     look_period_us: int = 1_000_000
 
     def __post_init__(self) -> None:
-        """Refuse numbers that are too small."""
+        """Refuse what cannot be."""
+        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
+            raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
         at_least = {"boot_us": 0, "linger_us": 0}
         for name in (
             "boot_us",

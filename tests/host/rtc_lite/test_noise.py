@@ -21,6 +21,7 @@ from tickrig.emulators.faults import Fault, FaultKind
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings
 from tickrig.wire.rtc_lite.codes import ContextType
+from tickrig.wire.rtc_lite.framing import Framing
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 NOISY_US = 3_000_000
@@ -70,10 +71,17 @@ SPOILS = st.lists(
 )
 
 
-def spoilt_bench(spoils: list[Spoil], context: ContextType) -> Bench:
+CONFIGS = [
+    NodeConfig(),
+    NodeConfig(context=ContextType.TIMER),
+    NodeConfig(framing=Framing.RTNO),
+]
+
+
+def spoilt_bench(spoils: list[Spoil], config: NodeConfig) -> Bench:
     """An active echo on a line that spoils what passes, each way in turn, until all is used up."""
-    bench = Bench(Echo, config=NodeConfig(context=context))
-    bench.attach(0, "Echo", Settings(rediscover=True))
+    bench = Bench(Echo, config=config)
+    bench.attach(0, "Echo", Settings(framing=config.framing, rediscover=True))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_to(2 * PERIOD_US)
@@ -112,9 +120,9 @@ def echoed(bench: Bench) -> list[int]:
 
 
 @settings(max_examples=150, deadline=None)
-@given(SPOILS, st.sampled_from(ContextType))
-def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], context: ContextType) -> None:
-    bench = spoilt_bench(spoils, context)
+@given(SPOILS, st.sampled_from(CONFIGS))
+def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], config: NodeConfig) -> None:
+    bench = spoilt_bench(spoils, config)
     bench.run_for(NOISY_US)
     bench.lines[0].clear("spoil")
     bench.run_for(QUIET_US)
