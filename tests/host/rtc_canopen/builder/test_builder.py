@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -106,10 +107,9 @@ def test_the_skeleton_has_the_profile_and_runs(tmp_path: Path, text: str) -> Non
 
 def test_the_skeleton_of_the_example_is_formatted_as_our_code_is(tmp_path: Path) -> None:
     written(tmp_path, EXAMPLE)
-    ruff = shutil.which("ruff")
-    if ruff is None:
-        pytest.skip("ruff is not on the path")
-    subprocess.run([ruff, "format", "--check", "--isolated", tmp_path], check=True)
+    ruff = [sys.executable, "-m", "ruff"]
+    subprocess.run([*ruff, "format", "--check", "--isolated", tmp_path], check=True)
+    subprocess.run([*ruff, "check", "--isolated", "--select", "E,F,I,D", tmp_path], check=True)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
