@@ -105,6 +105,28 @@ def test_t3_a_power_cut_while_inactive_is_fatal_within_140_ticks(phase_us: int) 
     assert "LiteA0" not in system.states()
 
 
+def test_t3_a_frame_that_was_on_the_line_at_the_cut_still_counts() -> None:
+    system = Experiment()
+    system.run_to(3_000_000)
+    ping_us = next(at_us for at_us, data in system.links[0].sent if data[1:3] == b"CY")
+    for cut_us in range(ping_us, ping_us + 5_000, 250):
+        system = Experiment()
+        system.run_to(cut_us)
+        system.nodes[0].inputs.set("power_cut", 1)
+        system.run_for(2_000_000)
+        assert system.at_us("FatalError") - cut_us <= 140 * TICK_US + 2_000
+
+
+def test_devices_that_fail_together_are_found_together() -> None:
+    system = Experiment()
+    system.run_to(2_500_000)
+    for node in system.nodes:
+        node.inputs.set("power_cut", 1)
+    system.run_for(2_000_000)
+    first_us, second_us = (event.at_us for event in system.events if event.kind == "FatalError")
+    assert second_us - first_us < 50_000
+
+
 def test_t4_every_second_lost_ping_is_not_fatal() -> None:
     system = Experiment()
     system.lines[0].arm("ping", 0.5)
