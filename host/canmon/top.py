@@ -14,6 +14,7 @@ from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us,
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
+from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.top_model import TopModel
 
@@ -44,7 +45,8 @@ def command(source: Sequence[str], span_us: int | None, strict: bool, **options:
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    frames, model = open_source(source, bus), TopModel(bus.bitrate)
+    log, model = whole_log(source), TopModel(bus.bitrate)
+    frames = log or open_source(source, bus)
     on_screen = frames.live and sys.stdout.isatty()
     try:
         with until_interrupted():
@@ -52,7 +54,7 @@ def command(source: Sequence[str], span_us: int | None, strict: bool, **options:
                 _paint(frames, model, span_us)
             else:
                 listen(frames, model.take, span_us or patience_us(frames, source))
-        click.echo("\n".join(model.final(frames.lost)))
+        click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
     report(frames, strict)

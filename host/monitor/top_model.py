@@ -62,10 +62,10 @@ class TopModel:
         snapshot = self._held or self.traffic.snapshot(now_us)
         return render(snapshot, self.view, lost, width, height)
 
-    def final(self, lost: int) -> list[str]:
-        """Return the whole table of all that came, as plain text."""
+    def final(self, lost: int, snapshot: Snapshot | None = None) -> list[str]:
+        """Return the whole table of all that came, or of a snapshot, as plain text."""
         view = View(self.view.order, self.view.bits, bit_rate=self.view.bit_rate)
-        return render(self.traffic.snapshot(), view, lost, UNBOUNDED, UNBOUNDED)
+        return render(snapshot or self.traffic.snapshot(), view, lost, UNBOUNDED, UNBOUNDED)
 
     def _quit(self) -> None:
         self.quit = True

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tickrig.host.canmon import whole_log
 from tickrig.host.canmon.cli import main
 
 LOG = "(1.000000) can0 181#00\n(1.100000) can0 181#01\n(1.150000) can0 701#05\n"
@@ -29,6 +30,12 @@ def test_a_log_file_ends_with_the_table(log: str) -> None:
         *("181", "2", "10.00", "100.000", "100.000", "100.000"),
         *("100.000", "100.000", "0.000", "0", "0.1", "01"),
     ]
+
+
+def test_a_large_log_has_the_same_table(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    small = top(log).stdout
+    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    assert top(log).stdout == small
 
 
 def test_the_load_is_a_share_of_the_bit_rate(log: str) -> None:

@@ -1,0 +1,93 @@
+"""The latest frames one below the other, with the times between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import islice
+from typing import Final, NamedTuple
+
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.ident import ERROR, ident_of
+from tickrig.wire.can import CanFrame
+
+CAPACITY: Final = 100_000
+
+
+class TraceRow(NamedTuple):
+    """One frame of the trace.
+
+    Attributes:
+        number: of the frame since the trace began, from 0.
+        heard: the frame.
+        since_us: since the frame before it on any bus; None for the first.
+        gap_us: since the frame before it with this identifier on this bus; None for the first.
+    """
+
+    number: int
+    heard: Heard
+    since_us: int | None
+    gap_us: int | None
+
+
+class Trace:
+    """Keeps the latest frames; what is older is given up, and counted.
+
+    Times that go back count as 0.
+
+    Args:
+        capacity: how many frames are kept.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._rows: deque[TraceRow] = deque(maxlen=capacity)
+        self._latest_us: dict[tuple[str, int], int] = {}
+        self._last_us: int | None = None
+        self._count = 0
+
+    @property
+    def count(self) -> int:
+        """How many frames were taken."""
+        return self._count
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest frame that is kept."""
+        return self._count - len(self._rows)
+
+    def take(self, heard: Heard) -> TraceRow:
+        """Add a frame at the end."""
+        at_us, channel, frame, _ = heard
+        key = channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+        row = TraceRow(
+            self._count,
+            heard,
+            _since(at_us, self._last_us),
+            _since(at_us, self._latest_us.get(key)),
+        )
+        self._rows.append(row)
+        self._latest_us[key] = self._last_us = at_us
+        self._count += 1
+        return row
+
+    def rows(self, begin: int, count: int) -> list[TraceRow]:
+        """Return frames by number; those that are given up or not there yet are left out."""
+        first = min(max(begin, self.first), self._count)
+        end = min(max(begin + count, first), self._count)
+        if first - self.first < self._count - end:
+            return list(islice(self._rows, first - self.first, end - self.first))
+        found = islice(reversed(self._rows), self._count - end, self._count - first)
+        return list(found)[::-1]  # the latest are near this end
+
+    def tail(self, count: int) -> list[TraceRow]:
+        """Return the latest frames."""
+        return self.rows(self._count - count, count)
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._rows.clear()
+        self._latest_us.clear()
+        self._last_us, self._count = None, 0
+
+
+def _since(at_us: int, before_us: int | None) -> int | None:
+    return None if before_us is None else max(0, at_us - before_us)
