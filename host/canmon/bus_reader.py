@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
@@ -87,5 +88,6 @@ class BusReader:
         return heard
 
     def close(self) -> None:
-        """Close the bus."""
-        self._bus.shutdown()
+        """Close the bus; one that is gone cannot be told."""
+        with suppress(can.CanError, OSError, ValueError):
+            self._bus.shutdown()

@@ -12,7 +12,7 @@ import can
 
 from tickrig.host.canmon.bus_reader import BusReader, open_bus
 from tickrig.host.canmon.socket_reader import SocketReader
-from tickrig.host.canmon.source_word import BusWord
+from tickrig.host.canmon.source_word import INTERFACES, BusWord
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.errors import LinkClosed
 from tickrig.host.monitor.candump_filter import CandumpFilter, flagged_id
@@ -80,7 +80,13 @@ def merged(word: BusWord, options: BusOptions) -> BusOptions:
         interface=word.interface or options.interface,
         channel=word.channel or options.channel,
         bitrate=word.bitrate or options.bitrate,
+        bus_kwargs=(*local(word.interface), *options.bus_kwargs),
     )
+
+
+def local(interface: str | None) -> tuple[str, ...]:
+    """Return what keeps frames on this machine, unless the command line says otherwise."""
+    return ("hop_limit=0",) if interface == INTERFACES["udp"] else ()
 
 
 class BusSource:

@@ -1,17 +1,21 @@
 from __future__ import annotations
 
+import os
 import time
+import tty
 from collections.abc import Callable, Iterator
 
 import can
 import pytest
 
+from tests.interop.buses import MULTICAST
 from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig
-from tickrig.host.canmon.bus_source import BusSource
+from tickrig.host.canmon.bus_source import BusSource, merged
 from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.source import Source, open_source
+from tickrig.host.canmon.source_word import BusWord
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.errors import LinkClosed
@@ -102,6 +106,39 @@ def test_closing_twice_closes_each_bus() -> None:
     source.close()
     source.close()
     assert reader.closed
+
+
+@pytest.mark.realtime
+def test_an_adapter_on_a_serial_port_is_read_until_it_is_unplugged() -> None:
+    adapter, port = os.openpty()
+    tty.setraw(port)
+    name = os.ttyname(port)
+    source = open_source(
+        [f"slcan:{name}@500k"], BusOptions(bus_kwargs=("sleep_after_open=0", "timeout=0.01"))
+    )
+    os.write(adapter, b"t70517F\r")
+    (one,) = wait(source, bool)
+    assert (one.channel, str(one.frame)) == (name, "705#7F")
+    assert b"S6\r" in os.read(adapter, 100)
+    os.close(port)
+    os.close(adapter)
+    wait(source, lambda _: source.ended)
+    assert source.failed.startswith(f"{name}: ")
+    source.close()
+
+
+@pytest.mark.realtime
+def test_a_bus_over_udp_stays_on_this_machine() -> None:
+    group = "ff11::7469:636e"
+    if why := MULTICAST.why_not():
+        pytest.skip(why)
+    source = open_source([f"udp:{group}"])
+    with can.Bus(interface="udp_multicast", channel=group, hop_limit=0) as bus:
+        bus.send(can.Message(arbitration_id=5, is_extended_id=False))
+        (one,) = wait(source, bool)
+    assert (one.channel, one.frame) == (group, CanFrame(5))
+    assert merged(BusWord("udp_multicast", group), BusOptions()).bus_kwargs == ("hop_limit=0",)
+    source.close()
 
 
 def test_a_rig_in_virtual_time_is_a_bus_whose_time_passes_while_it_is_polled() -> None:
