@@ -1,0 +1,128 @@
+"""The RTC-CANopen server: proxies at 100 Hz, PDO to port, time a frame."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.table import RUNS, percentiles, rates, row
+from tickrig.host.rtc import InPort, ModuleSpec, RtComponent
+from tickrig.host.rtc_canopen.definition import NodeEntry, Role, SystemDefinition
+from tickrig.host.rtc_canopen.device_file import read_device_file
+from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, lay_out
+from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.server import Server
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.rtc_types.basic import TimedShortSeq
+
+EDS = Path(__file__).parents[2] / "examples" / "eds" / "f-palette.eds"
+NODES = 126
+SECONDS = 5
+PERIOD_US = 10_000
+FRAMES = 20_000
+CALLS = 5_000
+
+
+class Sink(RtComponent):
+    """Has a port for the analogue inputs of a palette."""
+
+    spec = ModuleSpec("Sink")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.in_ = self.add_port(InPort[Any]("in", TimedShortSeq))
+
+
+def run(seconds: float) -> None:
+    """Print the rows of this suite."""
+    del seconds
+    periods()
+    frames()
+    latency()
+
+
+def ready(count: int) -> Server:
+    """Return a server whose nodes are Operational, without a bus."""
+    nodes = tuple(NodeEntry(n, f"N{n}", "eds", Role.DEVICE) for n in range(1, count + 1))
+    server = Server(SystemDefinition(nodes), {"eds": read_device_file(EDS)})
+    server.tick(0, ())
+    for node in server.nodes.values():
+        node.dialogue.clear()
+        node.layouts, node.phase = (layout(node.entry.id),), Phase.READY
+        server.booted(node)
+    for at_us in range(PERIOD_US, 50 * PERIOD_US, PERIOD_US):
+        alive = at_us % (10 * PERIOD_US) == 0
+        server.tick(at_us, heartbeats(server, NmtState.OPERATIONAL) if alive else ())
+    assert all(node.proxy and node.proxy.confirmed for node in server.nodes.values())
+    return server
+
+
+def layout(node_id: int) -> PdoLayout:
+    """Return a TPDO with four analogue inputs."""
+    mapping = tuple(MappedObject(0x6401, sub, 16) for sub in range(1, 5))
+    types: dict[tuple[int, int], int] = {(0x6401, sub): DataType.INTEGER16 for sub in range(1, 5)}
+    return lay_out(0x1801, 0x280 + node_id, mapping, types)
+
+
+def heartbeats(server: Server, state: NmtState) -> tuple[CanFrame, ...]:
+    """Return a heartbeat of each node."""
+    return tuple(CanFrame(0x700 + node_id, bytes((state,))) for node_id in server.nodes)
+
+
+def periods() -> None:
+    """Run proxies that each receive a PDO in each period of 10 ms."""
+    server = ready(NODES)
+    sink_all(server)
+    pdos = tuple(CanFrame(0x280 + node_id, bytes(8)) for node_id in server.nodes)
+    alive = heartbeats(server, NmtState.OPERATIONAL)
+    values = []
+    for _ in range(RUNS):
+        start, begin_us = time.perf_counter(), server.now_us
+        for period in range(1, SECONDS * 100 + 1):
+            heard = (*pdos, *alive) if period % 10 == 0 else pdos
+            server.tick(begin_us + period * PERIOD_US, heard)
+        values.append(NODES * SECONDS / (time.perf_counter() - start))
+    row("proxies at 100 Hz that one core serves, a PDO and a port write each period", values, "")
+
+
+def sink_all(server: Server) -> None:
+    """Connect the port of each proxy."""
+    for node in server.nodes.values():
+        sink = server.manager.add(Sink(f"S{node.entry.id}"), rate_hz=1.0)
+        server.manager.connect(f"{node.entry.name}.tpdo2", f"{sink.instance_name}.in")
+
+
+def frames() -> None:
+    """Give the server frames one by one, as a bus does."""
+    server = ready(NODES)
+    sink_all(server)
+    pdos = [CanFrame(0x280 + 1 + n % NODES, bytes(8)) for n in range(FRAMES)]
+    strangers = [CanFrame(0x4FF, bytes(8))] * FRAMES
+    for what, traffic in (("PDO to a port", pdos), ("a frame for nobody", strangers)):
+
+        def work(traffic: list[CanFrame] = traffic) -> None:
+            for frame in traffic:
+                server.tick(server.now_us, (frame,))
+
+        rates(f"{what}, {NODES} proxies, one frame a tick", FRAMES, "frames/s", work)
+
+
+def latency() -> None:
+    """Time from a received PDO to the value at the InPort of another component."""
+    server = ready(NODES)
+    sink_all(server)
+    port = server.manager.port("S1.in")
+    assert isinstance(port, InPort)
+    values = []
+    for n in range(CALLS):
+        frame = CanFrame(0x281, n.to_bytes(8, "little"))
+        start = time.perf_counter()
+        server.tick(server.now_us, (frame,))
+        assert port.is_new
+        values.append(1e6 * (time.perf_counter() - start))
+        port.read()
+    percentiles("PDO to InPort of another component", values, "us")
