@@ -9,6 +9,7 @@ from typing import Final
 from tickrig.emulators.run import say
 from tickrig.host.cli.refused import Refused
 from tickrig.host.errors import LinkClosed
+from tickrig.host.reopening_link import ReopeningLink
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
 from tickrig.host.rtc_lite.attachment import RATE_HZ
@@ -37,7 +38,7 @@ def attach_lite(
     name, url, baud = parse_lite(word)
     settings = Settings(boot_us=boot_us, rediscover=True)
     try:
-        link = stack.enter_context(closing(SerialLink(url, baud)))
+        link = stack.enter_context(closing(ReopeningLink(lambda: SerialLink(url, baud))))
         attach(manager, link, name, settings, listener=_tell, rate_hz=rate_hz or RATE_HZ)
     except (LinkClosed, ValueError) as error:
         raise Refused(f"--lite {word}: {error}") from None
