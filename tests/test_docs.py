@@ -29,6 +29,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/device-rtc.md",
         "docs/rtc-lite.md",
         "docs/rtc.md",
+        "docs/rtc-canopen.md",
         "docs/canopen-io-module.md",
         "docs/servo.md",
     ],

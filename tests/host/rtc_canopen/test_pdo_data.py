@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from tests.emulators.can_bench import frames
-from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
+from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import ReturnCode
 from tickrig.host.rtc_canopen.events import EventKind
@@ -92,3 +94,18 @@ def test_ports_that_do_not_fit_are_not_connected() -> None:
     bench.run_ms(50)
     (event,) = bench.events(EventKind.CONNECTION_REFUSED)
     assert "carries IDL:RTC/TimedOctet:1.0" in event
+
+
+def test_a_pdo_with_an_object_that_no_port_has_gets_no_port(tmp_path: Path) -> None:
+    head, digital = (EDS / "f-palette.eds").read_text("utf-8").split("[6000sub1]")
+    changed = digital.replace("DataType=0x0005", "DataType=0x0009", 1)
+    (tmp_path / "f-palette.eds").write_text(f"{head}[6000sub1]{changed}", "utf-8")
+    text = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"
+    bench = Bench(text, {16: "f-palette"}, tmp_path)
+    bench.boot()
+    assert bench.events(EventKind.PORT_REFUSED) == [
+        "PortRefused 16 tpdo1: no port has the type of 6000h:01"
+    ]
+    proxy = bench.proxy(16)
+    assert proxy is not None
+    assert "tpdo1" not in proxy.ports
