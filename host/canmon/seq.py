@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +17,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import format_time
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.sequence import steps
 from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
 from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
@@ -101,19 +103,20 @@ def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, qu
 
     with transmitters([bus], options, hears=True) as (out,), until_interrupted():
         pace = Pace()
-        _send(out, run.tick(pace.now_us))
+        _send(out, watch, run.tick(pace.now_us))
         while not run.done:
             _show(run, quiet)
             for heard in out.poll(max(0, min(POLL_US, run.due_us - pace.now_us))):
                 watch.take(heard)
-                _send(out, run.tick(pace.now_us, (heard,)))
-            _send(out, run.tick(pace.now_us))
+                _send(out, watch, run.tick(pace.now_us, (heard,)))
+            _send(out, watch, run.tick(pace.now_us))
     _show(run, quiet)
 
 
-def _send(out: Transmitter, frames: Frames) -> None:
+def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
     for frame in frames:
         out.send(frame)
+        watch.take(Heard(time.time_ns() // 1_000, out.name, frame, sent=True))
 
 
 def _show(run: SequenceRun, quiet: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -42,8 +43,8 @@ def replays(seconds: float) -> None:
         replayed = list(pool.map(replay, PEERS, [seconds] * len(PEERS)))
     for who, (late_us, cpu) in zip(PEERS, replayed, strict=True):
         percentiles(f"{who}, {FRAMES_S} frames/s for {seconds:.0f} s: late", late_us, "us")
-        ends = [sum(part) / len(part) for part in (late_us[:1_000], late_us[-1_000:])]
-        row(f"{who}: drift, last 1,000 frames against the first", [ends[1] - ends[0]], "us")
+        first, last = (statistics.median(part) for part in (late_us[:1_000], late_us[-1_000:]))
+        row(f"{who}: drift, last 1,000 frames against the first", [last - first], "us")
         row(f"{who}: processor", [100 * cpu], "% of a core")
 
 

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_host import CanHost
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig, Station
+from tickrig.host.canmon.watch import Watch
+from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
+from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
+from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.wire.can import Frames
+
+EXAMPLES = Path(__file__).parents[4] / "examples"
+START = EXAMPLES / "sequences/start_drive.toml"
+
+
+def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
+    """Carry out a sequence on our drive, in virtual time."""
+    wire = CanWire()
+    slave = make_slave(epos.dictionary(), 5, application=epos.make)
+    drive = epos.Epos.of(slave)
+    host = CanHost(Rig(Station(slave, wire.end())), wire.end())
+    watch = Watch({5: read_eds(EXAMPLES / "eds/epos.eds", 5)})
+    resolve = PdoWords(watch.eds).frame
+    sequence = TomlSequence(text, START.name, resolve=resolve, condition=watch.condition).parse()
+    run = SequenceRun(sequence)
+
+    def send(frames: Frames) -> None:
+        host.send(frames)
+        for frame in frames:
+            watch.take(Heard(host.now_us, "can0", frame, sent=True))
+
+    send(run.tick(host.now_us))
+    while not run.done:
+        for frame in host.receive(run.due_us - host.now_us):
+            heard = Heard(host.now_us, "can0", frame)
+            watch.take(heard)
+            send(run.tick(host.now_us, (heard,)))
+        send(run.tick(host.now_us))
+    return run, drive
+
+
+def test_the_example_turns_our_drive() -> None:
+    run, drive = carried_out(START.read_text())
+    assert [note.text for note in run.notes if note.mark is Mark.MISSED] == []
+    assert (run.done, run.met) == (True, 5)
+    assert drive.read("shaft_deg") != 0
+
+
+def test_an_answer_by_sdo_is_expected_by_the_name_of_its_object() -> None:
+    text = """
+    [[step]]
+    expect = "705#00"
+    [[step]]
+    send = "605#4000100000000000"
+    [[step]]
+    expect = "device_type=0x20192"
+    within = "20ms"
+    """
+    run, _ = carried_out(text)
+    assert [note.text for note in run.notes][-1] == "2 met, 0 missed"
+
+
+def test_a_drive_that_is_not_there_is_missed() -> None:
+    run, drive = carried_out(START.read_text().replace("id = 5", "id = 6").replace("{id}.r", "5.r"))
+    assert (run.met, run.missed) == (0, 1)
+    assert drive.read("shaft_deg") == 0
