@@ -162,7 +162,7 @@ class BusDecoder:
             memory.written(entry, data)
         if entry[0] in PDO_OBJECTS:
             self._refresh(pdos_of(transfer.node, (entry[0],)))
-        elif memory.is_drive != was_drive or entry == DEVICE_TYPE:
+        if memory.is_drive != was_drive or entry == DEVICE_TYPE:
             self._refresh(self._pdos.known(transfer.node))
         self._learn_cob_ids(transfer.node, entry[0])
 

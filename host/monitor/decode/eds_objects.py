@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -46,6 +45,8 @@ def read_eds(path: Path, node_id: int) -> EdsObjects:
         OSError: the file cannot be read.
         EdsError: it is malformed.
     """
+    import configparser  # noqa: PLC0415 - for files alone
+
     from canopen.objectdictionary import import_od  # noqa: PLC0415 - slow
 
     path.open("rb").close()  # the library tells a missing file as a wrong one

@@ -70,16 +70,12 @@ class PdoLayout:
             return Decoded(self.kind, self.node, text, (), self.source)
         number = int.from_bytes(data, "little")
         signals = []
-        words = []
         for name, shift, mask, sign, convert, unit, write in self._fields:
             raw = number >> shift & mask
             value: Value = (raw ^ sign) - sign if convert is None else convert(raw)
-            text = "" if write is None else write(raw)
-            signals.append(Signal(name, value, unit, text))
-            words.append(f"{name}={text or str(value)}{unit}")
-        if self._note or not words:
-            words.append(self._note or "empty")
-        return Decoded(self.kind, self.node, " ".join(words), tuple(signals), self.source)
+            signals.append(Signal(name, value, unit, "" if write is None else write(raw)))
+        said = " ".join([*map(str, signals), self._note]) if self._note else None
+        return Decoded(self.kind, self.node, said, tuple(signals), self.source)
 
 
 class MpdoLayout:

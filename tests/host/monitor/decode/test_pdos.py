@@ -55,6 +55,12 @@ def test_another_device_type_has_no_statusword(device_type: str, text: str) -> N
     assert last(f"{WRITTEN} 585#43001000{device_type} 185#3702D2040000").text == text
 
 
+def test_names_of_a_drive_come_to_all_its_pdos() -> None:
+    before = "585#4F00160001000000 585#4300160110004060"
+    assert last(f"{before} 205#0F00").text == "6040h:00=0x000F"
+    assert last(f"{before} {WRITTEN} 205#0F00").text == "controlword=0x000F"
+
+
 def test_a_mapping_that_was_read_counts_as_well() -> None:
     read = (
         "605#40001A0000000000 585#4F001A0001000000 605#40001A0100000000 585#43001A0110004160"
