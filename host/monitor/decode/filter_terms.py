@@ -10,12 +10,14 @@ from typing import Final
 from tickrig.host.monitor.candump_filter import CandumpFilter, flagged_id
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.drive_state import BITS
+from tickrig.host.monitor.decode.heard_line import HeardLine
 from tickrig.host.monitor.decode.transfer import Outcome
 from tickrig.host.monitor.heard import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
-Test = Callable[[Heard, Decoded], bool]
+Listened = Heard | HeardLine
+Test = Callable[[Listened, Decoded], bool]
 Compare = Callable[[float, float], bool]
 
 COMPARISONS: Final[dict[str, Compare]] = {
@@ -37,12 +39,12 @@ OUTCOMES: Final = {
     "sdo.unanswered": Outcome.UNANSWERED,
     "sdo.broken": Outcome.BROKEN,
 }
-FIELDS: Final[dict[str, Callable[[Heard, Decoded], int | None]]] = {
+FIELDS: Final[dict[str, Callable[[Listened, Decoded], int | None]]] = {
     "node": lambda heard, decoded: decoded.node,
     "id": lambda heard, decoded: _can_id(heard),
     "dlc": lambda heard, decoded: getattr(heard.frame, "dlc", None),
 }
-WORDS: Final[dict[str, Callable[[Heard, Decoded], str]]] = {
+WORDS: Final[dict[str, Callable[[Listened, Decoded], str]]] = {
     "channel": lambda heard, decoded: heard.channel,
     "kind": lambda heard, decoded: decoded.kind,
     "dir": lambda heard, decoded: "tx" if heard.sent else "rx",
@@ -82,7 +84,7 @@ def object_test(index: int, sub: int | None) -> Test:
 def range_test(low: int, high: int, *, extended: bool) -> Test:
     """Return the test for CAN-IDs, both ends included."""
 
-    def test(heard: Heard, decoded: Decoded) -> bool:
+    def test(heard: Listened, decoded: Decoded) -> bool:
         frame = heard.frame
         if not isinstance(frame, CanFrame) or frame.extended != extended:
             return False
@@ -100,14 +102,14 @@ def error_test(mask: int) -> Test:
 
 def candump_test(chosen: CandumpFilter) -> Test:
     """Return the test of candump's rules."""
-    return lambda heard, decoded: chosen.passes(flagged_id(heard))
+    return lambda heard, decoded: isinstance(heard, Heard) and chosen.passes(flagged_id(heard))
 
 
 def field_test(name: str, compare: Compare, value: float) -> Test:
     """Return the test for a number that every frame of some kind has."""
     field = FIELDS[name]
 
-    def test(heard: Heard, decoded: Decoded) -> bool:
+    def test(heard: Listened, decoded: Decoded) -> bool:
         found = field(heard, decoded)
         return found is not None and compare(found, value)
 
@@ -135,7 +137,7 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
     whole = name if shift is None else base
     compare = _comparison(sign, text)
 
-    def test(heard: Heard, decoded: Decoded) -> bool:
+    def test(heard: Listened, decoded: Decoded) -> bool:
         if node is not None and decoded.node != node:
             return False
         for signal in decoded.signals:
@@ -179,5 +181,5 @@ def _bit(signal: Signal, shift: int) -> Signal:
     return Signal(signal.name, value >> shift & 1 if isinstance(value, int) else "")
 
 
-def _can_id(heard: Heard) -> int | None:
+def _can_id(heard: Listened) -> int | None:
     return heard.frame.can_id if isinstance(heard.frame, CanFrame) else None

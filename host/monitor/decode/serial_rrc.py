@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Final, NamedTuple
+from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
+from tickrig.host.monitor.decode.heard_line import HeardLine
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.check import strip_check
@@ -13,24 +14,6 @@ from tickrig.wire.rrc.commands import Command, parse_command
 from tickrig.wire.rrc.replies import Event, Ok, Refusal, StatusA, Text, parse_reply
 
 KIND: Final = "rrc"
-
-
-class HeardLine(NamedTuple):
-    """A message of a serial line.
-
-    Attributes:
-        at_us: when its last byte was heard.
-        channel: name of the line.
-        to_device: the host sent it.
-        data: its bytes.
-        decoded: what it says.
-    """
-
-    at_us: int
-    channel: str
-    to_device: bool
-    data: bytes
-    decoded: Decoded
 
 
 class RrcLines:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
+from tickrig.host.monitor.decode.heard_line import HeardLine
 from tickrig.host.monitor.decode.object_text import write_bytes
-from tickrig.host.monitor.decode.serial_rrc import HeardLine
 from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_lite.codes import Command, LinkFault, State, Status
 from tickrig.wire.rtc_lite.decoder import Decoder

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.decode.serial_rrc import RrcLines
 from tickrig.host.monitor.decode.serial_rtc_lite import RtcLiteLine
 from tickrig.wire.rtc_lite.codes import Command
@@ -50,6 +51,22 @@ def test_a_line_that_is_no_command_is_said_to_be() -> None:
 )
 def test_a_line_of_the_rrc_says_this(line: bytes, text: str) -> None:
     assert rrc(line, to_device=False) == [text]
+
+
+@pytest.mark.parametrize(
+    ("text", "passes"),
+    [
+        ("rrc and gauge = 10", True),
+        ("rtc-lite", False),
+        ("channel = ttyS0 and dir = rx", True),
+        ("123:7FF or 181-18F or id = 5 or dlc = 8 or error", False),
+        ("not node = 3", True),
+        ("in_v_pct > 99", True),
+    ],
+)
+def test_a_filter_takes_lines_as_it_takes_frames(text: str, passes: bool) -> None:
+    (line,) = RrcLines("ttyS0").take(0, b"SA:64003200A1000F\n", to_device=False)
+    assert parse_filter(text).matches(line, line.decoded) is passes
 
 
 def test_the_status_of_the_rrc_has_signals() -> None:
