@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,7 +19,7 @@ class Odometry(RtComponent):
     """Adds up the way of both wheels on exact arcs, for the middle of the drive axle.
 
     The port LocalizedPosition is there and unused, as in the specification. Angles that
-    are fewer than the wheels' ids ask for are passed over.
+    are no numbers, or fewer than the wheels' ids ask for, are passed over.
 
     Attributes:
         pose: where the cart is thought to be.
@@ -47,15 +48,15 @@ class Odometry(RtComponent):
         self._before: tuple[float, float] | None = None
 
     def load(self, path: Path) -> None:
-        """Let the values of a file such as Odometry.conf take the place of the defaults.
+        """Let the values of a file such as Odometry.conf take the place of those in its sets.
 
         Raises:
             OSError: it cannot be read.
             RtcRefused: a line, a parameter or a value that cannot be.
         """
         for set_id, values in read_conf(path).items():
-            for name, text in values.items():
-                self.configuration.set(name, text, set_id)
+            held = self.configuration.sets.get(set_id, {})
+            self.configuration.add_set(set_id, {**held, **values})
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin at the initial pose."""
@@ -80,6 +81,8 @@ class Odometry(RtComponent):
         if max(left_id, right_id) >= len(sample.data):
             return
         angles = sample.data[left_id], sample.data[right_id]
+        if not (isfinite(angles[0]) and isfinite(angles[1])):
+            return
         before, self._before = self._before or angles, angles
         left = (angles[0] - before[0]) * self.left_radius.value
         right = (angles[1] - before[1]) * self.right_radius.value
