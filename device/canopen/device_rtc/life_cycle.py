@@ -1,46 +1,21 @@
-"""The life cycle of RTC inside the NMT states (NEDO report, 3.4.43.3, Table 3, Fig. 110).
-
-Where figure and table are silent the decisions K6 to K13 of the project hold.
-"""
+"""The life cycle of RTC inside the NMT states (NEDO report, 3.4.43.3, Fig. 110)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Enum
-from typing import Final
 
 from tickrig.device.canopen.device_rtc.component import Component, Result, ReturnCode
+from tickrig.device.canopen.device_rtc.transitions import (
+    ACTIVITIES,
+    ADMITTED,
+    ENDING,
+    ENTERED,
+    STATES,
+    STRICT_ERROR,
+    RtcState,
+)
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
-
-
-class RtcState(Enum):
-    """State of a component (OMG RTC 1.1, LifeCycleState), and what comes after the end."""
-
-    CREATED = "Created"
-    INACTIVE = "Inactive"
-    ACTIVE = "Active"
-    ERROR = "Error"
-    FINALIZED = "Finalized"
-
-
-STATES: Final = {
-    NmtState.INITIALISING: RtcState.CREATED,
-    NmtState.PRE_OPERATIONAL: RtcState.INACTIVE,
-    NmtState.OPERATIONAL: RtcState.ACTIVE,
-    NmtState.STOPPED: RtcState.ERROR,
-}
-"""Table 3, for a component that was initialized."""
-
-ACTIVITIES: Final = {
-    RtcState.INACTIVE: "error_check",
-    RtcState.ACTIVE: "on_execute",
-    RtcState.ERROR: "on_error",
-}
-"""What a state does at the rate of the component."""
-
-ALIVE: Final = tuple(ACTIVITIES)
-RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 
 
 class LifeCycle:
@@ -91,35 +66,28 @@ class LifeCycle:
         return self._initialized and not self._finalized
 
     def admits(self, command: NmtCommand) -> bool:
-        """Run what comes before an NMT command; say whether it is carried out (K8 to K11)."""
+        """Run what comes before an NMT command; say whether it is carried out."""
         state = self.state
+        table = ADMITTED[state]
+        if state is RtcState.ERROR and self.component.strict_cia301:
+            table = STRICT_ERROR
+        if command not in table:
+            return False
+        well = self._call_all(table[command])
         if state is RtcState.ERROR:
-            return self._leaves_error(command)
-        if state is RtcState.ACTIVE and command in RESETS:
-            self._call("on_deactivated")
-        if command is not NmtCommand.RESET_NODE:
-            return state in ALIVE
-        if state in ALIVE:
-            self._call("on_finalize")
-        if state is not RtcState.FINALIZED:
+            return well
+        if command is NmtCommand.RESET_NODE:
             self.create()
-        return state is not RtcState.FINALIZED
+        return True
 
     def moved(self, old: NmtState, new: NmtState) -> None:
-        """Run exit action, effect and entry action of a change that was made (M2 to M7)."""
-        match (old, new):
-            case (NmtState.OPERATIONAL, NmtState.STOPPED):
-                self._call("on_deactivated")
-                self._call("on_aborting")
-            case (NmtState.OPERATIONAL, NmtState.PRE_OPERATIONAL):
-                if not self._call("on_deactivated"):
-                    self._call("on_aborting")
-                    self._node.enter(NmtState.STOPPED)
-            case (_, NmtState.OPERATIONAL):
-                if not self._call("on_activated"):
-                    self._node.enter(NmtState.STOPPED)
-            case _:
-                return
+        """Run the callbacks of a change that was made; an error leads to Error."""
+        well = self._call_all(ENTERED.get((old, new), ()))
+        if well or new is NmtState.STOPPED:
+            return
+        if old is NmtState.OPERATIONAL:
+            self._call("on_aborting")
+        self._node.enter(NmtState.STOPPED)
 
     def run(self) -> None:
         """Run what the state does; an error leads to Error (M5, M6)."""
@@ -128,19 +96,15 @@ class LifeCycle:
 
     def finalize(self) -> None:
         """End (M11): the node falls silent until its supply was cut."""
-        if self.state not in ALIVE:
-            return
-        if self.state is RtcState.ACTIVE:
-            self._call("on_deactivated")
-        self._call("on_finalize")
-        self._finalized = True
-        self._node.reset_node()
+        if self.state in ENDING:
+            self._call_all(ENDING[self.state])
+            self._finalized = True
+            self._node.reset_node()
 
-    def _leaves_error(self, command: NmtCommand) -> bool:
-        leads_out = command in RESETS
-        if self.component.strict_cia301:
-            leads_out = command is not NmtCommand.STOP
-        return leads_out and self._call("on_reset")
+    def _call_all(self, callbacks: tuple[str, ...]) -> bool:
+        """Run callbacks, all of them; False if one failed."""
+        results = [self._call(name) for name in callbacks]
+        return all(results)
 
     def _call(self, callback: str) -> bool:
         """Run a callback; False if it failed."""
