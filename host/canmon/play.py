@@ -13,6 +13,7 @@ from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.source import log_path
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
@@ -125,7 +126,7 @@ def _can_id(text: str | None) -> int | None:
 
 def _play(plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: int | None) -> None:
     late, pace = Lateness(), Pace()
-    with until_interrupted():
+    with until_interrupted(), until_unread():
         if wait_rx is not None:
             _wait_for(wait_rx, list(buses.values()))
             pace = Pace()

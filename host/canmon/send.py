@@ -11,6 +11,7 @@ import click
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
@@ -60,7 +61,7 @@ def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any)
     made = _frames(frames, eds)
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
-    with transmitters([bus], BusOptions(**options)) as (out,), until_interrupted():
+    with transmitters([bus], BusOptions(**options)) as (out,), until_interrupted(), until_unread():
         _run(cyclic, out, quiet)
     missed = sum(one.missed for one in cyclic)
     if missed:

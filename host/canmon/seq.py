@@ -12,6 +12,7 @@ import click
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.watch import Watch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import format_time
@@ -101,7 +102,7 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
 def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, quiet: bool) -> None:
     from tickrig.host.canmon.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
 
-    with transmitters([bus], options, hears=True) as (out,), until_interrupted():
+    with transmitters([bus], options, hears=True) as (out,), until_interrupted(), until_unread():
         pace = Pace()
         _send(out, watch, run.tick(pace.now_us))
         while not run.done:

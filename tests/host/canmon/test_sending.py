@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import can
@@ -260,19 +261,48 @@ def test_a_condition_that_is_none_is_refused_with_its_line(wire: Wire, tmp_path:
     assert (result.exit_code, result.stderr.startswith(f"Error: {path}:2: filter")) == (2, True)
 
 
-@pytest.mark.realtime
-def test_ctrl_c_ends_what_is_sent_for_ever() -> None:
-    words = ["canmon", "send", "virtual:alone", "080#", "--every", "1ms"]
-    program = f"import sys; sys.argv = {words}; {PROGRAM}"
+@contextmanager
+def running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
+    """`canmon` as a process of its own."""
+    program = f"import sys; sys.argv = {['canmon', *words]}; {PROGRAM}"
     with subprocess.Popen(
         [sys.executable, "-u", "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
+        yield process
+
+
+def interrupted(process: subprocess.Popen[bytes]) -> tuple[int, str]:
+    """Press Ctrl-C; return the exit status and what was said then."""
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=10)
+    return process.returncode, said.decode()
+
+
+@pytest.mark.realtime
+def test_ctrl_c_ends_what_is_sent_for_ever() -> None:
+    with running("send", "virtual:alone", "080#", "--every", "1ms") as process:
         assert process.stdout is not None
-        assert process.stderr is not None
         for _ in range(10):
             assert b" alone 080#" in process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        process.stdout.read()
-        said = process.stderr.read()
-        assert process.wait(10) == 0
-    assert b"Traceback" not in said
+        status, said = interrupted(process)
+    assert (status, "Traceback" in said) == (0, False)
+
+
+@pytest.mark.realtime
+def test_ctrl_c_cuts_a_sequence_short(tmp_path: Path) -> None:
+    path = tmp_path / "a.seq"
+    path.write_text("loop forever\n+1 080#\n")
+    with running("seq", "virtual:alone", str(path)) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert interrupted(process) == (1, "interrupted before its end\n")
+
+
+@pytest.mark.realtime
+def test_sending_ends_quietly_when_nobody_reads_what_is_printed() -> None:
+    with running("send", "virtual:alone", "080#", "--every", "1ms") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert (process.wait(10), process.stderr.read()) == (0, b"")

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -71,6 +72,16 @@ def test_a_mistake_in_a_line_is_told_with_its_number(text: str, said: str) -> No
     with pytest.raises(SequenceError, match=r"^a\.seq:") as caught:
         parse_lines(text, "a.seq")
     assert said in str(caught.value)
+
+
+def test_the_sequence_of_the_page_can_be_carried_out() -> None:
+    page = (Path(__file__).parents[4] / "docs/canmon-sending.md").read_text("utf-8")
+    match = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert match is not None
+    assert outline(TomlSequence(match[1], "page.toml").parse().steps)[:2] == [
+        "send 000#0105",
+        "expect 705#05 within 300 ms, else go on",
+    ]
 
 
 def test_a_sequence_is_told_without_a_bus() -> None:
