@@ -41,6 +41,7 @@ _shown: Final = add_options(
         help="Time: (a)bsolute, (d)elta, (z)ero at the first, (A)bsolute with date.",
     ),
     click.option("-x", "extra", is_flag=True, help="Show RX or TX."),
+    click.option("-e", "errors", is_flag=True, help="Error frames in words, with --raw too."),
     click.option("-r", "--raw", is_flag=True, help="Bytes alone, as candump shows them."),
     click.option("-L", "output", flag_value="log", help="Lines of a log, as candump -L."),
     click.option("--jsonl", "output", flag_value="jsonl", help="One JSON object a line."),
@@ -70,6 +71,7 @@ def command(  # noqa: PLR0913 - options
     source: Sequence[str],
     stamp: str | None,
     extra: bool,
+    errors: bool,
     raw: bool,
     output: str | None,
     file: Path | None,
@@ -101,10 +103,10 @@ def command(  # noqa: PLR0913 - options
     chosen, form = read_filter(wanted), Output(output or "")
     plain = raw or form is Output.LOG or file is not None
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
-    shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain), form)
+    shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
     with ExitStack() as held:
-        log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         frames = held.enter_context(closing(open_source(source, BusOptions(**options))))
+        log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         with until_interrupted(), until_unread():
             pass_on(frames, Meaning(decoder, chosen), (log or shown).take, count, quiet_ms)
     report(frames, strict)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
+from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig.host.monitor.dump_line import DumpLines, Stamp
@@ -31,22 +32,49 @@ class Output(StrEnum):
 CSV_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
 
 
-def printer_of(output: Output, stamp: Stamp, extra: bool, plain: bool) -> Printer:
-    """Return what prints a frame; `plain` leaves out what it means, as `stamp` asks."""
+def printer_of(
+    output: Output, stamp: Stamp, extra: bool, raw: bool, errors: bool = False
+) -> Printer:
+    """Return what prints a frame.
+
+    Args:
+        output: as what.
+        stamp: time in front of lines of text.
+        extra: direction in lines of text.
+        raw: leave out what frames mean,
+        errors: but not of error frames.
+    """
+    write = _writer(output, stamp, extra)
+    if not raw:
+        return write
+    if errors:
+        return lambda heard, _: write(heard, _error_meaning(heard))
+    return lambda heard, _: write(heard, None)
+
+
+def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
     match output:
         case Output.TEXT:
             lines = DumpLines(stamp, extra)
-            return lambda heard, decoded: lines.line(
-                heard, decoded_text(None if plain else decoded)
-            )
+            return lambda heard, decoded: lines.line(heard, decoded_text(decoded))
         case Output.LOG:
             return log_printer
         case Output.JSONL:
-            return lambda heard, decoded: json_printer(heard, None if plain else decoded)
+            return json_printer
         case Output.CSV:
-            return lambda heard, decoded: csv_printer(heard, None if plain else decoded)
+            return csv_printer
         case _:
             assert_never(output)
+
+
+def _error_meaning(heard: Heard) -> Decoded | None:
+    if not isinstance(heard.frame, ErrorFrame):
+        return None
+    from tickrig.host.monitor.decode.error_frame_text import (  # noqa: PLC0415 - seldom wanted
+        decode_error,
+    )
+
+    return decode_error(heard.frame)
 
 
 def log_printer(heard: Heard, decoded: Decoded | None) -> str:
@@ -91,7 +119,9 @@ def decoded_text(decoded: Decoded | None) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return a value as JSON has it; bytes are hex."""
+    """Return a value as JSON has it: bytes are hex, and what is no number is null."""
+    if isinstance(value, float) and not isfinite(value):
+        return None
     return value.hex().upper() if isinstance(value, bytes | bytearray) else value
 
 

@@ -49,6 +49,12 @@ def test_raw_lines_are_those_of_candump(log: str) -> None:
     ]
 
 
+def test_error_frames_are_put_into_words_in_raw_lines_too(log: str) -> None:
+    lines = canmon("dump", log, "-r", "-e").stdout.splitlines()
+    assert lines[4].endswith("ERRORFRAME   error protocol, bus error")
+    assert lines[0].endswith("40 00 10 00 00 00 00 00")
+
+
 @pytest.mark.parametrize(
     ("stamp", "second"),
     [("a", " (0000000001.000250)"), ("d", " (000.000250)"), ("z", " (000.000250)")],
@@ -188,3 +194,10 @@ def test_verbs_on_a_candump_log_do_not_import_what_is_slow(log: str) -> None:
             [sys.executable, "-c", code, *words], capture_output=True, text=True, check=True
         )
         assert run.stdout.splitlines()[-1] == ""
+
+
+def test_a_log_is_left_alone_where_the_source_cannot_be_opened(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.log"
+    kept.write_text(LOG, "ascii")
+    assert canmon("dump", "socketcan:nowhere", "-l", str(kept)).exit_code == 3
+    assert kept.read_text("ascii") == LOG
