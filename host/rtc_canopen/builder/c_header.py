@@ -28,6 +28,9 @@ C_TYPES: Final = {
 }
 """Data types of ports."""
 
+NODE_ID: Final = 0x80
+"""Bit of `access` beside those of `Access`: the node-ID is added to the default."""
+
 HEAD: Final = """\
 /* {type_name} {version}: object dictionary of a DeviceRTC, written by rtc-canopen-builder.
  *
@@ -143,14 +146,14 @@ def _table(profile: RtcProfile, rows: list[ObjectRow], lower: str) -> Iterator[s
 
 
 def _entry(row: ObjectRow, port: PlacedPort | None, lower: str) -> str:
-    access = f"0x{(row.access.value) | (0x80 if row.relative else 0):02X}u"
+    access = row.access.value | (NODE_ID if row.relative else 0)
     number, text = "0u", "NULL"
     if row.data_type.size:
         number = f"0x{int.from_bytes(row.default, 'little'):X}u"
     else:
         text = f'"{row.default.decode("ascii")}"'
     return (
-        f"{{0x{row.index:04X}u, {row.sub}u, 0x{row.data_type:02X}u, {access}, "
+        f"{{0x{row.index:04X}u, {row.sub}u, 0x{row.data_type:02X}u, 0x{access:02X}u, "
         f"{row.data_type.size}u, {_offset(row, port, lower)}, {number}, {text}}}"
     )
 

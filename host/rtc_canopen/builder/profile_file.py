@@ -37,6 +37,8 @@ TEXTS: Final = ("version", "vendor", "category")
 NUMBERS: Final = ("rate_hz", "product_code")
 KEYS: Final = ("name", *TEXTS, *NUMBERS, "node_id", "word_bits", "strict_cia301", "port")
 PORT_KEYS: Final = ("name", "direction", "type", "length")
+_KINDS: Final = {str: "no text", int: "no whole number", bool: "neither true nor false"}
+
 DEFAULT_WORD_BITS: Final = 32
 DEFAULT_NODE_ID: Final = 16
 
@@ -129,6 +131,3 @@ def _take(table: Table, key: str, kind: type[Any], default: Any = None) -> Any:
     if type(value) is not kind:
         raise ProfileError(f"{key} {value!r} is {_KINDS[kind]}")
     return value
-
-
-_KINDS: Final = {str: "no text", int: "no whole number", bool: "neither true nor false"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Final
 
 from tickrig.host.rtc_canopen.builder.fragment import pdo_name
 from tickrig.wire.canopen.eds_value import format_value
@@ -10,8 +11,15 @@ from tickrig.wire.canopen.object_table import Access, ObjectRow
 from tickrig.wire.rtc_canopen.objects import object_table
 from tickrig.wire.rtc_canopen.profile import FIRST_PORT, PlacedPort, RtcProfile
 
-OBJECT = "{:<9} {:<36} {:<14} {:<6} {}"
-PDO = "{:<9} {:<9} {:<5} {}"
+OBJECT: Final = "{:<9} {:<36} {:<14} {:<6} {}"
+LETTERS: Final = {
+    Access.READ: "r",
+    Access.WRITE: "w",
+    Access.CONST: "c",
+    Access.TPDO: "T",
+    Access.RPDO: "R",
+}
+PDO: Final = "{:<9} {:<9} {:<5} {}"
 
 
 def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
@@ -27,14 +35,7 @@ def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
 def _objects(rows: Iterable[ObjectRow]) -> Iterator[str]:
     yield OBJECT.format("object", "name", "type", "access", "default")
     for row in rows:
-        access = "".join(
-            letter
-            for letter, flag in (
-                *(("r", Access.READ), ("w", Access.WRITE), ("c", Access.CONST)),
-                *(("T", Access.TPDO), ("R", Access.RPDO)),
-            )
-            if flag in row.access
-        )
+        access = "".join(letter for flag, letter in LETTERS.items() if flag in row.access)
         default = format_value(row.data_type, row.default, relative=row.relative)
         place = f"{row.index:04X}h:{row.sub:02X}"
         shown = default if default.isprintable() else row.default.hex()
