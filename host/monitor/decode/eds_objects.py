@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -49,9 +50,10 @@ def read_eds(path: Path, node_id: int) -> EdsObjects:
 
     from canopen.objectdictionary import import_od  # noqa: PLC0415 - slow
 
-    path.open("rb").close()  # the library tells a missing file as a wrong one
+    file = io.StringIO(_read_text(path))
+    file.name = "file.eds"  # by which the library tells formats
     try:
-        found = import_od(str(path), node_id)
+        found = import_od(file, node_id)
     except (configparser.Error, ValueError, KeyError, TypeError, AttributeError) as error:
         raise EdsError(f"{path} is no EDS: {' '.join(str(error).split())}") from error
     variables = list(_variables(found))
@@ -66,6 +68,15 @@ def read_eds(path: Path, node_id: int) -> EdsObjects:
         },
         found.device_information.product_name or path.stem,
     )
+
+
+def _read_text(path: Path) -> str:
+    """Return the text; vendors write Windows code pages, too."""
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
 
 
 def _variables(found: ObjectDictionary) -> Iterator[tuple[str, ODVariable]]:

@@ -103,7 +103,11 @@ class NodeMemory:
 
     def describe(self, index: int, sub: int) -> ObjectText:
         """Return what is known of an object; the words of a drive have the names of CiA 402."""
-        told = self.eds.texts.get((index, sub)) or describe_standard(index, sub)
+        told, standard = self.eds.texts.get((index, sub)), describe_standard(index, sub)
+        if told is None:
+            told = standard
+        elif standard is not None:
+            told = told._replace(in_hex=standard.in_hex)
         if self.is_drive and (told is None or index in DRIVE_WORDS):
             text = describe_drive(index, sub) or ObjectText()
             return text if told is None else text._replace(source=told.source)

@@ -29,6 +29,19 @@ def test_a_pdo_by_the_mapping_of_an_eds_is_named_and_so_is_its_source() -> None:
     assert decoded.signals[0].text == "0x0237[operation enabled]"
 
 
+def test_an_eds_in_a_windows_code_page_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "drive.txt"
+    text = EPOS.read_text().replace("ProductName=EPOS", "ProductName=Getriebe für 5 °C")
+    path.write_bytes(text.encode("cp1252"))
+    assert read_eds(path, 5).name == "Getriebe für 5 °C"
+
+
+def test_a_cob_id_is_hexadecimal_whoever_names_it() -> None:
+    decoded = last("585#4300180185010040", {5: read_eds(EPOS, 5)})
+    name = "tpdo1_communication_parameter.cob_id"
+    assert decoded.text.startswith(f"upload 1800h:01 {name} = 0x40000185")
+
+
 def test_units_and_factors_of_an_eds_are_used(tmp_path: Path) -> None:
     path = tmp_path / "unit.eds"
     path.write_text(
