@@ -4,29 +4,53 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import click
 
+from tickrig.host.canmon.decode_options import (
+    decode_options,
+    filter_option,
+    make_decoder,
+    read_filter,
+)
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us, span_option
+from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.top_model import TopModel
 
 PAINT_US: Final = 100_000
 
+Take = Callable[[list[Heard]], None]
+
 
 @click.command(cls=BusCommand)
 @click.argument("source", nargs=-1)
+@click.option("-d", "--decode", is_flag=True, help="Show what frames mean instead of bytes.")
+@filter_option
+@decode_options
 @span_option
 @click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
 @bus_options
-def command(source: Sequence[str], span_us: int | None, strict: bool, **options: Any) -> None:
+def command(  # noqa: PLR0913 - options
+    *,
+    source: Sequence[str],
+    decode: bool,
+    wanted: str | None,
+    eds: Sequence[str],
+    dbc: Sequence[Path],
+    span_us: int | None,
+    strict: bool,
+    **options: Any,
+) -> None:
     """Show all identifiers: counts, rates, gaps, jitter, missed cycles, changes, load.
 
     It listens only. Ten times a second the screen is painted; the last table
@@ -36,36 +60,45 @@ def command(source: Sequence[str], span_us: int | None, strict: bool, **options:
     \b
     canmon top can0 -b 500000
     canmon top run.log
+    canmon top can0 -d --eds 3=drive.eds -F 'node=3 and pdo'
     ssh robot canmon dump can0 --jsonl | canmon top -
     canmon top can0 --for 10s > table.txt
 
-    Keys: q quit, space hold, b bits, n notch (hide what changed so far),
-    s sort, c clear, arrows scroll.
+    Keys: q quit, space hold, b bits, d decode (with -d, -F, --eds or --dbc),
+    n notch (hide what changed so far), s sort, c clear, arrows scroll.
 
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    log, model = whole_log(source), TopModel(bus.bitrate)
+    chosen, model = read_filter(wanted), TopModel(bus.bitrate)
+    plain = not (decode or chosen or eds or dbc)
+    take = model.take if plain else _meant(model, Meaning(make_decoder(eds, dbc), chosen))
+    log = whole_log(source) if plain else None
+    model.press("d" if decode else "")
     frames = log or open_source(source, bus)
     on_screen = frames.live and sys.stdout.isatty()
     try:
         with until_interrupted():
             if on_screen:
-                _paint(frames, model, span_us)
+                _paint(frames, model, take, span_us)
             else:
-                listen(frames, model.take, span_us or patience_us(frames, source))
+                listen(frames, take, span_us or patience_us(frames, source))
         click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
     report(frames, strict)
 
 
-def _paint(source: Source, model: TopModel, span_us: int | None) -> None:
+def _meant(model: TopModel, meaning: Meaning) -> Take:
+    return lambda heards: model.take_meant(meaning.take(heards))
+
+
+def _paint(source: Source, model: TopModel, take: Take, span_us: int | None) -> None:
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
         while not (source.ended or model.quit or is_over(begin_s, span_us)):
             heards = source.poll(POLL_US)
-            model.take(heards)
+            take(heards)
             watch.take(heards)
             keys = screen.keys()
             for key in keys:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.ident import ident_of
+from tickrig.host.monitor.payload_text import data_text
+from tickrig.host.monitor.tally import IdRow
 from tickrig.host.monitor.top_table import UNBOUNDED, Order, View, render
 from tickrig.host.monitor.traffic import Snapshot, Traffic
+from tickrig.wire.can import CanFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
 
 PAGE: Final = 10
 """Rows that a key for a page goes."""
@@ -33,10 +40,12 @@ class TopModel:
         self.view = View(styled=True, bit_rate=bit_rate, keys=True)
         self._held: Snapshot | None = None
         self._now_us = 0
+        self._meanings: dict[tuple[str, int], Decoded] = {}
         self._acts: dict[str, Callable[[], None]] = {
             "q": self._quit,
             " ": self._hold,
             "b": lambda: self._show(bits=not self.view.bits),
+            "d": lambda: self._show(meaning=None if self.view.meaning else self._meaning),
             "n": self.traffic.notch,
             "s": lambda: self._show(order=_next(self.view.order)),
             "c": self.traffic.clear,
@@ -51,6 +60,13 @@ class TopModel:
         for heard in heards:
             self.traffic.take(heard)
 
+    def take_meant(self, meant: Iterable[tuple[Heard, Decoded | None]]) -> None:
+        """Count frames, and keep what the latest of each identifier means."""
+        for heard, decoded in meant:
+            self.traffic.take(heard)
+            if decoded is not None and isinstance(heard.frame, CanFrame):
+                self._meanings[heard.channel, ident_of(heard.frame)] = decoded
+
     def press(self, key: str) -> None:
         """Act on a key; one without a meaning does nothing."""
         if key in self._acts:
@@ -64,8 +80,12 @@ class TopModel:
 
     def final(self, lost: int, snapshot: Snapshot | None = None) -> list[str]:
         """Return the whole table of all that came, or of a snapshot, as plain text."""
-        view = View(self.view.order, self.view.bits, bit_rate=self.view.bit_rate)
+        view = replace(self.view, held=False, top=0, styled=False, keys=False)
         return render(snapshot or self.traffic.snapshot(), view, lost, UNBOUNDED, UNBOUNDED)
+
+    def _meaning(self, row: IdRow) -> str:
+        decoded = self._meanings.get((row.channel, row.ident))
+        return data_text(row, False) if decoded is None else meaning_text(decoded)
 
     def _quit(self) -> None:
         self.quit = True
@@ -80,6 +100,13 @@ class TopModel:
 
     def _show(self, **changes: object) -> None:
         self.view = replace(self.view, **changes)  # type: ignore[arg-type]  # fields of View
+
+
+def meaning_text(decoded: Decoded) -> str:
+    """Write what a frame means, with the node and where the names are from."""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    source = f" ({decoded.source})" if decoded.source else ""
+    return f"{node}{decoded.kind} {decoded.text}".rstrip() + source
 
 
 def _next(order: Order) -> Order:

@@ -15,7 +15,9 @@ from tickrig.host.monitor.traffic import BusRow, Snapshot
 
 DATA_WIDTH: Final = 23
 HEAT_WIDTH: Final = 71
+MEANING_WIDTH: Final = 50
 CHANNEL_MAX: Final = 12
+KEYS: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
 UNBOUNDED: Final = 1 << 16
 """A width or height that everything fits into."""
 
@@ -50,7 +52,8 @@ class View:
         top: rows that are scrolled past.
         styled: changes are marked; text of a file is not.
         bit_rate: of the buses, None if it is not known.
-        keys: the last line tells the keys.
+        keys: a line tells the keys.
+        meaning: what the latest frame of a row means, shown instead of its bytes.
     """
 
     order: Order = Order.ID
@@ -60,6 +63,7 @@ class View:
     styled: bool = False
     bit_rate: int | None = None
     keys: bool = False
+    meaning: Callable[[IdRow], str] | None = None
 
 
 def render(
@@ -105,7 +109,7 @@ def bus_line(bus: BusRow, bit_rate: int | None) -> str:
 def _state_line(snapshot: Snapshot, view: View, lost: int) -> str:
     words = [f"lost {lost}", f"{len(snapshot.rows)} identifiers by {view.order}"]
     words += ["held"] * view.held
-    keys = "  q quit, space hold, b bits, n notch, s sort, c clear" if view.keys else ""
+    keys = KEYS if view.keys else ""
     return ", ".join(words) + keys
 
 
@@ -115,14 +119,14 @@ class _Table(NamedTuple):
     Attributes:
         ids: the leading column.
         columns: of numbers.
-        bits: the payload is shown by its bits.
-        styled: what changed is marked, unless lines are cut: a style may not be.
+        payload: the last cell of a row, and its title.
+        styled: what changed is marked, in lines that are not cut: a style may not be.
         width: characters of the screen.
     """
 
     ids: IdText
     columns: tuple[Column, ...]
-    bits: bool
+    payload: tuple[Callable[[IdRow, bool], str], str]
     styled: bool
     width: int
 
@@ -131,21 +135,34 @@ class _Table(NamedTuple):
         """Choose the columns."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
         ids = IdText(min(CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
-        payload = HEAT_WIDTH if view.bits else DATA_WIDTH
-        room = width - ids.width - payload - 1
+        room = width - ids.width - _payload_width(view) - 1
         columns = fitting(room)
         fits = room >= sum(column.width + 1 for column in columns)
-        return cls(ids, columns, view.bits, view.styled and fits, width)
+        styled = view.styled and fits and (view.bits or view.meaning is None)
+        return cls(ids, columns, _payload(view), styled, width)
 
     def titles(self) -> str:
         """Return the head."""
         cells = [f"{column.title:>{column.width}}" for column in self.columns]
-        last = "bits that change" if self.bits else "data"
-        return " ".join([self.ids.title(), *cells, last])[: self.width]
+        return " ".join([self.ids.title(), *cells, self.payload[1]])[: self.width]
 
     def line(self, row: IdRow, now_us: int) -> str:
         """Return a row."""
         cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
-        payload = (heat_text if self.bits else data_text)(row, self.styled)
-        line = " ".join([self.ids.of(row), *cells, payload])
+        line = " ".join([self.ids.of(row), *cells, self.payload[0](row, self.styled)])
         return (line if self.styled else line[: self.width]).rstrip()
+
+
+def _payload_width(view: View) -> int:
+    if view.bits:
+        return HEAT_WIDTH
+    return DATA_WIDTH if view.meaning is None else MEANING_WIDTH
+
+
+def _payload(view: View) -> tuple[Callable[[IdRow, bool], str], str]:
+    meaning = view.meaning
+    if view.bits:
+        return heat_text, "bits that change"
+    if meaning is None:
+        return data_text, "data"
+    return lambda row, styled: meaning(row), "meaning"

@@ -38,6 +38,24 @@ def test_a_large_log_has_the_same_table(log: str, monkeypatch: pytest.MonkeyPatc
     assert top(log).stdout == small
 
 
+MAPPING = "(0.5) can0 581#4F001A0001000000\n(0.6) can0 581#43001A0110004160\n"
+
+
+def test_what_frames_mean_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    path.write_text(MAPPING + "(1.0) can0 181#3802\n(1.1) can0 7FF#00\n", "ascii")
+    lines = top(str(path), "-d").stdout.splitlines()
+    assert lines[2].endswith("meaning")
+    assert lines[3].endswith("1 tpdo1 statusword=0x0238[fault] (seen)")
+    assert lines[-1].endswith(" raw")
+
+
+def test_frames_that_are_not_wanted_are_not_counted(log: str) -> None:
+    result = top(log, "-F", "heartbeat")
+    assert result.stdout.startswith("can0: 1 frames")
+    assert result.stdout.splitlines()[-1].endswith(" 05")
+
+
 def test_the_load_is_a_share_of_the_bit_rate(log: str) -> None:
     assert "mean 1.7 %" in top(log, "-b", "10000").stdout
 

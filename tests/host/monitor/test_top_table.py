@@ -26,7 +26,7 @@ CAN-ID      frames     1/s   gap ms      min      avg      p99      max   jitter
 
 BITS = """\
 can0: 22 frames, load 0.2 %, error frames 1, controller passive, TEC 96 REC 128,
-lost 0, 3 identifiers by id  q quit, space hold, b bits, n notch, s sort, c clea
+lost 0, 3 identifiers by id  q quit, space hold, b bits, d decode, n notch, s so
 CAN-ID        1/s bits that change
 181         10.00 ···▁▁▂▄█ ········ ······▁▁
 701          0.00 ········
