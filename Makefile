@@ -1,6 +1,7 @@
 # Everything on a fresh machine: Python 3.11 or newer and make are enough.
 #   make test   lint, types, import contracts, wheel, tests, coverage
-#   make demo   an RRC on a pty, driven by the host client; CANopen: a potentiometer turns a motor
+#   make demo   an RRC on a pty, driven by the host client; CANopen: a potentiometer turns a motor;
+#               two PICs as RT components, one loses its power
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
 VENV   ?= .venv
 READY  := $(VENV)/.ready
@@ -14,6 +15,8 @@ demo: $(READY)
 	$(VENV)/bin/tickrig demo rrc
 	@echo
 	$(VENV)/bin/tickrig demo fig120
+	@echo
+	$(VENV)/bin/tickrig demo rtc-lite
 
 bench: $(READY)
 	$(VENV)/bin/python tools/bench
