@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable
 
@@ -26,13 +27,15 @@ class CanLink:
     Args:
         bus: an open bus; nobody else may read from it.
         name: what people call it.
+        drops: go on, without a wait, when the bus takes no frame; the frame is lost.
 
     Attributes:
+        lost: frames that the bus did not take.
         on_error_state: told the error state of the controller, where the driver says it.
     """
 
-    def __init__(self, bus: can.BusABC, name: str) -> None:
-        self._bus, self._name = bus, name
+    def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
+        self._bus, self._name, self._drops, self.lost = bus, name, drops, 0
         self.on_error_state: Callable[[ErrorState], None] | None = None
 
     @classmethod
@@ -60,11 +63,13 @@ class CanLink:
 
     def send(self, traffic: Frames, /) -> None:
         """Send frames; raises LinkClosed if the bus is gone or takes none for 1 s."""
-        try:
-            for frame in traffic:
-                self._bus.send(to_message(frame), SEND_TIMEOUT_S)
-        except (can.CanError, OSError, ValueError) as error:
-            raise LinkClosed(f"cannot send on {self._name}: {error}") from error
+        for frame in traffic:
+            try:
+                self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_S)
+            except (can.CanError, OSError, ValueError) as error:
+                if not (self._drops and _is_full(error)):
+                    raise LinkClosed(f"cannot send on {self._name}: {error}") from error
+                self.lost += 1
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Wait for a first frame, then return all that are there."""
@@ -100,6 +105,13 @@ def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
     if bit_rate is None:
         return can.Bus(channel=channel, interface=interface)
     return can.Bus(channel=channel, interface=interface, bitrate=bit_rate)
+
+
+def _is_full(error: Exception) -> bool:
+    """Say whether nobody took the frames before: no other node, no plug, bus-off."""
+    if isinstance(error, can.CanOperationError):
+        return error.error_code in (None, errno.ENOBUFS, errno.EAGAIN)
+    return isinstance(error, OSError) and error.errno in (errno.ENOBUFS, errno.EAGAIN)
 
 
 def _error_state(message: can.Message) -> ErrorState | None:

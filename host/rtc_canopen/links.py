@@ -33,11 +33,20 @@ class Links:
 
     def add(self, now_us: int, link: PdoLink) -> None:
         """Want a link, and make it; ServerRefused if it cannot be now."""
-        if link in self.links:
-            raise ServerRefused(f"{link.source} and {link.target} are linked")
+        for other in self.links:
+            if other.target == link.target:
+                raise ServerRefused(f"{other.source} and {other.target} are linked")
         self._check(link)
         self.links.append(link)
         self._make(now_us, link)
+
+    def remove(self, now_us: int, link: PdoLink) -> None:
+        """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
+        if link not in self.links:
+            raise ServerRefused(f"{link.source} and {link.target} are not linked")
+        own = self.layout(link.target).cob_id
+        self.links.remove(link)
+        self._write(now_us, link, own, linked=False)
 
     def make(self, now_us: int, node_id: int) -> None:
         """Make those of a node that has become ready."""
@@ -72,16 +81,20 @@ class Links:
 
     def _make(self, now_us: int, link: PdoLink) -> None:
         """Give the RPDO the COB-ID of the TPDO."""
-        cob_id, node_id = self.layout(link.source).cob_id, link.target.node
-        node, text = self._nodes[node_id], f"{link.source} to {link.target}"
+        self._write(now_us, link, self.layout(link.source).cob_id, linked=True)
+
+    def _write(self, now_us: int, link: PdoLink, cob_id: int, *, linked: bool) -> None:
+        node, text = self._nodes[link.target.node], f"{link.source} to {link.target}"
 
         def done(_: None) -> None:
             for sink in node.proxy.sinks if node.proxy else ():
-                sink.linked = sink.linked or sink.layout.index == link.target.index
-            self._note(EventKind.PDO_LINKED, node_id, f"{text} by {cob_id:03X}h")
+                if sink.layout.index == link.target.index:
+                    sink.linked = linked
+            kind = EventKind.PDO_LINKED if linked else EventKind.PDO_UNLINKED
+            self._note(kind, node.entry.id, f"{text}: {cob_id:03X}h")
 
         def failed(failure: Failure) -> None:
-            self._note(EventKind.LINK_REFUSED, node_id, f"{text}: {failure}")
+            self._note(EventKind.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
         node.run(now_us, Job("link", script, done, failed))

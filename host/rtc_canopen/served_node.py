@@ -123,6 +123,10 @@ class ServedNode:
         self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._plan()
 
+    def refuse(self, problem: str) -> None:
+        """Leave it as it is until it boots again."""
+        self.phase, self.problem = Phase.REFUSED, problem
+
     def hear_error_control(self, now_us: int, data: bytes) -> None:
         """Take a boot-up or heartbeat; anything else is passed over."""
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tickrig.host.link import NEVER
+from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
@@ -142,8 +143,12 @@ class Server:
 
     def booted(self, node: ServedNode, /) -> None:
         """Make the proxy of a node that has booted, its links and connections."""
-        if node.proxy is None:
+        try:
             self._make_proxy(node)
+        except RtcRefused as error:  # its name, or that of a port, is there twice
+            node.refuse(str(error))
+            self.note(EventKind.PROXY_REFUSED, node.entry.id, str(error))
+            return
         node.to_start = node.to_start or self.definition.start.autoactivate
         self.links.make(self.now_us, node.entry.id)
 
@@ -176,8 +181,10 @@ class Server:
             node.look(self.now_us)
 
     def _make_proxy(self, node: ServedNode) -> None:
-        proxy = node.operations.proxy = ProxyRtc(node.entry, node.layouts)
-        self.manager.add(proxy, context=self._context)
+        if node.proxy is not None:
+            return
+        proxy = ProxyRtc(node.entry, node.layouts)
+        node.operations.proxy = self.manager.add(proxy, context=self._context)
         for layout in node.layouts:
             if layout.unknown:
                 mapped = ", ".join(f"{m.index:04X}h:{m.sub:02X}" for m in layout.unknown)

@@ -43,7 +43,7 @@ class PdoView:
 
     Attributes:
         name: as `16.tpdo2`.
-        cob_id: its CAN-ID.
+        cob_id: its CAN-ID; an RPDO that is linked has that of its source meanwhile.
         bits: its length.
     """
 
@@ -162,6 +162,10 @@ class ServerView:
     def link(self, source: PdoName, target: PdoName) -> None:
         """Let an RPDO receive a TPDO without the PC; ServerRefused if they do not fit."""
         self._server.links.add(self._server.now_us, PdoLink(source, target))
+
+    def unlink(self, source: PdoName, target: PdoName) -> None:
+        """End such a link; ServerRefused if there is none."""
+        self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
     def read(self, node_id: int, index: int, sub: int) -> Transfer:
         """Read an object of a device; ServerRefused if there is no such node."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 
 import can
@@ -85,4 +86,31 @@ def test_an_error_frame_tells_the_error_state(
     other.send(to_message(frames("080#")[0]))
     link.receive(1_000_000)
     assert told == ([] if state is None else [state])
+    link.close()
+
+
+class FullBus(can.BusABC):
+    """A bus that takes nothing, as one without another node does in the end."""
+
+    def __init__(self, code: int | None) -> None:
+        super().__init__(channel="full")
+        self._code = code
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise can.CanOperationError("Transmit buffer full", self._code)
+
+
+@pytest.mark.parametrize("code", [None, errno.ENOBUFS])
+def test_a_link_that_drops_goes_on_when_the_bus_takes_nothing(code: int | None) -> None:
+    link = CanLink(FullBus(code), "full", drops=True)
+    link.send(frames("080# 080#"))
+    assert link.lost == 2
+    link.close()
+
+
+@pytest.mark.parametrize(("code", "drops"), [(errno.ENETDOWN, True), (None, False)])
+def test_a_bus_that_is_gone_ends_it(code: int | None, drops: bool) -> None:
+    link = CanLink(FullBus(code), "full", drops=drops)
+    with pytest.raises(LinkClosed, match="cannot send on full: Transmit buffer full"):
+        link.send(frames("080#"))
     link.close()

@@ -21,6 +21,7 @@ from tickrig.host.link import NEVER, Link
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
+    from tickrig.host.can_link import CanLink
     from tickrig.host.rtc_canopen.definition import BusEntry, SystemDefinition
     from tickrig.host.rtc_canopen.events import Event, Listener
     from tickrig.host.rtc_canopen.server import Server
@@ -132,8 +133,8 @@ def _open(options: BusOptions, server: Server, stack: ExitStack) -> Link[Frames]
     from tickrig.host.echo_free_link import EchoFreeLink  # noqa: PLC0415
 
     bus, interface, channel = open_raw(options)
-    link = CanLink(bus, f"{interface}:{channel}")
-    stack.callback(link.close)
+    link = CanLink(bus, f"{interface}:{channel}", drops=True)
+    stack.callback(_close, link)
     link.on_error_state = server.bus_state
     click.echo(f"{len(server.nodes)} nodes on {interface} {channel}. Ctrl-C ends.", err=True)
     return EchoFreeLink(link) if interface in ECHOING else link
@@ -154,6 +155,12 @@ def _listeners(log: Path | None, stack: ExitStack, *, quiet: bool) -> Iterator[L
 
 def _write(file: TextIO, event: Event) -> None:
     file.write(f"{event.to_json()}\n")
+
+
+def _close(link: CanLink) -> None:
+    if link.lost:
+        click.echo(f"{link.lost} frames were lost: the bus took none", err=True)
+    link.close()
 
 
 @contextmanager

@@ -8,11 +8,13 @@ import pytest
 
 from tests.emulators.can_bench import frames
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
+from tests.host.rtc_canopen.components import add_knob
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.device_file import read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.host.rtc_canopen.events import EventKind
 from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.wire.rtc_types.basic import TimedOctet
 
 PALETTE = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"
 ONE = {16: "f-palette"}
@@ -136,6 +138,33 @@ def test_nodes_are_activated_in_their_order_each_when_those_before_are_active() 
     assert [bench.state(16), bench.state(32)] == [LifeCycleState.ACTIVE] * 2
     times = [at for at, heard in bench.log.heard if str(heard) in ("720#05", "000#0110")]
     assert times[0] < times[1]
+
+
+@pytest.mark.parametrize(
+    ("ports", "reason"),
+    [
+        ("{tpdo1: x, tpdo2: x}", "Palette0 has a port 'x' already"),
+        ("{}", "a component 'Palette0' is there already"),
+    ],
+)
+def test_a_name_that_is_there_twice_refuses_the_proxy(ports: str, reason: str) -> None:
+    bench = Bench(PALETTE[:-3] + f", ports: {ports}}}]\n", ONE)
+    if ports == "{}":
+        add_knob(bench.server.manager, TimedOctet, "Palette0")
+    event = bench.run_until(EventKind.PROXY_REFUSED)
+    assert (event.node, event.text) == (16, reason)
+    bench.run_ms(500)
+    assert bench.server.nodes[16].problem == reason
+
+
+def test_however_often_it_is_told_the_time_the_same_happens() -> None:
+    lines = []
+    for step_ms in (0.1, 1, 100):
+        bench = Bench(PALETTE_AND_MOTOR + "start: {autoactivate: true}")
+        for _ in range(round(500 / step_ms)):
+            bench.run_ms(step_ms)
+        lines.append(bench.log.lines)
+    assert lines[0] == lines[1] == lines[2]
 
 
 def test_on_the_servers_stop_its_nodes_are_reset_and_stopped_if_it_says_so() -> None:

@@ -53,7 +53,7 @@ def angle(bench: Bench) -> float:
 def test_fig_120_by_link_passes_nothing_through_the_pc() -> None:
     bench = turned(BY_LINK)
     assert angle(bench) == pytest.approx(90.0027, abs=0.002)
-    assert "PdoLinked 32 16.tpdo2 to 32.rpdo2 by 290h" in bench.events()
+    assert "PdoLinked 32 16.tpdo2 to 32.rpdo2: 290h" in bench.events()
     assert "290#0040" in bench.log.text
     assert "320#" not in bench.log.text
 
