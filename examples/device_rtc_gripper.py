@@ -35,9 +35,7 @@ class Gripper(Component):
         return self.error_check()
 
     def error_check(self) -> Result:
-        """Look at the temperature."""
+        """Look at the temperature; Error is left when it is lower."""
         return ERROR if self.inputs["motor_dc"] > HOT_DC else None
 
-    def on_reset(self) -> Result:
-        """Stay in Error until it is cooler."""
-        return self.error_check()
+    on_reset = error_check

@@ -32,7 +32,7 @@ from tickrig.wire.candump import LogLine
 VIRTUAL_CHANNEL: Final = "can0"
 BIT_RATE: Final = 1_000_000
 SHOWN_NODES: Final = 8
-NO_NODE: Final = "no node: give --eds FILE --node-id N, --model NAME, --node N=FILE or --rig FILE"
+NO_NODE: Final = "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node or --rig FILE"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
