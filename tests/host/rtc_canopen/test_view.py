@@ -97,13 +97,13 @@ def test_pdos_of_the_same_length_are_linked_while_the_server_runs() -> None:
     bench, view = booted()
     with pytest.raises(ServerRefused, match=r"16.tpdo1 has 8 bits, 32.rpdo2 has 64"):
         view.link(PdoName(16, "tpdo1"), SAME_LENGTH[1])
+    with pytest.raises(ServerRefused, match="node 5 is not ready"):
+        view.link(PdoName(5, "tpdo1"), SAME_LENGTH[1])
     view.link(*SAME_LENGTH)
     bench.run_ms(20)
     assert bench.events(EventKind.PDO_LINKED) == ["PdoLinked 32 16.tpdo2 to 32.rpdo2: 290h"]
     with pytest.raises(ServerRefused, match=r"16.tpdo2 and 32.rpdo2 are linked"):
         view.link(*SAME_LENGTH)
-    with pytest.raises(ServerRefused, match="node 5 is not ready"):
-        view.link(PdoName(5, "tpdo1"), SAME_LENGTH[1])
 
 
 def test_a_link_can_be_ended_and_another_made() -> None:
