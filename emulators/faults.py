@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic
 
-from tickrig.device.core import W
 from tickrig.device.chance import Chance, check_rate, threshold_of
+from tickrig.device.core import W
 from tickrig.emulators.port import Port
 
 Fault = Callable[[int, W], W]

@@ -13,7 +13,7 @@ import click
 from tickrig.host.canmon.check_options import read_rules, rule_options
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import listen, patience_us, span_option
-from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -152,4 +152,4 @@ def _write(path: Path, text: str) -> None:
         refuse_path("--junit", error)
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

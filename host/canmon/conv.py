@@ -18,7 +18,7 @@ from tickrig.host.canmon.dump import pass_on
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.log_file import LogFile
 from tickrig.host.canmon.meaning import Meaning
-from tickrig.host.canmon.source import SOURCE_HELP, open_source
+from tickrig.host.canmon.source import explain_sources, open_source
 from tickrig.host.cli.options import PATH
 
 
@@ -58,4 +58,4 @@ def command(  # noqa: PLR0913 - options
     report(frames, strict)
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

@@ -21,7 +21,7 @@ from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.log_file import LogFile
 from tickrig.host.canmon.meaning import Meaning, Meant
 from tickrig.host.canmon.printer import Output, printer_of
-from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stdout import Printed, until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, add_options
@@ -133,4 +133,4 @@ def pass_on(
             break
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

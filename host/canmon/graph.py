@@ -16,7 +16,7 @@ from tickrig.host.canmon.graph_file import write_graph
 from tickrig.host.canmon.graph_request import GraphRequest
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.screen import Screen
-from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -147,4 +147,4 @@ def _show(series: Sequence[Series], request: GraphRequest) -> None:
         click.echo("\n".join(line.rstrip() for line in lines))
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

@@ -13,7 +13,7 @@ import click
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.screen import Screen
-from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
@@ -139,4 +139,4 @@ def _is_over(begin_s: float, span_us: int | None) -> bool:
     return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from inspect import cleandoc
 from pathlib import Path
 from typing import Protocol
+
+import click
 
 from tickrig.host.canmon.file_source import FileSource
 from tickrig.host.canmon.source_word import BusWord, FileWord, parse_source
@@ -20,6 +23,11 @@ SOURCE   can0                      a bus of SocketCAN, or of the interface that 
          run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
          -                         standard input: candump -L, or canmon dump --jsonl"""
 """For the help text of a verb that takes SOURCE words."""
+
+
+def explain_sources(command: click.Command) -> None:
+    """Put what a SOURCE may be in the place of `{source}` in a command's help."""
+    command.help = cleandoc(command.help or "").replace("{source}", SOURCE_HELP)
 
 
 class Source(Protocol):

@@ -9,7 +9,7 @@ import click
 
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import listen, patience_us, span_option
-from tickrig.host.canmon.source import SOURCE_HELP, open_source
+from tickrig.host.canmon.source import explain_sources, open_source
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.heard import Heard
@@ -81,4 +81,4 @@ def _jsonl(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
     return lines + [node_json(row) for row in node_rows(snapshot.rows)]
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

@@ -20,7 +20,7 @@ from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us, span_option
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.screen import Screen
-from tickrig.host.canmon.source import SOURCE_HELP, Source, open_source
+from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -108,4 +108,4 @@ def _paint(source: Source, model: TopModel, take: Take, span_us: int | None) -> 
                 screen.paint(model.lines(watch.now_us, source.lost, *screen.size()))
 
 
-command.help = (command.help or "").replace("{source}", SOURCE_HELP)
+explain_sources(command)

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
+from tickrig.device.chance import Chance, threshold_of
 from tickrig.device.core import NEVER
 from tickrig.emulators.byte_faults import BYTE_FAULTS
-from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.fault_spec import parse_fault_spec
 from tickrig.emulators.faults import FaultyPort
 from tickrig.emulators.rig import Rig, Station
