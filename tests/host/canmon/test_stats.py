@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,3 +58,27 @@ def test_a_large_log_has_the_same_statistics(log: str, monkeypatch: pytest.Monke
 
 def test_a_log_that_is_not_there_ends_with_3() -> None:
     assert stats("none.log").exit_code == 3
+
+
+LIGHT = """
+import sys
+from tickrig.host.canmon.cli import main
+try:
+    main([{verb!r}, {log!r}, *{options!r}])
+except SystemExit as ended:
+    heavy = {{"can", "numpy", "textual", "canopen", "cantools"}} & set(sys.modules)
+    sys.exit(f"{{ended.code}}, imported {{heavy}}" if ended.code or heavy else 0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("verb", "options"), [("stats", []), ("top", []), ("check", ["--nodes", "1-2", "--no-emcy"])]
+)
+def test_a_small_log_needs_no_heavy_library(verb: str, options: list[str], tmp_path: Path) -> None:
+    log = tmp_path / "run.log"
+    log.write_text("(1.0) can0 701#05\n(1.0) can0 702#05\n", "ascii")
+    program = LIGHT.format(verb=verb, log=str(log), options=options)
+    ran = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stderr) == (0, "all rules hold\n" if verb == "check" else "")
