@@ -39,8 +39,9 @@ class Candump:
             time.sleep(0.01)
 
     def _listens(self, bus: Bus) -> bool:
-        """The kernel lists who reads from a bus."""
-        return bus.channel in Path("/proc/net/can/rcvlist_all").read_text("ascii")
+        """The kernel lists who reads from a bus; where nobody does, it says `(vcan0: no entry)`."""
+        listed = Path("/proc/net/can/rcvlist_all").read_text("ascii")
+        return re.search(rf"^ +{bus.channel} ", listed, re.MULTILINE) is not None
 
     @property
     def frames(self) -> list[str]:
