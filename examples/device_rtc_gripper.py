@@ -1,7 +1,7 @@
 """A gripper as DeviceRTC: an RT component on the microcontroller of a CANopen slave.
 
-`canopen-slave-emu --rtc examples/device_rtc_gripper.py:Gripper --node-id 16 -c vcan0 -i socketcan`
-runs it. NMT Start activates it; while its motor is hot it ends in Error.
+Run it with `canopen-slave-emu --rtc examples/device_rtc_gripper.py:Gripper --node-id 16`.
+NMT Start activates it; while its motor is hot it ends in Error.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
 from tickrig.device.physical import Input
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT
 
-STEP_UM = 500
-HOT_DC = 900
+STEP_UM, HOT_DC = 500, 900
 
 
 class Gripper(Component):
