@@ -121,7 +121,8 @@ class BusDecoder:
         else:
             self._guarded.discard(node)
         if decoded.kind == "boot-up" and self.memory(node).boot():
-            self._refresh(self._pdos.known(node))
+            indices = self.memory(node).indices
+            self._refresh({*self._pdos.known(node), *pdos_of(node, indices)})
         return decoded
 
     def _sdo(

@@ -69,6 +69,11 @@ class NodeMemory:
         self._now, self._written = dict(self._power_on), set()
         return changed
 
+    @property
+    def indices(self) -> set[int]:
+        """The objects of which a value is known."""
+        return {index for values in (self._now, self.eds.values) for index, _ in values}
+
     def number(self, index: int, sub: int) -> int | None:
         """Return a value; None where nobody told it."""
         data = self._now.get((index, sub), self.eds.values.get((index, sub)))

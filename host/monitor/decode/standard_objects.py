@@ -89,7 +89,11 @@ def describe_standard(index: int, sub: int) -> ObjectText | None:
         return _text(*_VARIABLES[index]) if sub == 0 else None
     if index in _ARRAYS:
         name, kind = _ARRAYS[index]
-        return _text(f"{name}.{sub}", kind) if sub else _text(f"{name}.count", U8)
+        return (
+            ObjectText(f"{name}.{sub}", kind, in_hex=kind is U32)
+            if sub
+            else _text(f"{name}.count", U8)
+        )
     if index in _RECORDS:
         return _member(*_RECORDS[index], sub)
     for indices, name, members in _RANGES:

@@ -56,6 +56,20 @@ def test_units_and_factors_of_an_eds_are_used(tmp_path: Path) -> None:
     )
 
 
+def test_what_a_file_says_wrongly_of_an_object_is_not_used(tmp_path: Path) -> None:
+    path = tmp_path / "odd.eds"
+    path.write_text(
+        "[DeviceInfo]\nProductName=odd\n[OptionalObjects]\nSupportedObjects=2\n"
+        "1=0x2001\n2=0x2002\n"
+        "[2001]\nParameterName=Type\nObjectType=0x7\nDataType=0x7777\nAccessType=rw\n"
+        "[2002]\nParameterName=Value\nObjectType=0x7\nDataType=0x0005\nAccessType=rw\n"
+        "DefaultValue=300\n"
+    )
+    eds = read_eds(path, 5)
+    assert eds.values == {}
+    assert last("585#4F01200007000000", {5: eds}).text.startswith("upload 2001h:00 type = 07")
+
+
 @pytest.mark.parametrize(
     "text", ["no EDS at all", "[DeviceInfo]\n", "[DeviceInfo]\n[2001]\nObjectType=0x7\n"]
 )

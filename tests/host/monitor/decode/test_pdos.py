@@ -106,9 +106,36 @@ def test_a_mapping_that_was_not_stored_is_gone_after_a_boot_up() -> None:
     assert last(f"{WRITTEN} 705#00 185#3702D2040000").kind == "unmapped"
 
 
+def test_a_pdo_that_was_switched_off_is_back_after_a_boot_up() -> None:
+    off = "605#2300180185010080 585#6000180100000000"
+    kinds = [d.kind for d in decode(f"{off} 185#FEFF0000803F 705#00 185#FEFF0000803F", {5: EDS})]
+    assert kinds[2:] == ["unmapped", "boot-up", "tpdo1"]
+
+
 def test_a_mapping_that_was_stored_survives_a_boot_up() -> None:
     stored = "605#2310100173617665 585#6010100100000000"
     assert last(f"{WRITTEN} {stored} 705#00 185#3702D2040000").kind == "tpdo1"
+
+
+def test_a_pdo_that_is_asked_for_has_no_signals() -> None:
+    decoded = last(f"{WRITTEN} 185#R")
+    assert (decoded.text, decoded.signals) == ("asked for by RTR", ())
+
+
+def test_a_multiplexed_pdo_of_a_wrong_length_is_said_to_be() -> None:
+    assert last("585#4F001A00FF000000 185#00").text == "1 bytes, an MPDO has 8"
+
+
+def test_a_pdo_beyond_the_fourth_needs_its_cob_id() -> None:
+    mapping = "585#4F041A0001000000 585#43041A0110004160"
+    assert last(f"{mapping} 185#3702").kind == "unmapped"
+    assert last(f"{mapping} 585#4304180185010000 185#3702").kind == "tpdo5"
+
+
+def test_a_cob_id_without_a_mapping_names_the_pdo_alone() -> None:
+    decoded = last("585#4301180185010000 185#3702")
+    assert (decoded.kind, decoded.source) == ("tpdo2", "seen")
+    assert decoded.text == "unmapped: 1A01h was not heard"
 
 
 def test_a_short_pdo_is_not_processed() -> None:

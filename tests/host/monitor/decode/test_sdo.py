@@ -229,6 +229,31 @@ def test_a_further_sdo_server_is_followed_once_its_cob_ids_are_known() -> None:
     assert [t.entry for t in found] == [(0x1201, 1), (0x1201, 2), (0x1000, 0)]
 
 
+def test_receipts_of_segments_that_were_not_heard_are_no_data() -> None:
+    found = decode("605#2107200003000000 585#6007200000000000 585#2000000000000000")
+    assert found[-1].text.startswith("receipt of no segment that was heard")
+
+
+def test_a_short_frame_in_a_block_is_no_segment() -> None:
+    begun = "605#C607200003000000 585#A40720007F000000"
+    assert last(f"{begun} 605#81").text == "an SDO frame of 1 bytes, it has 8"
+
+
+@pytest.mark.parametrize(
+    ("answer", "text"),
+    [
+        ("4308100045504F53", "'EPOS'"),
+        ("4308100000000000", "''"),
+        ("4F17100007000000", "0x07"),  # one byte of a heartbeat time, which has two
+        ("4F00200007000000", "0x07"),
+        ("4303100130810000", "0x00008130"),
+    ],
+)
+def test_a_value_is_written_by_its_type(answer: str, text: str) -> None:
+    (found,) = transfers(f"585#{answer}")
+    assert found.text == text
+
+
 def test_frames_of_a_wrong_length_are_said_to_be() -> None:
     assert last("605#40").text == "an SDO frame of 1 bytes, it has 8"
     assert last("585#40").text == "an SDO frame of 1 bytes, it has 8"
