@@ -79,8 +79,8 @@ def command(
             else:
                 patience = frames.live and list(source) != ["-"]
                 view.listen(frames, span_us or (PATIENCE_US if patience else None))
-        lines = board_json(view.board, view.now_us) if jsonl else view.lines()
-        click.echo("\n".join(lines))
+        for line in board_json(view.board, view.now_us) if jsonl else view.lines():
+            click.echo(line)
     finally:
         frames.close()
     report(frames, strict)

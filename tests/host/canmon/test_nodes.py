@@ -34,6 +34,13 @@ def test_each_node_is_a_json_object() -> None:
     assert [emcy["code"] for emcy in found["emcy"]] == [0x8210]
 
 
+def test_without_nodes_there_is_no_json(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    path.write_text("(1.000000) can0 181#00\n")
+    assert nodes(str(path), "--jsonl").stdout == ""
+    assert nodes(str(path)).stdout == "no node was heard\n"
+
+
 def test_standard_input_is_read_to_its_end() -> None:
     said = "(1.000000) can0 705#05\n(1.100000) can0 705#05\n"
     words = [sys.executable, "-c", PROGRAM, "nodes", "-", "--jsonl"]
