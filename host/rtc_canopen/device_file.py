@@ -42,16 +42,7 @@ def read_device_file(path: Path) -> DeviceFile:
     Raises:
         DefinitionError: it cannot be read.
     """
-    if path.suffix.lower() not in (".eds", ".dcf"):
-        raise DefinitionError(f"{path}: the name does not end in .eds or .dcf")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # its own
-            dictionary = canopen.import_od(str(path))
-    except OSError as error:
-        raise DefinitionError(f"{path}: {error.strerror}") from error
-    except (configparser.Error, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DefinitionError(f"{path} is no EDS: {' '.join(str(error).split())}") from error
+    dictionary = _import(path)
     variables = {(var.index, var.subindex): var for var in _variables(dictionary)}
     return DeviceFile(
         {
@@ -62,6 +53,19 @@ def read_device_file(path: Path) -> DeviceFile:
         {key: var.data_type for key, var in variables.items() if var.data_type is not None},
         tuple(index for index in dictionary if index in RPDOS or index in TPDOS),
     )
+
+
+def _import(path: Path) -> canopen.ObjectDictionary:
+    if path.suffix.lower() not in (".eds", ".dcf"):
+        raise DefinitionError(f"{path}: the name does not end in .eds or .dcf")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # its own
+            return canopen.import_od(str(path))
+    except OSError as error:
+        raise DefinitionError(f"{path}: {error.strerror}") from error
+    except (configparser.Error, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DefinitionError(f"{path} is no EDS: {' '.join(str(error).split())}") from error
 
 
 def _variables(dictionary: canopen.ObjectDictionary) -> Iterator[ODVariable]:

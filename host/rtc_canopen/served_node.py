@@ -138,16 +138,7 @@ class ServedNode:
         changed = state is not operations.nmt_state
         operations.now_us, operations.nmt_state, self.heard_us = now_us, state, now_us
         self.dialogue.hear_state(now_us, state)
-        twin = self._twins.hear(now_us, state, listening=self.phase is Phase.LISTENING)
-        if state is NmtState.INITIALISING:
-            self._booted_up()
-        elif twin and self.phase in (Phase.READY, Phase.LISTENING):
-            self._refuse_twin()
-        elif self.phase is Phase.ABSENT:
-            self._found()
-        elif self.phase is Phase.READY:
-            self.lost = False
-            operations.follow(state, changed=changed)
+        self._take(state, changed=changed)
         self._plan()
 
     def hear_sdo(self, now_us: int, data: bytes) -> None:
@@ -197,6 +188,19 @@ class ServedNode:
         if due_us != self.due_us:
             self.due_us = due_us
             self._house.wake(due_us)
+
+    def _take(self, state: NmtState, *, changed: bool) -> None:
+        """See to a state that was reported just now."""
+        twin = self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
+        if state is NmtState.INITIALISING:
+            self._booted_up()
+        elif twin and self.phase in (Phase.READY, Phase.LISTENING):
+            self._refuse_twin()
+        elif self.phase is Phase.ABSENT:
+            self._found()
+        elif self.phase is Phase.READY:
+            self.lost = False
+            self.operations.follow(state, changed=changed)
 
     def _booted_up(self) -> None:
         self._house.note(EventKind.BOOT_UP, self.entry.id)

@@ -72,3 +72,18 @@ def test_in_error_a_start_of_another_master_changes_nothing(bench: Bench) -> Non
     bench.run_ms(300)
     assert (bench.state(48), rtc_state(bench)) == (ERROR, "Error")
     assert bench.events(EventKind.FOREIGN_TRANSITION) == []
+
+
+def test_a_drive_that_cannot_reset_its_fault_is_reset_all_the_same(tmp_path: Path) -> None:
+    description = MODELS["rtc-echo"].describe()
+    (tmp_path / "echo.eds").write_text(write_eds(description.template, description.info), "utf-8")
+    bench = Bench(ECHO.replace("ports", "role: drive, ports"), {48: "rtc-echo"}, tmp_path)
+    bench.boot()
+    bench.run_ms(120)
+    abort(bench)
+    bench.log.heard.clear()
+    bench.server.manager.reset("Echo0")  # a DeviceRTC stays Stopped whatever it is told
+    bench.run_ms(500)
+    commands = [str(heard) for _, heard in bench.log.heard if str(heard).startswith("000#")]
+    assert commands == ["000#8030", "000#8130"]
+    assert (bench.state(48), rtc_state(bench)) == (INACTIVE, "Inactive")

@@ -139,7 +139,9 @@ def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:
 
 def test_an_emergency_is_told_of_and_noise_is_not() -> None:
     bench = running()
-    foreign(bench, "090#3081110000000000 090#4081110000000000 090#00 710# 710#55 590#FF 7A0#05")
+    foreign(
+        bench, "090#3081110000000000 090#4081110000000000 090#00 710# 710#55 590#FF 7A1#05 7A0#01"
+    )
     assert bench.events(EventKind.EMERGENCY, EventKind.BUS_OFF) == [
         "Emergency 16 8130h life guard error or heartbeat error, error register 11h",
         "BusOff 16 8140h recovered from bus off, error register 11h",

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tickrig.host.rtc import InPort, connect
 from tickrig.host.rtc_canopen.pdo_layout import lay_out, proxy_index
 from tickrig.host.rtc_canopen.pdo_ports import PdoSink, PdoSource
 from tickrig.host.rtc_canopen.port_types import PORT_TYPES
@@ -94,6 +95,10 @@ def test_octets_are_a_sequence_of_bytes() -> None:
     layout = lay_out(0x1400, 0x210, mapped(8, 8), types(5, 5))
     sink = PdoSink(layout, "do")
     assert sink.encode("do", basic.TimedOctetSeq(Time(), b"\1\2")) == b"\1\2"
+    source, in_ = PdoSource(layout, "di"), InPort("in", basic.TimedOctetSeq)
+    connect(source.ports[0], in_)
+    source.receive(1_000, b"\1\2")
+    assert in_.read() == basic.TimedOctetSeq(Time(0, 1_000_000), b"\1\2")
 
 
 def test_objects_of_several_types_have_ports_of_their_own() -> None:

@@ -106,6 +106,16 @@ def test_pdos_of_the_same_length_are_linked_while_the_server_runs() -> None:
         view.link(*SAME_LENGTH)
 
 
+def test_a_link_to_a_stopped_device_is_refused_as_it_answers_no_sdo() -> None:
+    bench, view = booted()
+    manager = bench.server.manager
+    manager.context_of("Motor0").abort_component(manager.find("Motor0"))
+    bench.run_ms(200)
+    view.link(*SAME_LENGTH)
+    event = bench.run_until(EventKind.LINK_REFUSED)
+    assert event.text == "16.tpdo2 to 32.rpdo2: 1401h:01 was not answered"
+
+
 def test_a_link_can_be_ended_and_another_made() -> None:
     bench, view = booted()
     rpdo = bench.devices[32].slave.dictionary[0x1401, 1]
