@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import random
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import can
@@ -42,7 +43,7 @@ RULES = parse_rules(
         "no_error_frames": True,
         "no_reboot": True,
         "nodes": "1-50",
-        "heartbeat": [f"{node}=750ms±50%" for node in range(1, 51)],
+        "heartbeat": [f"{node}=1125ms±20%" for node in range(1, 51)],
         "max_gap": [f"{0x180 + node:03X}=100ms" for node in range(1, 51)],
     }
 )
@@ -64,11 +65,11 @@ def run(seconds: float) -> None:
 
 
 def write_log(path: Path, *, dirty: bool) -> None:
-    """Write PDOs of 50 nodes at about 10,000 frames/s, a heartbeat each 750 ms."""
+    """Write PDOs of 50 nodes at about 6,700 frames/s, a heartbeat each 1.1 s."""
     chance, at_us = random.Random(1), 1_700_000_000_000_000
     with path.open("w", encoding="ascii") as file:
         for n in range(FRAMES):
-            at_us += chance.randrange(50, 150)
+            at_us += chance.randrange(100, 200)
             node = n % IDS + 1
             text = f"{0x180 + node:03X}#{n:08X}{chance.randrange(1 << 32):08X}"
             if n % 150 == 0:
@@ -189,22 +190,27 @@ def painting() -> None:
 def first_paint() -> None:
     """Start in a terminal until the first screen is there."""
     top = [sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()", "top"]
-    row("canmon top: first paint", _painted([*top, "virtual:bench"], "lost 0"), "s")
     viewer = [sys.executable, "-m", "can.viewer", "-i", "virtual", "-c", "bench"]
-    row("can_viewer: first paint", _painted(viewer, "Count"), "s")
+    with tempfile.TemporaryDirectory() as folder:
+        env = {**os.environ, "PYTHONPYCACHEPREFIX": folder}
+        env.pop("PYTHONDONTWRITEBYTECODE", None)  # both compiled, as when installed
+        row("canmon top: first paint", _painted([*top, "virtual:bench"], "lost 0", env), "s")
+        row("can_viewer: first paint", _painted(viewer, "Count", env), "s")
 
 
-def _painted(command: list[str], text: str) -> list[float]:
+def _painted(command: list[str], text: str, env: Mapping[str, str]) -> list[float]:
     values = []
-    for _ in range(RUNS):
+    for _ in range(1 + RUNS):
         start = time.perf_counter()
-        child = pexpect.spawn(command[0], command[1:], dimensions=(40, 120), encoding="utf-8")
+        child = pexpect.spawn(
+            command[0], command[1:], dimensions=(40, 120), env=dict(env), encoding="utf-8"
+        )
         child.expect_exact(text, timeout=20)
         values.append(time.perf_counter() - start)
         child.sendintr()
         child.expect(pexpect.EOF, timeout=20)
         child.close()
-    return values
+    return values[1:]
 
 
 def _s(work: Callable[[], object]) -> list[float]:
