@@ -12,36 +12,34 @@ import click
 
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import report, until_interrupted
+from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us, span_option
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.eds_objects import EdsObjects
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.heard import Heard
 
-POLL_US: Final = 20_000
 PAINT_S: Final = 0.1
-PATIENCE_US: Final = 5_000_000
-"""How long a bus is heard where there is no terminal to leave it at."""
-MANY_LINES: Final = 1_000
-MANY_COLUMNS: Final = 1_000
+MANY: Final = 1_000
+"""Lines, and columns where nobody's terminal sets them."""
 
 
 @click.command(cls=BusCommand)
 @click.argument("source", nargs=-1)
 @eds_option
-@click.option("--for", "span", metavar="TIME", help="End after 10s, 500ms.")
+@span_option
 @click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end.")
 @click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
 @bus_options
 def command(
+    *,
     source: Sequence[str],
     eds: Sequence[str],
-    span: str | None,
+    span_us: int | None,
     jsonl: bool,
     strict: bool,
     **options: Any,
@@ -61,25 +59,15 @@ def command(
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    try:
-        span_us = None if span is None else parse_time_us(span)
-    except ValueError as error:
-        raise Refused(f"--for {error}") from None
-    objects = read_eds_files(eds)
-    decoder = Decoder(objects)
-    view = NodesView(
-        decoder, NodeBoard(decoder, {node: found.name for node, found in objects.items()})
-    )
+    view = NodesView(read_eds_files(eds))
     frames = open_source(source, BusOptions(**options))
-    on_screen = frames.live and sys.stdout.isatty() and not jsonl
     try:
         with until_interrupted():
-            if on_screen:
+            if frames.live and sys.stdout.isatty() and not jsonl:
                 view.paint(frames, span_us)
             else:
-                patience = frames.live and list(source) != ["-"]
-                view.listen(frames, span_us or (PATIENCE_US if patience else None))
-        for line in board_json(view.board, view.now_us) if jsonl else view.lines():
+                listen(frames, view.take, span_us or patience_us(frames, source))
+        for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
             click.echo(line)
     finally:
         frames.close()
@@ -87,56 +75,48 @@ def command(
 
 
 class NodesView:
-    """Feeds a board from a source.
+    """A node board, fed and shown.
 
     Args:
-        decoder: decodes what comes.
-        board: takes it.
+        eds: what files say, by node-ID; these nodes are on the board from the beginning.
     """
 
-    def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
-        self.board = board
-        self._decoder = decoder
+    def __init__(self, eds: dict[int, EdsObjects]) -> None:
+        self._decoder = Decoder(eds)
+        self._board = NodeBoard(self._decoder, {node: found.name for node, found in eds.items()})
         self._watch = Stopwatch()
-        self._live = False
 
-    @property
-    def now_us(self) -> int:
-        """The time at the source; of a file its last frame's."""
-        return self._watch.now_us if self._live else self.board.now_us
+    def take(self, heards: Sequence[Heard]) -> None:
+        """Take what was heard."""
+        for heard in heards:
+            self._board.take(heard, self._decoder.take(heard))
+        self._watch.take(heards)
 
-    def lines(self) -> list[str]:
-        """Return the board for paper, or for as many columns as the terminal has."""
-        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else MANY_COLUMNS
-        return render_board(self.board, self.now_us, columns, MANY_LINES)
+    def lines(self, *, live: bool) -> list[str]:
+        """Return the board for paper, or as wide as the terminal is."""
+        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else MANY
+        return render_board(self._board, self._now_us(live), columns, MANY)
 
-    def listen(self, source: Source, span_us: int | None) -> None:
-        """Take what comes, without a screen; a file is taken whole."""
-        self._live, begin_s = source.live, time.monotonic()
-        while not (source.ended or _is_over(begin_s, span_us)):
-            self._take(source.poll(POLL_US))
+    def json(self, *, live: bool) -> list[str]:
+        """Return the board as JSON, an object a node."""
+        return board_json(self._board, self._now_us(live))
 
     def paint(self, source: Source, span_us: int | None) -> None:
         """Take what comes, and show the board ten times a second."""
-        self._live, begin_s, due_s = True, time.monotonic(), 0.0
+        begin_s, due_s = time.monotonic(), 0.0
         with Screen() as screen:
-            while not (source.ended or _is_over(begin_s, span_us)):
-                self._take(source.poll(POLL_US))
+            while not (source.ended or is_over(begin_s, span_us)):
+                self.take(source.poll(POLL_US))
                 pressed = screen.keys()
                 if "q" in pressed:
                     break
                 if time.monotonic() >= due_s:
                     due_s = time.monotonic() + PAINT_S
-                    screen.paint(render_board(self.board, self.now_us, *screen.size()))
+                    screen.paint(render_board(self._board, self._watch.now_us, *screen.size()))
 
-    def _take(self, heards: list[Heard]) -> None:
-        for heard in heards:
-            self.board.take(heard, self._decoder.take(heard))
-        self._watch.take(heards)
-
-
-def _is_over(begin_s: float, span_us: int | None) -> bool:
-    return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6
+    def _now_us(self, live: bool) -> int:
+        """Return the time at a live source, of a file its last frame's."""
+        return self._watch.now_us if live else self._board.now_us
 
 
 explain_sources(command)
