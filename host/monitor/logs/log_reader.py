@@ -12,7 +12,8 @@ from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, log_format
 from tickrig.host.monitor.logs.log_lines import LogLines
 from tickrig.host.monitor.logs.tally import BadLines, Tally
 
-BLOCK_BYTES: Final = 1 << 15
+BLOCK_BYTES: Final = 1 << 13
+"""So few frames at once that the garbage collector seldom meets them."""
 
 
 class LogError(ValueError):
