@@ -19,7 +19,9 @@ from tickrig.host.rtc_canopen.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.server import Server
 
-EDS = Path(__file__).parents[3] / "examples" / "eds"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+EDS = EXAMPLES / "eds"
+SYSTEMS = EXAMPLES / "rtc_canopen"
 
 PALETTE_AND_MOTOR = """
 nodes:

@@ -4,30 +4,27 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.rtc_canopen.bench import Bench
+from tests.host.rtc_canopen.bench import SYSTEMS, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
-BEEGO = """
-nodes:
-- {id: 1, name: Left, eds: epos.eds, role: drive, ports: {rpdo1: set, tpdo1: get}}
-- {id: 2, name: Right, eds: epos.eds, role: drive, ports: {rpdo1: set, tpdo1: get}}
-sdo:
-- {node: 1, index: 0x6060, sub: 0, value: 3, size: 1}
-- {node: 2, index: 0x6060, sub: 0, value: 3, size: 1}
+BEEGO = (
+    (SYSTEMS / "beego.yaml").read_text("utf-8")
+    + """
 rt_connections:
 - {from: Knob0.out, to: Left.set_60FF_00}
 - {from: Knob0.out, to: Right.set_60FF_00}
 - {from: Left.get_6064_00, to: Logger0.in}
 """
+)
 WHEELS = {1: "epos", 2: "epos"}
 
 
 def running() -> Bench:
-    bench = Bench(BEEGO, WHEELS)
+    bench = Bench(BEEGO, WHEELS, SYSTEMS)
     bench.boot()
     bench.activate()
     assert (bench.state(1), bench.state(2)) == (ACTIVE, ACTIVE)
@@ -79,7 +76,7 @@ def test_a_velocity_is_sent_with_the_controlword_that_keeps_it_enabled() -> None
 
 
 def test_a_command_before_the_drive_is_enabled_is_not_sent() -> None:
-    bench = Bench(BEEGO, WHEELS)
+    bench = Bench(BEEGO, WHEELS, SYSTEMS)
     bench.boot()
     knob = add_knob(bench.server.manager, TimedLong)
     bench.server.manager.activate("Left")
@@ -91,7 +88,7 @@ def test_a_command_before_the_drive_is_enabled_is_not_sent() -> None:
 
 
 def test_a_drive_that_does_not_enable_is_in_error() -> None:
-    bench = Bench(BEEGO, WHEELS)
+    bench = Bench(BEEGO, WHEELS, SYSTEMS)
     bench.boot()
     bench.devices[1].physical["supply_v"].write(5.0)
     bench.run_ms(50)

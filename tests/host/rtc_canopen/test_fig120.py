@@ -4,39 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
+from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, SYSTEMS, Bench
 from tickrig.host.rtc import ReturnCode
 from tickrig.host.rtc_canopen.events import EventKind
 from tickrig.wire.rtc_types.basic import Time, TimedShort
 
-FIG_120 = """
-nodes:
-- id: 16
-  name: Palette0
-  eds: f-palette.eds
-  role: device
-  pdos:
-    tpdo2: {mapping: [0x64010110], cob_id: 0x290, type: 255, inhibit_100us: 100, event_ms: 50}
-  ports: {tpdo2: ai}
-- id: 32
-  name: Motor0
-  eds: motor-core-unit.eds
-  role: device
-  pdos: {rpdo2: {mapping: [0x64110110]}}
-  ports: {rpdo2: angle}
-sdo:
-- {node: 16, index: 0x6426, sub: 1, value: 8, size: 4}
-- {node: 16, index: 0x6423, sub: 0, value: 1, size: 1}
-- {node: 32, index: 0x2000, sub: 0, value: 3, size: 1}
-start: {order: [32, 16], autoactivate: true}
-"""
-BY_LINK = FIG_120 + "pdo_links: [{from: 16.tpdo2, to: 32.rpdo2}]\n"
-BY_PORTS = FIG_120 + "rt_connections: [{from: Palette0.ai, to: Motor0.angle}]\n"
+BY_LINK = (SYSTEMS / "fig120.yaml").read_text("utf-8")
+BY_PORTS = BY_LINK.replace("pdo_links: [{", "#").replace("# Through the PC instead: ", "")
+CAST = {16: "f-palette", 32: "motor-core-unit"}
 
 
 def turned(text: str) -> Bench:
     """Turn the potentiometer to the middle, and let the motor follow."""
-    bench = Bench(text)
+    bench = Bench(text, CAST, SYSTEMS)
     bench.run_ms(700)
     bench.log.heard.clear()
     bench.devices[16].physical["ai1_v"].write(2.5)
@@ -59,7 +39,7 @@ def test_fig_120_by_link_passes_nothing_through_the_pc() -> None:
 
 
 def test_fig_120_by_link_goes_on_without_the_server() -> None:
-    bench = Bench(BY_LINK)
+    bench = Bench(BY_LINK, CAST, SYSTEMS)
     bench.run_ms(700)
     bench.devices[16].physical["ai1_v"].write(2.5)
     bench.rig.run_for(600_000)
