@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import time
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -14,7 +15,7 @@ from tickrig.host.canmon.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.graph_file import write_graph
 from tickrig.host.canmon.graph_request import GraphRequest
-from tickrig.host.canmon.pace import Pace
+from tickrig.host.canmon.listening import is_over, listen, patience_us, span_option
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stopwatch import Stopwatch
@@ -48,7 +49,7 @@ SIZE: Final = (100, 28)
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
 @click.option("--size", metavar="WxH", default="960x400", help="Of a picture; 960x400 pixels.")
 @click.option("--window", metavar="TIME", default="10s", help="Shown of a bus; 10s.")
-@click.option("--for", "span", metavar="TIME", help="Leave a bus after this time.")
+@span_option
 @click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
 @bus_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
@@ -83,38 +84,36 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     collector = Collector(words, decoder, MOST if frames.live else 0)
     try:
         with until_interrupted():
-            _collect(frames, collector, request)
+            _collect(frames, source, collector, request)
         _show(collector.series, request)
     finally:
         frames.close()
     report(frames, strict)
 
 
-def _collect(frames: Source | WholeLog, collector: Collector, request: GraphRequest) -> None:
+def _collect(
+    frames: Source | WholeLog, source: str, collector: Collector, request: GraphRequest
+) -> None:
     """Take what comes; live, paint it where there is a terminal."""
     if isinstance(frames, WholeLog):
         collector.take_columns(frames.columns)
-    if frames.live and sys.stdout.isatty():
+    elif frames.live and sys.stdout.isatty():
         with Screen() as screen:
             _watch(frames, collector, request, screen)
-        return
-    pace = Pace()
-    while not (frames.ended or _is_over(pace, request)):
-        for heard in frames.poll(POLL_US):
-            collector.take(heard)
+    else:
+        listen(frames, collector.take_all, request.span_us or patience_us(frames, [source]))
 
 
 def _watch(frames: Source, collector: Collector, request: GraphRequest, screen: Screen) -> None:
-    pace, watch, due_us = Pace(), Stopwatch(), 0
+    watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     pressed: list[str] = []
-    while not (frames.ended or "q" in pressed or _is_over(pace, request)):
+    while not (frames.ended or "q" in pressed or is_over(begin_s, request.span_us)):
         pressed = screen.keys()
         heards = frames.poll(POLL_US)
         watch.take(heards)
-        for heard in heards:
-            collector.take(heard)
-        if pace.now_us >= due_us:
-            due_us = pace.now_us + PAINT_US
+        collector.take_all(heards)
+        if time.monotonic() >= due_s:
+            due_s = time.monotonic() + PAINT_US / 1e6
             screen.paint(_live(collector.series, request, watch.now_us, screen.size()))
 
 
@@ -124,10 +123,6 @@ def _live(
     view = View(now_us - request.window_us, now_us, request.ranges, None, now_us)
     width, height = size
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
-
-
-def _is_over(pace: Pace, request: GraphRequest) -> bool:
-    return request.span_us is not None and pace.now_us >= request.span_us
 
 
 def _show(series: Sequence[Series], request: GraphRequest) -> None:

@@ -30,7 +30,7 @@ class GraphRequest:
         ranges: of axes.
         size: of a picture in pixels.
         window_us: what is shown of a bus.
-        span_us: how long a bus is heard, None for ever.
+        span_us: how long a bus is heard, None where it was not said.
     """
 
     files: tuple[Path, ...]
@@ -56,7 +56,7 @@ class GraphRequest:
             ranges=dict(map(_range, options.pop("ranges"))),
             size=_size(options.pop("size")),
             window_us=_time_us("--window", options.pop("window")) or 1,
-            span_us=_time_us("--for", options.pop("span")),
+            span_us=options.pop("span_us"),
         )
 
     def view(self, series: Sequence[Series]) -> View:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -19,7 +19,7 @@ from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.log_reader import LogError, LogReader, read_log
 from tickrig.host.monitor.replay.lateness import Lateness
-from tickrig.host.monitor.replay.replay_plan import FOREVER, ReplayPlan
+from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, ReplayPlan
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
@@ -130,21 +130,26 @@ def _play(plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: 
         if wait_rx is not None:
             _wait_for(wait_rx, list(buses.values()))
             pace = Pace()
-        try:
-            for at_us, channel, frame in plan:
-                if step:
-                    _ask(f"{buses[channel].name} {frame}")
-                    at_us = pace.now_us  # noqa: PLW2901 - now is when it is due
-                late.add(pace.wait_until(at_us))
-                buses[channel].send(frame)
-        except OSError as error:
-            raise SourceFailed(f"{error.filename}: {error.strerror}") from error
-        except LogError as error:
-            raise SourceFailed(str(error)) from error
+        for at_us, channel, frame in _due(plan):
+            if step:
+                _ask(f"{buses[channel].name} {frame}")
+                at_us = pace.now_us  # noqa: PLW2901 - now is when it is due
+            late.add(pace.wait_until(at_us))
+            buses[channel].send(frame)
     told = [f"{late.count} frames in {pace.now_us / 1e6:.3f} s"]
     told += [str(late)] if plan.speed and not step else []
     told += [f"{plan.left_out} left out"] if plan.left_out else []
     click.echo("; ".join(told), err=True)
+
+
+def _due(plan: ReplayPlan) -> Iterator[Due]:
+    """Yield what is planned; SourceFailed if the log cannot be read."""
+    try:
+        yield from plan
+    except OSError as error:
+        raise SourceFailed(f"{error.filename}: {error.strerror}") from error
+    except LogError as error:
+        raise SourceFailed(str(error)) from error
 
 
 def _wait_for(can_id: int, buses: Sequence[Transmitter]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.decode.decoded import Decoded
@@ -59,6 +59,11 @@ class Collector:
             if decoded.signals:
                 for wanted in self._objects:
                     wanted.take(at_us, decoded)
+
+    def take_all(self, heards: Iterable[Heard]) -> None:
+        """Take the values in frames."""
+        for heard in heards:
+            self.take(heard)
 
     def take_columns(self, columns: Columns) -> None:
         """Take the values of slices in a whole log at once."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from itertools import accumulate
 from typing import Final
 
 MOST_US: Final = 100_000
@@ -30,13 +31,10 @@ class Lateness:
         self._counts[min(late_us, MOST_US)] += 1
 
     def percentile_us(self, percent: float) -> int:
-        """Return what so many percent are not later than; 0 if none were counted."""
-        wanted, seen = self.count * percent / 100, 0
-        for late_us, number in enumerate(self._counts):
-            seen += number
-            if seen >= wanted:
-                return min(late_us, self.max_us)
-        return self.max_us
+        """Return what so many percent, 0 to 100, are not later than; 0 if none were counted."""
+        wanted = self.count * percent / 100
+        sums = enumerate(accumulate(self._counts))
+        return min(next(late_us for late_us, seen in sums if seen >= wanted), self.max_us)
 
     def __str__(self) -> str:
         """Say it to people."""

@@ -131,7 +131,7 @@ def test_a_file_that_cannot_be_written_ends_with_status_3(log: str) -> None:
 @pytest.mark.realtime
 def test_a_bus_is_drawn_when_its_time_is_over(wire: Wire) -> None:
     with wire.calling("185#370205000000"):
-        result = canmon(wire.word, "185[2:6]s", "--for", "200ms")
+        result = canmon(wire.word, "185[2:6]s", "--for", "500ms")
     assert result.stdout.startswith("━ 185[2:6]s 5\n")
 
 

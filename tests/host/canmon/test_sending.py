@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import re
 import signal
 import subprocess
@@ -163,6 +164,21 @@ def test_a_replay_that_cannot_be_is_refused(
     assert said in result.stderr
 
 
+def test_what_is_no_frame_in_a_log_is_told(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    path.write_text("(1.000000) can0 080#\n???\n")
+    result = canmon("play", str(path), wire.word)
+    assert (result.exit_code, wire.all()) == (0, ["080#"])
+    assert f"{path}: line 2 is no frame: '???'" in result.stderr
+
+
+def test_a_log_that_ends_in_the_middle_ends_with_status_3(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "run.log.gz"
+    path.write_bytes(gzip.compress(LOG.encode())[:-20])
+    result = canmon("play", str(path), wire.word)
+    assert (result.exit_code, result.stderr.startswith(f"Error: {path}: ")) == (3, True)
+
+
 def test_a_log_that_is_not_there_ends_with_status_3(wire: Wire) -> None:
     result = canmon("play", "/nowhere/run.log", wire.word)
     assert (result.exit_code, result.stderr) == (
@@ -305,4 +321,7 @@ def test_sending_ends_quietly_when_nobody_reads_what_is_printed() -> None:
         assert process.stderr is not None
         process.stdout.readline()
         process.stdout.close()
-        assert (process.wait(10), process.stderr.read()) == (0, b"")
+        assert process.wait(10) == 0
+        assert re.fullmatch(
+            rb"(\d+ periods passed whole and were left out\n)?", process.stderr.read()
+        )

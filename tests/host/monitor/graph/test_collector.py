@@ -39,8 +39,7 @@ def heard(*texts: str) -> list[Heard]:
 
 def test_a_slice_is_taken_of_each_data_frame_that_holds_it() -> None:
     collector = collected("181[2:6]s", "00000181[0]", "mode=181[0]@2")
-    for frame in heard("181#3702FEFFFFFF", "00000181#07", "181#R", "181#3702"):
-        collector.take(frame)
+    collector.take_all(heard("181#3702FEFFFFFF", "00000181#07", "181#R", "181#3702"))
     collector.take(Heard(9, "can0", NO_ACK))
     assert [list(one.values) for one in collector.series] == [[-2], [7], [0x37, 0x37]]
     assert [(one.label, one.axis) for one in collector.series] == [
@@ -53,8 +52,7 @@ def test_a_slice_is_taken_of_each_data_frame_that_holds_it() -> None:
 def test_an_object_is_taken_by_its_name_or_how_that_begins() -> None:
     collector = collected("5.position", "5.statusword.fault", "s=5.status", eds={5: EPOS})
     frames = heard("185#3F020A000000", "185#37020B000000", "185#3702", "186#37020C000000")
-    for frame in frames:
-        collector.take(frame)
+    collector.take_all(frames)
     position, fault, status = collector.series
     assert [list(one.values) for one in (fault, status)] == [[1, 0], [0x23F, 0x237]]
     assert (position.label, list(position.values)) == ("5.position_actual_value", [10, 11])
@@ -65,16 +63,14 @@ def test_a_name_that_began_with_one_object_keeps_to_it() -> None:
     collector = collected("5.target", eds={5: EPOS})
     velocity = ("605#40FF600000000000", "585#43FF6000E8030000")
     position = ("605#407A600000000000", "585#437A600001000000")
-    for frame in heard(*velocity, *position, *velocity):
-        collector.take(frame)
+    collector.take_all(heard(*velocity, *position, *velocity))
     (target,) = collector.series
     assert (target.label, list(target.values)) == ("5.target_velocity", [1_000, 1_000])
 
 
 def test_a_name_alone_means_the_first_node_that_has_it() -> None:
     collector = collected("position", "statusword.fault", eds={5: EPOS, 6: EPOS})
-    for frame in heard("185#37020A000000", "186#37020B000000"):
-        collector.take(frame)
+    collector.take_all(heard("185#37020A000000", "186#37020B000000"))
     assert [(one.label, list(one.values)) for one in collector.series] == [
         ("5.position_actual_value", [10]),
         ("5.statusword.fault", [0]),
@@ -83,8 +79,7 @@ def test_a_name_alone_means_the_first_node_that_has_it() -> None:
 
 def test_a_signal_of_a_dbc_file_has_a_curve_with_its_unit() -> None:
     collector = Collector([parse_signal("speed")], Decoder(dbc=[DBC]))
-    for frame in heard("123#E8030100", "123#E803"):
-        collector.take(frame)
+    collector.take_all(heard("123#E8030100", "123#E803"))
     (speed,) = collector.series
     assert (speed.label, speed.unit, list(speed.values)) == ("Speed", "rpm", [500, 500])
 
@@ -94,8 +89,7 @@ def test_a_log_as_columns_gives_the_same(tmp_path: Path) -> None:
     path.write_text(LOG)
     words = ("181[2:6]s*0.5", "00000181[0]", "281[0:4]f", "281[3]")
     one_by_one, at_once = collected(*words), collected(*words)
-    for frame in read_log(path):
-        one_by_one.take(frame)
+    one_by_one.take_all(read_log(path))
     at_once.take_columns(read_columns(path))
     assert one_by_one.series == at_once.series
     assert [list(one.values) for one in at_once.series[:3]] == [[-1, 1], [1], [1.5]]
@@ -103,10 +97,11 @@ def test_a_log_as_columns_gives_the_same(tmp_path: Path) -> None:
 
 
 def test_what_is_no_number_has_no_curve() -> None:
-    collector = collected("5.manufacturer_device_name", eds={5: EPOS})
-    for frame in heard("605#4008100000000000", "585#43081000414243FF"):
-        collector.take(frame)
-    assert len(collector.series[0]) == 0
+    collector = collected("5.manufacturer", "6.manufacturer", eds={5: EPOS, 6: EPOS})
+    collector.take_all(heard("605#4008100000000000", "585#4308100041424344"))
+    five, six = collector.series
+    assert (five.label, len(five)) == ("5.manufacturer_device_name", 0)
+    assert (six.label, len(six)) == ("6.manufacturer", 0)
 
 
 @pytest.mark.parametrize(
