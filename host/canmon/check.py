@@ -14,6 +14,7 @@ from tickrig.host.canmon.check_options import read_rules, rule_options
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import listen, patience_us, span_option
 from tickrig.host.canmon.source import Source, explain_sources, open_source
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -99,7 +100,8 @@ class Verdict:
         """Show findings."""
         if findings:
             self.findings += findings
-            click.echo("\n".join(map(self._text, findings)))
+            with until_unread():
+                click.echo("\n".join(map(self._text, findings)))
 
     def summary(self) -> str:
         """Say how it ended."""

@@ -21,6 +21,7 @@ from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us,
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import Source, explain_sources, open_source
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -83,7 +84,8 @@ def command(  # noqa: PLR0913 - options
                 _paint(frames, model, take, span_us)
             else:
                 listen(frames, take, span_us or patience_us(frames, source))
-        click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
+        with until_unread():
+            click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
     report(frames, strict)
