@@ -229,8 +229,11 @@ class Server:
             proxy.ready = False
 
     def _send_heartbeat(self) -> None:
+        """Send a heartbeat that is due; after a pause one, not all that were missed."""
         if self.now_us >= self._heartbeat_us:
-            self._heartbeat_us += 1_000 * self.definition.master.heartbeat_ms
+            period_us = 1_000 * self.definition.master.heartbeat_ms
+            late_us = self.now_us - self._heartbeat_us
+            self._heartbeat_us = self.now_us - late_us % period_us + period_us
             self._error_control(NmtState.OPERATIONAL)
 
     def _error_control(self, state: NmtState) -> None:
