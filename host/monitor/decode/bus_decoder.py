@@ -18,6 +18,7 @@ from tickrig.host.monitor.decode.network_services import (
     decode_sync,
     decode_time,
 )
+from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
 from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step
 from tickrig.host.monitor.decode.transfer import Direction, Outcome, Transfer, write_entry
@@ -137,14 +138,12 @@ class BusDecoder:
             self._learn(transfer)
         ended = tuple(self._named(transfer) for transfer in step.ended)
         last = ended[-1]
-        text = "; ".join(str(transfer) for transfer in ended)
-        return Decoded("sdo", node, text, _signals(last), last.source, step.entry, ended)
+        return Decoded("sdo", node, None, _signals(last), last.source, step.entry, ended)
 
     def _named(self, transfer: Transfer) -> Transfer:
         """Return it with name and value of its object."""
-        if transfer.entry is None:
-            return transfer
-        text = self.memory(transfer.node).describe(*transfer.entry)
+        entry = transfer.entry
+        text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
         value, written = (None, "") if transfer.data is None else text.read(transfer.data)
         return replace(
             transfer, name=text.name, value=value, text=written, unit=text.unit, source=text.source
@@ -203,7 +202,8 @@ class BusDecoder:
 
 
 def _signals(transfer: Transfer) -> tuple[Signal, ...]:
-    if transfer.outcome is not Outcome.DONE or transfer.value is None or transfer.flaws:
+    told = transfer.outcome is Outcome.DONE and not transfer.flaws and transfer.entry is not None
+    if not told or transfer.value is None:
         return ()
     name = transfer.name or write_entry(transfer.entry)
     return (Signal(name, transfer.value, transfer.unit, transfer.text),)

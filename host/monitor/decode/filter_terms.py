@@ -76,9 +76,12 @@ def kind_test(word: str) -> Test | None:
 
 def object_test(index: int, sub: int | None) -> Test:
     """Return the test for SDO frames about an object."""
-    if sub is not None:
-        return lambda heard, decoded: decoded.entry == (index, sub)
-    return lambda heard, decoded: decoded.entry is not None and decoded.entry[0] == index
+
+    def test(heard: Listened, decoded: Decoded) -> bool:
+        entries = (decoded.entry, *(transfer.entry for transfer in decoded.transfers))
+        return any(entry and entry[0] == index and sub in (None, entry[1]) for entry in entries)
+
+    return test
 
 
 def range_test(low: int, high: int, *, extended: bool) -> Test:

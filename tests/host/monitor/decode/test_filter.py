@@ -108,6 +108,14 @@ def test_a_wrong_filter_is_refused_with_its_column(text: str, column: int, reaso
     assert refused.value.column == column
 
 
+def test_a_request_that_ends_another_transfer_passes_for_both_objects() -> None:
+    decoder = Decoder()
+    heard = trace("605#4000100000000000 605#4001100000000000")
+    decoded = [decoder.take(item) for item in heard]
+    assert parse_filter("sdo[1000h] and sdo.unanswered").matches(heard[1], decoded[1])
+    assert parse_filter("sdo[1001h:00]").matches(heard[1], decoded[1])
+
+
 def test_a_filter_says_which_signals_it_asks_for() -> None:
     assert parse_filter("emcy or speed > 3 or 5.statusword.fault").signals == {
         "speed",

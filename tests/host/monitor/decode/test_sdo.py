@@ -158,7 +158,7 @@ def test_a_late_answer_leaves_the_next_transfer_alone() -> None:
 def test_segments_of_an_upload_without_beginning_are_a_value_of_an_unknown_object() -> None:
     (found,) = transfers("605#7000000000000000 585#1173697800000000")
     assert (found.entry, found.partial, found.data) == (None, True, b"six\0\0\0\0")
-    assert str(found).startswith("upload an unknown object")
+    assert str(found).startswith("upload an unknown object = 0x00000000786973 (segmented, 7 B")
 
 
 def test_segments_of_a_download_without_beginning_are_a_value_of_an_unknown_object() -> None:
