@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isfinite
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.rtc.data_port import InPort
@@ -12,6 +11,9 @@ from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.idl import Struct
 
 T = TypeVar("T", bound=Struct)
+
+MOST: Final = 1e9
+"""Numbers beyond it are no metres, radians or speeds of a cart."""
 
 
 def arrived(port: InPort[T]) -> Iterator[T]:
@@ -28,13 +30,15 @@ def newest(port: InPort[T]) -> T | None:
     return latest
 
 
+def sound(*numbers: float) -> bool:
+    """Return whether these are numbers of a cart: not NaN, infinite or beyond `MOST`."""
+    return all(-MOST <= number <= MOST for number in numbers)
+
+
 def to_pose(data: Pose2D) -> Pose | None:
-    """Return a pose, its heading in -pi..pi; None if a number is none (NaN, infinite)."""
-    numbers = (data.position.x, data.position.y, data.heading)
-    if not all(isfinite(number) for number in numbers):
-        return None
-    x, y, heading = numbers
-    return Pose(x, y, wrap(heading))
+    """Return a pose, its heading in -pi..pi; None if a number is not `sound`."""
+    x, y, heading = data.position.x, data.position.y, data.heading
+    return Pose(x, y, wrap(heading)) if sound(x, y, heading) else None
 
 
 def to_pose_2d(pose: Pose) -> Pose2D:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from pathlib import Path
 from typing import ClassVar
 
 from tickrig.host.motion.conf_file import read_conf
 from tickrig.host.motion.dead_reckoning import moved
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.host.motion.ports import arrived, to_pose_2d
+from tickrig.host.motion.ports import arrived, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import TimedDoubleSeq
@@ -81,7 +80,7 @@ class Odometry(RtComponent):
         if max(left_id, right_id) >= len(sample.data):
             return
         angles = sample.data[left_id], sample.data[right_id]
-        if not (isfinite(angles[0]) and isfinite(angles[1])):
+        if not sound(*angles):
             return
         before, self._before = self._before or angles, angles
         left = (angles[0] - before[0]) * self.left_radius.value

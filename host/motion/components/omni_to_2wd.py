@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import ClassVar, Final
 
@@ -20,18 +21,18 @@ from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
 NO_WAY: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""
 
-PATH_POINTS: Final = (START_POINT, INTERMEDIATE_POINT, END_POINT)
+_LOG: Final = logging.getLogger(__name__)
 
 
 class OmniTo2WD(RtComponent):
     """Plans for a cart that cannot go sideways; it never goes backward.
 
-    A step from one point to the next that is no way is left out. A goal or point with a
+    A step from one point to the next that is no way is left out. A goal or a path with a
     number that is none is passed over with a line in the log. FINISH is told when it is
     reached, not while it lasts: what an earlier command left behind answers no later one.
 
     Attributes:
-        refused: how many goals and points were passed over.
+        refused: how many goals and paths were passed over.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("OmniTo2WD", "Plans turns and lines to a goal")
@@ -48,7 +49,7 @@ class OmniTo2WD(RtComponent):
 
     def _forget(self) -> None:
         self._pose: Pose | None = None
-        self._points: list[Pose] = []
+        self._points: list[Pose | None] = []
         self._waiting: list[Pose] = []
         self._began = self._ran = False
 
@@ -71,19 +72,19 @@ class OmniTo2WD(RtComponent):
 
     def _take(self, message: iis.TimedPose2D) -> None:
         """Take a goal, or a point of a path; what came before gives way."""
-        point = to_pose(message.data)
-        if point is None:
-            self.refused += 1
-            return
         kind = message.id[0] if message.id else None
-        if kind not in PATH_POINTS:
-            self._waiting = [point]
-            return
-        if kind == START_POINT:
+        if kind not in (INTERMEDIATE_POINT, END_POINT):
             self._points = []
-        self._points.append(point)
-        if kind == END_POINT:
-            self._waiting, self._points = self._points, []
+        self._points.append(to_pose(message.data))
+        if kind in (START_POINT, INTERMEDIATE_POINT):
+            return
+        sound = [point for point in self._points if point is not None]
+        if len(sound) == len(self._points):
+            self._waiting = sound
+        else:
+            self.refused += 1
+            _LOG.warning("%s: passed over what is no number: %s", self.instance_name, message)
+        self._points = []
 
     def _plan(self, ec: ExecutionContext, pose: Pose) -> None:
         way = plan(pose, self._waiting)

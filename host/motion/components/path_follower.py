@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isfinite
 from typing import ClassVar
 
 from tickrig.host.motion.dead_reckoning import twist_of
 from tickrig.host.motion.geometry import Pose, Twist, clip
 from tickrig.host.motion.limiter import Limits, steps
-from tickrig.host.motion.ports import newest, to_pose
+from tickrig.host.motion.ports import newest, sound, to_pose
 from tickrig.host.motion.regulator import Law, Regulator
 from tickrig.host.motion.turning import ReferenceSpin, TimeOptimalSpin
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
@@ -33,7 +32,8 @@ class PathFollower(RtComponent):
 
     The parameters behind `max_w` are ours: `acc_cycle` is the time for which `max_acc_*`
     are given, `law` the way the regulator steps, `spin` the way it turns, `latency` the
-    time from a pose to the effect of the command.
+    time from a pose to the effect of the command. Without a pose for `pose_timeout` the
+    cart is to stand: nobody knows where it is.
 
     Attributes:
         twist: the command of the latest period.
@@ -59,6 +59,7 @@ class PathFollower(RtComponent):
         self.law = bind("law", "implicit", "(implicit, explicit)")
         self.spin = bind("spin", "reference", "(reference, time-optimal)")
         self.latency = bind("latency", 0.0, "x>=0", unit="s")
+        self.pose_timeout = bind("pose_timeout", 0.5, "x>0", unit="s")
         self.tread = bind("tread", 0.464, "x>0", unit="m")
         self.radius = bind("radius", 0.0995, "x>0", unit="m")
         self.configuration.add_set("tuned", TUNED)
@@ -66,12 +67,21 @@ class PathFollower(RtComponent):
         self.position = self.add_port(InPort("position", iis.TimedPose2D))
         self.target_path = self.add_port(InPort("target_path", Path))
         self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
+        self._modes: Mapping[int, Mode] = {
+            RunMode.LINEFOLLOW: self._line,
+            RunMode.TO_POINT: self._to_point,
+            RunMode.CIRCLEFOLLOW: self._circle,
+            RunMode.SPIN: self._turn,
+            RunMode.VEL: self._velocity,
+            RunMode.WHEEL_VEL: self._wheels,
+        }
         self._configure()
         self._forget()
 
     def _forget(self) -> None:
         self.path, self.twist = Path(RunMode.STOP), Twist()
         self._pose: Pose | None = None
+        self._seen_us = 0
 
     def _configure(self) -> None:
         h, alpha = self.control_cycle.value, self.max_acc_w.value / self.control_cycle.value
@@ -97,11 +107,8 @@ class PathFollower(RtComponent):
         """Take one message, make a step of its mode, command the velocity."""
         if self.target_path.is_new and (path := self.target_path.read()) is not None:
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
-            sound = all(isfinite(number) for number in numbers)
-            self.path = path if sound else Path(RunMode.STOP)
-        if (latest := newest(self.position)) is not None:
-            self._pose = to_pose(latest.data) or self._pose
-        wanted = Twist() if self._pose is None else self._wanted(self.path, self._pose)
+            self.path = path if sound(*numbers) else Path(RunMode.STOP)
+        wanted = self._wanted(self._present(ec))
         self.twist = self._limits(ec).smooth(wanted, self.twist)
         data = Velocity2D(self.twist.v, 0.0, self.twist.w)
         self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
@@ -113,24 +120,23 @@ class PathFollower(RtComponent):
         )
         return Limits(self.max_v.value, self.max_w.value, dv, dw)
 
-    def _wanted(self, path: Path, pose: Pose) -> Twist:
-        mode = self._modes.get(path.type)
-        return Twist() if mode is None else mode(path, Pose(path.x, path.y, path.theta), pose)
+    def _present(self, ec: ExecutionContext) -> Pose | None:
+        """Return the latest pose, None if there was none for long."""
+        if (latest := newest(self.position)) is not None and (pose := to_pose(latest.data)):
+            self._pose, self._seen_us = pose, ec.now_us
+        elif ec.now_us - self._seen_us > self.pose_timeout.value * 1e6:
+            self._pose = None
+        return self._pose
 
-    @property
-    def _modes(self) -> Mapping[int, Mode]:
-        """What each mode makes of a message, its target and the pose; the others mean stop."""
-        follow = self._regulator
-        return {
-            RunMode.LINEFOLLOW: lambda path, target, pose: follow.follow_line(
-                target, pose, path.v, self.twist
-            ),
-            RunMode.TO_POINT: self._to_point,
-            RunMode.CIRCLEFOLLOW: self._circle,
-            RunMode.SPIN: self._turn,
-            RunMode.VEL: lambda path, target, pose: Twist(path.v, path.w),
-            RunMode.WHEEL_VEL: self._wheels,
-        }
+    def _wanted(self, pose: Pose | None) -> Twist:
+        path = self.path
+        mode = self._modes.get(path.type)
+        if mode is None or pose is None:
+            return Twist()
+        return mode(path, Pose(path.x, path.y, path.theta), pose)
+
+    def _line(self, path: Path, target: Pose, pose: Pose) -> Twist:
+        return self._regulator.follow_line(target, pose, path.v, self.twist)
 
     def _circle(self, path: Path, centre: Pose, pose: Pose) -> Twist:
         if not path.r:
@@ -140,6 +146,9 @@ class PathFollower(RtComponent):
     def _turn(self, path: Path, target: Pose, pose: Pose) -> Twist:
         most = min(abs(path.w), self.max_w.value)
         return self._spin.turn(target.heading, pose.heading, most, self.twist)
+
+    def _velocity(self, path: Path, target: Pose, pose: Pose) -> Twist:
+        return Twist(path.v, path.w)
 
     def _wheels(self, path: Path, target: Pose, pose: Pose) -> Twist:
         radius = self.radius.value

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import newest, to_pose_2d
+from tickrig.host.motion.ports import newest, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -53,31 +53,37 @@ class PositionInput(RtComponent):
         return not (self._commands or self._running)
 
     def goal(self, pose: Pose) -> None:
-        """Enter a goal; it waits for those before it."""
-        self._commands.append((iis.TimedPose2D(data=to_pose_2d(pose)),))
+        """Enter a goal; it waits for those before it.
+
+        Raises:
+            ValueError: a number that is none.
+        """
+        self._commands.append((_point(pose),))
 
     def path(self, poses: Sequence[Pose]) -> None:
         """Enter a path of two points or more.
 
         Raises:
-            ValueError: fewer points.
+            ValueError: fewer points, or a number that is none.
         """
         if len(poses) < 2:
             raise ValueError(f"a path has 2 points or more, got {len(poses)}")
         inner = [INTERMEDIATE_POINT] * (len(poses) - 2)
         ids = (START_POINT, *inner, END_POINT)
         self._commands.append(
-            tuple(
-                iis.TimedPose2D(id=(ident,), data=to_pose_2d(pose))
-                for ident, pose in zip(ids, poses, strict=True)
-            )
+            tuple(_point(pose, ident) for ident, pose in zip(ids, poses, strict=True))
         )
 
     def replace(self, pose: Pose) -> None:
-        """Enter a goal that takes the place of what runs and waits."""
+        """Enter a goal that takes the place of what runs and waits.
+
+        Raises:
+            ValueError: a number that is none; what runs goes on.
+        """
+        point = _point(pose)
         self._commands.clear()
         self._running = False
-        self.goal(pose)
+        self._commands.append((point,))
 
     def end(self) -> None:
         """Go into Error when all has finished, as the original does after its last command."""
@@ -97,3 +103,9 @@ class PositionInput(RtComponent):
         if self._ending and self.idle:
             return ReturnCode.RTC_ERROR
         return ReturnCode.RTC_OK
+
+
+def _point(pose: Pose, *ids: int) -> iis.TimedPose2D:
+    if not sound(*pose):
+        raise ValueError(f"a pose has three numbers, got {tuple(pose)}")
+    return iis.TimedPose2D(id=ids, data=to_pose_2d(pose))

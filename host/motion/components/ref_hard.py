@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
-from math import isfinite, tau
+from collections.abc import Callable, Mapping
+from math import tau
 from typing import ClassVar, Final, Protocol
 
 from tickrig.host.errors import LinkError
@@ -13,7 +13,7 @@ from tickrig.host.link import Link
 from tickrig.host.modbus.master import Answer, ModbusMaster
 from tickrig.host.motion.dead_reckoning import wheel_speeds
 from tickrig.host.motion.geometry import Twist
-from tickrig.host.motion.ports import newest
+from tickrig.host.motion.ports import newest, sound
 from tickrig.host.rtc import (
     ExecutionContext,
     InPort,
@@ -25,7 +25,7 @@ from tickrig.host.rtc import (
     ServicePort,
 )
 from tickrig.host.serial_link import SerialLink
-from tickrig.wire.modbus.requests import READ_WRITE, WRITE, Request
+from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
 from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
@@ -33,13 +33,15 @@ from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 MISSES: Final = 3
 """Unanswered requests in a row that are an error (rh3-control, drive protocol)."""
 
-GAINS: Final = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
+GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
 """Of position and of velocity."""
 
 WATCHDOG_MS: Final = 500
 """Silence after which the base stops by itself."""
 
 _TURN: Final = 2**32  # counts after which a counter begins again
+
+_MODE: Final = Request(READ, (Address.MODE, 1))
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -66,7 +68,8 @@ class RefHardRh3(RtComponent):
 
     It goes into Error when the base has a fault, refuses, answers three times in a row
     not at all, or the line is gone; the base then stops by its own watchdog. While the
-    bumper is pressed or after `Stop` it commands standstill.
+    bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
+    faster than Velocity_limit, both are slowed down alike.
 
     Not there: the library libsvm and its protocol, whose texts are not public.
 
@@ -90,16 +93,14 @@ class RefHardRh3(RtComponent):
         for port_name, service in (("InventGUIRefHard", "service"), ("BumpRefHard", "service")):
             port = self.add_port(ServicePort(port_name))
             port.provide(Provider[RefHard](service, "RefHard", self))
+        self._counts, self._angles = (0, 0), [0.0, 0.0]
         self._forget()
 
     def _bind(self) -> None:
         bind = self.configuration.bind
         self.device = bind("DeviceFileName", "/dev/ttyUSB0")
         self.gains = tuple(
-            bind(f"gain_{name}", default, "0<=x<=32767")
-            for name, default in zip(
-                ("P", "I", "D", "VP", "VI", "VD"), (10, 0, 0, 10, 0, 1), strict=True
-            )
+            bind(f"gain_{name}", default, "0<=x<=32767") for name, default in GAINS.items()
         )
         self.velocity_limit = bind("Velocity_limit", 10.0, "x>0", unit="rad/s")
         self.acceleration_limit = bind("Acceleration_limit", 50.0, "x>0", unit="rad/s2")
@@ -113,8 +114,6 @@ class RefHardRh3(RtComponent):
     def _forget(self) -> None:
         self._orders: deque[Request] = deque()
         self._twist, self._stopped = Twist(), False
-        self._counts: tuple[int, int] | None = None
-        self._angles = [0.0, 0.0]
         self.report: Report | None = None
 
     @property
@@ -134,6 +133,8 @@ class RefHardRh3(RtComponent):
         """Open the line, and order settings and power."""
         self._forget()
         self.velocity.clear()
+        if not all(constant.value for constant in self.constants):
+            return self._failed("an EncoderConstant is 0")
         try:
             self._master = ModbusMaster(self._open_link(self.device.value))
         except LinkError as error:
@@ -142,6 +143,7 @@ class RefHardRh3(RtComponent):
         limits = (self.velocity_limit.value * per_rad, self.acceleration_limit.value * per_rad)
         gains = (gain.value for gain in self.gains)
         settings = (*gains, *(word for limit in limits for word in wide(round(limit))))
+        self._orders.append(_MODE)
         self._orders.append(_write(Address.GAIN_P, *settings))
         self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
         self._orders.append(_write(Address.COMMAND, Command.ENABLE))
@@ -154,13 +156,23 @@ class RefHardRh3(RtComponent):
                 self._master.begin(_write(Address.COMMAND, Command.STOP))
             except LinkError as error:
                 _LOG.warning("%s: %s", self.instance_name, error)
-            self._master.close()
-        self._master = None
+        self._close()
         return ReturnCode.RTC_OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Error; `on_activated` clears the fault in the base."""
+        """Give the line back; `on_activated` clears the fault in the base."""
+        self._close()
         return ReturnCode.RTC_OK
+
+    def on_finalize(self) -> ReturnCode:
+        """Give the line back."""
+        self._close()
+        return ReturnCode.RTC_OK
+
+    def _close(self) -> None:
+        if self._master is not None:
+            self._master.close()
+        self._master = None
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take the answer of the period before."""
@@ -179,9 +191,8 @@ class RefHardRh3(RtComponent):
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
         """Send what is to be sent in this period."""
         if (latest := newest(self.velocity)) is not None:
-            data = latest.data
-            sound = isfinite(data.vx) and isfinite(data.va)
-            self._twist = Twist(data.vx, data.va) if sound else Twist()
+            v, w = latest.data.vx, latest.data.va
+            self._twist = Twist(v, w) if sound(v, w) else Twist()
         if self._master is None or self._master.pending:
             return ReturnCode.RTC_OK
         try:
@@ -201,16 +212,18 @@ class RefHardRh3(RtComponent):
         speeds = wheel_speeds(
             twist, self.tread.value, self.radius_left.value, self.radius_right.value
         )
+        share = min(1.0, self.velocity_limit.value / max(1e-9, *map(abs, speeds)))
         words: list[int] = []
         for speed, constant in zip(speeds, self.constants, strict=True):
-            words += wide(round(speed * self._counts_per_rad * constant.value))
+            words += wide(round(speed * share * self._counts_per_rad * constant.value))
         return Request(READ_WRITE, REPORT, (Address.TARGET_SPEED_LEFT, tuple(words)))
 
     def _take(self, ec: ExecutionContext, answer: Answer) -> ReturnCode:
         if answer.refusal is not None:
             return self._failed(f"the base refuses {answer.request}: {answer.refusal!r}")
         if self._orders:
-            self._orders.popleft()
+            if self._orders.popleft() == _MODE and answer.values == (Mode.FREE,):
+                self._counts = (0, 0)  # it was without power
             return ReturnCode.RTC_OK
         self.report = report = Report.parse(answer.values)
         self._turn(report)
@@ -223,9 +236,8 @@ class RefHardRh3(RtComponent):
     def _turn(self, report: Report) -> None:
         """Add what the counters counted; they begin again after 2**32."""
         counts = (report.left, report.right)
-        before = self._counts or (0, 0)
         for place, constant in enumerate(self.constants):
-            change = (counts[place] - before[place] + _TURN // 2) % _TURN - _TURN // 2
+            change = (counts[place] - self._counts[place] + _TURN // 2) % _TURN - _TURN // 2
             self._angles[place] += change / (self._counts_per_rad * constant.value)
         self._counts = counts
 
