@@ -99,11 +99,6 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
     return open_buses(buses or [BusWord()], options)
 
 
-def is_log(word: str) -> bool:
-    """Say whether a SOURCE word names a log file."""
-    return isinstance(parse_source(word), FileWord)
-
-
 def log_path(word: str) -> Path:
     """Return the log file that a word names; Refused if it names none."""
     parsed = parse_source(word)

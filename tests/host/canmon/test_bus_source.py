@@ -158,3 +158,22 @@ def test_a_bus_that_cannot_be_opened_fails() -> None:
 def test_an_unknown_interface_is_refused() -> None:
     with pytest.raises(Refused, match="'nothing' is none of python-can"):
         open_source(["nothing:0"])
+
+
+def test_a_bus_without_an_interface_is_of_socketcan(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CAN_INTERFACE", raising=False)
+    monkeypatch.setattr("can.util.CONFIG_FILES", [])
+    with pytest.raises(SourceFailed, match="CAN bus socketcan nowhere"):
+        open_source(["nowhere"])
+
+
+def test_the_interface_may_be_configured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CAN_INTERFACE", "virtual")
+    source = open_source(["bench"])
+    assert (source.live, source.ended, source.words()) == (True, False, [])
+    source.close()
+
+
+def test_buses_that_were_opened_are_closed_where_another_fails(bench: can.BusABC) -> None:
+    with pytest.raises(SourceFailed):
+        open_source(["virtual:canmon-bench", "socketcan:nowhere"])

@@ -201,3 +201,13 @@ def test_a_log_is_left_alone_where_the_source_cannot_be_opened(tmp_path: Path) -
     kept.write_text(LOG, "ascii")
     assert canmon("dump", "socketcan:nowhere", "-l", str(kept)).exit_code == 3
     assert kept.read_text("ascii") == LOG
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("name", ["full.log", "full.asc"])
+def test_a_full_disk_ends_it_with_status_3(log: str, tmp_path: Path, name: str) -> None:
+    full = tmp_path / name
+    full.symlink_to("/dev/full")
+    result = canmon("dump", log, "-l", str(full))
+    assert result.exit_code == 3
+    assert result.stderr.endswith(f"Error: {full}: No space left on device\n")

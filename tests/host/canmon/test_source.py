@@ -102,3 +102,39 @@ def test_words_that_name_nothing_are_refused(words: list[str], said: str) -> Non
 def test_a_file_that_is_not_there_fails() -> None:
     with pytest.raises(SourceFailed, match=r"nowhere\.log: No such file"):
         open_source(["nowhere.log"])
+
+
+def test_standard_input_that_cannot_be_read_fails() -> None:
+    folder = os.open("/", os.O_RDONLY)
+    source = StdinSource(folder)
+    assert source.poll(0) == []
+    assert (source.ended, source.failed) == (True, "standard input: Is a directory")
+    os.close(folder)
+
+
+def test_standard_input_tells_of_bad_lines_and_losses() -> None:
+    read, write = os.pipe()
+    source = StdinSource(read)
+    os.write(write, b'noise\n{"v":1,"ev":"drop","n":3}\n')
+    assert source.poll(0) == []
+    source.close()
+    assert (source.lost, source.ended, source.live) == (3, True, True)
+    assert source.words() == [
+        "standard input: line 1 is no frame: 'noise'",
+        "standard input: its recorder lost 3 frames",
+    ]
+    os.close(read)
+    os.close(write)
+
+
+def test_joined_filters_must_all_hold(tmp_path: Path) -> None:
+    source = open_source([log(tmp_path, LOG) + ",700:700,705~7FF,j"])
+    assert drained(source) == []
+    source = open_source([log(tmp_path, LOG) + ",00000705:DFFFFFFF"])
+    assert drained(source) == []
+
+
+def test_error_frames_pass_by_their_mask_alone(tmp_path: Path) -> None:
+    text = "(0.1) can0 20000088#\n(0.2) can0 20000004#\n(0.3) can0 123#\n"
+    source = open_source([log(tmp_path, text) + ",7FF:7FF,#80"])
+    assert [str(heard.frame) for heard in drained(source)] == ["20000088#0000000000000000"]
