@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import can
 import pytest
 
-from tests.interop.buses import MULTICAST
+from tests.interop.buses import MULTICAST, PORT
 from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig
@@ -132,8 +132,8 @@ def test_a_bus_over_udp_stays_on_this_machine() -> None:
     group = "ff11::7469:636e"
     if why := MULTICAST.why_not():
         pytest.skip(why)
-    source = open_source([f"udp:{group}"])
-    with can.Bus(interface="udp_multicast", channel=group, hop_limit=0) as bus:
+    source = open_source([f"udp:{group}"], BusOptions(bus_kwargs=(f"port={PORT}",)))
+    with can.Bus(interface="udp_multicast", channel=group, port=PORT, hop_limit=0) as bus:
         bus.send(can.Message(arbitration_id=5, is_extended_id=False))
         (one,) = wait(source, bool)
     assert (one.channel, one.frame) == (group, CanFrame(5))
