@@ -1,0 +1,135 @@
+"""Frames that somebody at a panel sends: one by one, or cyclically, and only while it is armed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.frame_fields import FrameFields
+from tickrig.wire.can import CanFrame, Frames
+
+ONCE: Final = 0
+"""As a period: a row that is sent when somebody says so."""
+
+
+@dataclass(slots=True)
+class TransmitRow:
+    """One frame of the list.
+
+    Args:
+        name: what people call it.
+        frame: what is sent.
+        period_us: of a cyclic row, else `ONCE`.
+        fields: what changes in it each time.
+
+    Attributes:
+        sent: how often it was.
+        missed: how many periods passed without it.
+
+    Raises:
+        ValueError: a period below 0, or a field that is not in the frame.
+    """
+
+    name: str
+    frame: CanFrame
+    period_us: int = ONCE
+    fields: FrameFields = field(default_factory=FrameFields)
+    sent: int = field(default=0, init=False)
+    missed: int = field(default=0, init=False)
+    _cyclic: Cyclic | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.period_us < 0:
+            raise ValueError(f"{self.name}: a period of {self.period_us} us; 0 is none")
+        self.fields.check(len(self.frame.data))
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is sent cyclically."""
+        return self._cyclic is not None
+
+    @property
+    def due_us(self) -> int:
+        """When it is sent next."""
+        return NEVER if self._cyclic is None else self._cyclic.due_us
+
+    def enable(self, now_us: int) -> None:
+        """Send it from now on in each period; counters go on where they were.
+
+        Raises:
+            ValueError: it has no period.
+        """
+        if self.period_us == ONCE:
+            raise ValueError(f"{self.name} has no period")
+        if self._cyclic is None:
+            self._cyclic = Cyclic(self.frame, self.period_us, now_us)
+
+    def disable(self) -> None:
+        """Send it no more."""
+        self._cyclic = None
+
+    def once(self) -> Frames:
+        """Return it, to be sent now."""
+        data = self.fields.put(self.frame.data, self.sent)
+        self.sent += 1
+        return (self.frame._replace(data=data),)
+
+    def tick(self, now_us: int) -> Frames:
+        """Return it if it is due."""
+        if self._cyclic is None or not self._cyclic.tick(now_us):
+            return ()
+        self.missed, self._cyclic.missed = self.missed + self._cyclic.missed, 0
+        return self.once()
+
+
+@dataclass(slots=True)
+class TransmitList:
+    """Rows, and the key that arms them.
+
+    Nothing is sent until it is armed; stopping disarms it and disables all rows, so that arming
+    it again sends nothing by itself.
+
+    Args:
+        rows: the frames.
+
+    Attributes:
+        armed: rows may send.
+    """
+
+    rows: list[TransmitRow] = field(default_factory=list)
+    armed: bool = field(default=False, init=False)
+
+    @property
+    def due_us(self) -> int:
+        """When a row is sent next."""
+        return min((row.due_us for row in self.rows), default=NEVER)
+
+    def arm(self) -> None:
+        """Let rows send."""
+        self.armed = True
+
+    def stop(self) -> None:
+        """Send nothing more, whatever was enabled."""
+        self.armed = False
+        for row in self.rows:
+            row.disable()
+
+    def enable(self, number: int, now_us: int) -> None:
+        """Send a row in each period from now on; ValueError if that must not be."""
+        self._check_armed()
+        self.rows[number].enable(now_us)
+
+    def once(self, number: int) -> Frames:
+        """Return a row, to be sent now; ValueError if it is not armed."""
+        self._check_armed()
+        return self.rows[number].once()
+
+    def tick(self, now_us: int) -> Frames:
+        """Return what is due, in the order of the rows."""
+        return tuple(frame for row in self.rows for frame in row.tick(now_us))
+
+    def _check_armed(self) -> None:
+        if not self.armed:
+            raise ValueError("not armed: nothing is sent")
