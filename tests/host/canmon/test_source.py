@@ -91,6 +91,7 @@ def test_a_line_that_comes_in_pieces_is_one_line() -> None:
         (["can0,12"], "'12' is no filter like 123:7FF"),
         (["run.gz"], "a log's name ends in"),
         ([""], "is not a bus"),
+        (["/"], "'/' is a folder"),
         (["can0@fast"], "is not a bus"),
     ],
 )
