@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
+from tickrig.host.canopen.script import Pause, Script
+from tickrig.host.canopen.sdo_transfer import download, download_number, upload_number
 from tickrig.host.rtc_canopen.definition import NodeEntry, PdoEntry, PdoName, SdoEntry
 from tickrig.host.rtc_canopen.device_file import DeviceFile
-from tickrig.host.rtc_canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.rtc_canopen.pdo_layout import PARAMETERS, PdoLayout, lay_out
-from tickrig.host.rtc_canopen.script import Pause, Script
-from tickrig.host.rtc_canopen.sdo_transfer import download, download_number, upload_number
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 

@@ -2,11 +2,6 @@
 
 DefinitionError (ValueError)    a System Definition that cannot be used
 ServerRefused (ValueError)      a command to the server that cannot be
-SdoFailed
- +-- SdoAborted                 the device or we aborted a transfer
- +-- SdoTimeout (TimeoutError)  the device did not answer
-StateTimeout (TimeoutError)     a device did not report a state in time
-WrongIdentity                   a device is none of those that its EDS describes
 """
 
 from __future__ import annotations
@@ -26,44 +21,3 @@ class DefinitionError(ValueError):
 
 class ServerRefused(ValueError):  # noqa: N818 - what the server did
     """A command to the server that cannot be."""
-
-
-class SdoFailed(Exception):  # noqa: N818 - what the transfer did
-    """An SDO transfer that brought nothing.
-
-    Attributes:
-        index: of the object.
-        sub: of the object.
-    """
-
-    def __init__(self, message: str, index: int, sub: int) -> None:
-        super().__init__(message)
-        self.index, self.sub = index, sub
-
-
-class SdoAborted(SdoFailed):
-    """A transfer that was aborted.
-
-    Attributes:
-        code: an AbortCode, or the number as it came if it is none.
-    """
-
-    def __init__(self, index: int, sub: int, code: int) -> None:
-        name = getattr(code, "name", "unknown")
-        super().__init__(f"{index:04X}h:{sub:02X} aborted: {code:08X}h {name}", index, sub)
-        self.code = code
-
-
-class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
-    """A transfer to which nobody answered."""
-
-    def __init__(self, index: int, sub: int) -> None:
-        super().__init__(f"{index:04X}h:{sub:02X} was not answered", index, sub)
-
-
-class StateTimeout(TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
-    """A device that did not report a state in time."""
-
-
-class WrongIdentity(Exception):  # noqa: N818 - what the device has
-    """A device that is none of those that its EDS describes."""

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.host.canopen.errors import SdoFailed, StateTimeout
+from tickrig.host.canopen.script import Await, Command, Pause, Script
+from tickrig.host.canopen.sdo_transfer import download_number, upload_number
 from tickrig.host.rtc_canopen.definition import NodeEntry, Role
-from tickrig.host.rtc_canopen.errors import SdoFailed, StateTimeout
-from tickrig.host.rtc_canopen.script import Await, Command, Pause, Script
-from tickrig.host.rtc_canopen.sdo_transfer import download_number, upload_number
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 CONFIRM_US: Final = 300_000

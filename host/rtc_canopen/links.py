@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from tickrig.host.canopen.dialogue import Failure, Job
 from tickrig.host.rtc_canopen.boot import set_pdo
 from tickrig.host.rtc_canopen.definition import PdoEntry, PdoLink, PdoName
-from tickrig.host.rtc_canopen.dialogue import Failure, Job
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout

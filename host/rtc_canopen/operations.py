@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
+from tickrig.host.canopen.script import Command, Script
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition import NodeEntry, Role
-from tickrig.host.rtc_canopen.dialogue import Dialogue, Failure, Job
-from tickrig.host.rtc_canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES
 from tickrig.host.rtc_canopen.proxy import Asked, ProxyRtc
-from tickrig.host.rtc_canopen.script import Command, Script
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 STATES: Final = {

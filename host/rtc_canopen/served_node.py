@@ -5,12 +5,12 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, Protocol
 
+from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.host.link import NEVER
 from tickrig.host.rtc_canopen.boot import boot, probe
 from tickrig.host.rtc_canopen.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.device_file import DeviceFile
-from tickrig.host.rtc_canopen.dialogue import Dialogue, Failure, Job
-from tickrig.host.rtc_canopen.errors import SdoTimeout
 from tickrig.host.rtc_canopen.events import EventKind
 from tickrig.host.rtc_canopen.operations import Operations, kind_of
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout

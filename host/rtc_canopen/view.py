@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
+from tickrig.host.canopen.dialogue import Failure, Job
+from tickrig.host.canopen.script import Script
+from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.rtc.data_port import DataPort, OutPort
 from tickrig.host.rtc.port import AnyPort
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, SystemDefinition
-from tickrig.host.rtc_canopen.dialogue import Failure, Job
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import Event
-from tickrig.host.rtc_canopen.script import Script
-from tickrig.host.rtc_canopen.sdo_transfer import download, upload
 from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
 from tickrig.host.rtc_canopen.server import Server
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.rtc_canopen.dialogue import Dialogue, Failure, Job
-from tickrig.host.rtc_canopen.script import SDO_TIMEOUT_US, Command, Pause, Script
-from tickrig.host.rtc_canopen.sdo_transfer import download, upload
+from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.script import SDO_TIMEOUT_US, Command, Pause, Script
+from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand
 
 Exchange = tuple[str, str]

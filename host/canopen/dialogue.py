@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from tickrig.host.link import NEVER
-from tickrig.host.rtc_canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
-from tickrig.host.rtc_canopen.script import (
+from tickrig.host.canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
+from tickrig.host.canopen.script import (
     SDO_TIMEOUT_US,
     Ask,
     Await,
@@ -19,6 +18,7 @@ from tickrig.host.rtc_canopen.script import (
     Step,
     Tell,
 )
+from tickrig.host.link import NEVER
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
 from tickrig.wire.canopen.sdo import (
