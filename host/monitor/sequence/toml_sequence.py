@@ -84,6 +84,8 @@ class TomlSequence:
             top = tomllib.loads(self._text)
         except tomllib.TOMLDecodeError as error:
             raise SequenceError(self._syntax(str(error))) from None
+        except RecursionError:
+            raise SequenceError(self._syntax("lists in lists in lists (at end)")) from None
         try:
             self._variables = {**self._vars(top.get("vars", {})), **self._given}
             _check_keys(top, _TOP, ())

@@ -4,6 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.monitor.decode.decoder import Decoder
@@ -117,3 +119,11 @@ def test_what_is_no_number_has_no_curve() -> None:
 def test_what_is_no_signal_is_refused(text: str, said: str) -> None:
     with pytest.raises(ValueError, match=re.escape(said)):
         parse_signal(text)
+
+
+@given(st.text("0123456789ABCabf[]:.+*/-=@us ", max_size=20) | st.text(max_size=20))
+def test_any_text_is_a_signal_or_refused(text: str) -> None:
+    try:
+        parse_signal(text)
+    except ValueError as error:
+        assert str(error)  # noqa: PT017 - either is right
