@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from itertools import islice
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.ident import ERROR, ident_of
 from tickrig.wire.can import CanFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
 
 CAPACITY: Final = 100_000
 
@@ -21,12 +24,16 @@ class TraceRow(NamedTuple):
         heard: the frame.
         since_us: since the frame before it on any bus; None for the first.
         gap_us: since the frame before it with this identifier on this bus; None for the first.
+        changed: bits in which its payload differs from that one's; see `BitRow`.
+        decoded: what it means, where that was asked.
     """
 
     number: int
     heard: Heard
     since_us: int | None
     gap_us: int | None
+    changed: int = 0
+    decoded: Decoded | None = None
 
 
 class Trace:
@@ -40,7 +47,7 @@ class Trace:
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self._rows: deque[TraceRow] = deque(maxlen=capacity)
-        self._latest_us: dict[tuple[str, int], int] = {}
+        self._latest: dict[tuple[str, int], tuple[int, int]] = {}
         self._last_us: int | None = None
         self._count = 0
 
@@ -54,18 +61,23 @@ class Trace:
         """The number of the oldest frame that is kept."""
         return self._count - len(self._rows)
 
-    def take(self, heard: Heard) -> TraceRow:
+    def take(self, heard: Heard, decoded: Decoded | None = None) -> TraceRow:
         """Add a frame at the end."""
         at_us, channel, frame, _ = heard
         key = channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+        payload = int.from_bytes(frame.data, "little")
+        before_us, before = self._latest.get(key, (None, payload))
         row = TraceRow(
             self._count,
             heard,
             _since(at_us, self._last_us),
-            _since(at_us, self._latest_us.get(key)),
+            _since(at_us, before_us),
+            payload ^ before,
+            decoded,
         )
         self._rows.append(row)
-        self._latest_us[key] = self._last_us = at_us
+        self._latest[key] = at_us, payload
+        self._last_us = at_us
         self._count += 1
         return row
 
@@ -85,7 +97,7 @@ class Trace:
     def clear(self) -> None:
         """Begin anew."""
         self._rows.clear()
-        self._latest_us.clear()
+        self._latest.clear()
         self._last_us, self._count = None, 0
 
 

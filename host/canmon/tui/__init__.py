@@ -1,0 +1,1 @@
+"""The monitor as a full-screen program (extra `tui`)."""

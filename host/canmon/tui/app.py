@@ -1,0 +1,111 @@
+"""The monitor: tabs of panels over one session."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Footer, TabbedContent, TabPane
+
+from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.status_line import StatusLine
+
+PAINT_S: Final = 0.1
+ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Monitor(App[None]):
+    """Tabs, keys, help and the status line.
+
+    Args:
+        session: what is heard, and how to send; it is started by whoever runs the app.
+        panels: the tabs.
+    """
+
+    TITLE = "canmon"
+    CSS = """
+    TabbedContent, ContentSwitcher, TabPane, Panel { height: 1fr; }
+    TabPane { padding: 0; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f1,question_mark", "help", "help", key_display="F1"),
+        Binding("A", "arm", "arm"),
+        Binding("f9", "stop", "stop all", priority=True, key_display="F9"),
+        *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
+        Binding("q,ctrl+q", "quit", "quit", key_display="q"),
+        Binding("ctrl+c", "quit", "quit", show=False, priority=True),
+    ]
+
+    def __init__(self, session: Session, panels: Sequence[Panel]) -> None:
+        super().__init__()
+        self.session, self.panels = session, tuple(panels)
+
+    def compose(self) -> ComposeResult:
+        """Lay out the tabs."""
+        with TabbedContent(initial=_tab(self.panels[0])):
+            for number, panel in enumerate(self.panels, 1):
+                with TabPane(f"{number} {panel.title}", id=_tab(panel)):
+                    yield panel
+        yield StatusLine(self.session)
+        yield Footer(compact=True)
+
+    def on_mount(self) -> None:
+        """Begin to paint."""
+        loop = asyncio.get_running_loop()
+        for number in ENDING:
+            loop.add_signal_handler(number, self.exit)
+        self.set_interval(PAINT_S, self.look)
+
+    @property
+    def shown(self) -> Panel:
+        """The panel that is on the screen."""
+        active = self.query_one(TabbedContent).active
+        return next(panel for panel in self.panels if _tab(panel) == active)
+
+    def look(self) -> None:
+        """Paint what is on the screen."""
+        self.session.check()
+        if self.screen_stack and self.query(StatusLine):
+            self.shown.look()
+            self.query_one(StatusLine).look()
+
+    def on_tabbed_content_tab_activated(self) -> None:
+        """Let the keys go to the panel, and paint it at once."""
+        panel = self.shown
+        if not panel.query("*:focus"):
+            self.screen.focus_next(f"#{panel.id} *")
+        self.look()
+
+    def action_tab(self, number: int) -> None:
+        """Show a tab."""
+        if number <= len(self.panels):
+            self.query_one(TabbedContent).active = _tab(self.panels[number - 1])
+
+    def action_help(self) -> None:
+        """Show or hide what the keys do here."""
+        if self.screen.query("HelpPanel"):
+            self.action_hide_help_panel()
+        else:
+            self.action_show_help_panel()
+
+    def action_arm(self) -> None:
+        """Let panels send, or stop them."""
+        if self.session.armed:
+            self.session.disarm()
+        elif self.session.can_send:
+            self.session.arm()
+        else:
+            self.notify("nothing is sent into a log", severity="warning")
+
+    def action_stop(self) -> None:
+        """Stop all that sends, at once."""
+        self.session.disarm()
+
+
+def _tab(panel: Panel) -> str:
+    return f"tab-{panel.section}"

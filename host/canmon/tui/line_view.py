@@ -1,0 +1,111 @@
+"""Lines of text that are painted one by one: the live tables of all panels.
+
+A table of Textual takes eight times as long to paint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from rich.segment import Segment
+from rich.style import Style
+from textual.geometry import Size
+from textual.message import Message
+from textual.scroll_view import ScrollView
+from textual.strip import Strip
+
+Line = tuple[tuple[str, str], ...]
+"""Pieces of text, each with a style as `bold red`; empty for none."""
+
+CURSOR: Final = "reverse"
+
+
+def plain(text: str, style: str = "") -> Line:
+    """Return a line of one piece."""
+    return ((text, style),)
+
+
+def line_text(line: Line) -> str:
+    """Return a line without its styles."""
+    return "".join(text for text, _ in line)
+
+
+class LineView(ScrollView, can_focus=True):
+    """Shows lines; only those that changed are painted again.
+
+    Not all lines need be there: of many, those around the ones in view do.
+
+    Attributes:
+        lines: those that are there.
+        begin: the number of the first of them, from 0.
+    """
+
+    class Moved(Message):
+        """Other lines are in view."""
+
+    def __init__(self, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self.lines: list[Line] = []
+        self.begin = 0
+        self._strips: dict[Line, Strip] = {}
+
+    @property
+    def top(self) -> int:
+        """The number of the first line in view."""
+        return int(self.scroll_offset.y)
+
+    @property
+    def rows(self) -> int:
+        """How many lines are in view."""
+        return int(self.scrollable_content_region.height)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the last line is in view."""
+        return self.top >= int(self.virtual_size.height) - self.rows
+
+    def show(self, lines: Sequence[Line], begin: int = 0, total: int | None = None) -> None:
+        """Show lines.
+
+        Args:
+            lines: those that are there.
+            begin: the number of the first of them.
+            total: how many there are in all; as many as there are here if it is not given.
+        """
+        before, was = self.lines, self.begin
+        self.lines, self.begin = list(lines), begin
+        height = len(self.lines) if total is None else total
+        width = max((sum(len(text) for text, _ in line) for line in lines), default=0)
+        if self.virtual_size != (size := Size(width, height)):
+            self.virtual_size = size
+        for number in range(self.top, self.top + self.rows):
+            if _at(before, number - was) != _at(self.lines, number - begin):
+                self.refresh_line(number - self.top)
+
+    def watch_scroll_y(self, old_value: float, new_value: float) -> None:
+        """Tell that others are in view."""
+        super().watch_scroll_y(old_value, new_value)
+        self.post_message(self.Moved())
+
+    def render_line(self, y: int) -> Strip:
+        """Return what is painted on a line of the screen."""
+        number = self.top + y
+        line = self.line_at(number)
+        strip = self._strips.get(line)
+        if strip is None:
+            if len(self._strips) > 1_000:
+                self._strips.clear()
+            strip = self._strips[line] = Strip(
+                [Segment(text, Style.parse(style)) for text, style in line]
+            )
+        left, width = int(self.scroll_offset.x), self.size.width
+        return strip.crop_extend(left, left + width, None).apply_style(self.rich_style)
+
+    def line_at(self, number: int) -> Line:
+        """Return a line by its number; an empty one if it is not there."""
+        return _at(self.lines, number - self.begin)
+
+
+def _at(lines: Sequence[Line], place: int) -> Line:
+    return lines[place] if 0 <= place < len(lines) else ()

@@ -1,0 +1,70 @@
+"""All that panels show of a source: frames in, nothing painted, no clock and no thread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.node_board import NodeBoard
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.top_model import TopModel
+from tickrig.host.monitor.trace import Trace
+
+Meant = tuple[Heard, Decoded]
+"""A frame and what it means."""
+
+
+class Model:
+    """What was heard, decoded and counted.
+
+    Args:
+        eds: what files say, by node-ID.
+        dbc: DBC files.
+        bit_rate: of the buses, None if it is not known.
+
+    Attributes:
+        eds: what files say, by node-ID.
+        decoder: decodes all that is taken here.
+        board: the nodes.
+        top: the traffic, and how the statistics show it.
+        trace: the latest frames.
+        frames: how many were taken, error frames among them.
+        now_us: the time at the source.
+        lost: frames that were there and did not get here.
+        failed: why the source ended before its time; empty if it did not.
+        ended: no more will come.
+    """
+
+    def __init__(
+        self,
+        eds: Mapping[int, EdsObjects] | None = None,
+        dbc: Sequence[Path] = (),
+        bit_rate: int | None = None,
+    ) -> None:
+        self.eds = dict(eds or {})
+        self.decoder = Decoder(self.eds, dbc)
+        self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
+        self.top = TopModel(bit_rate)
+        self.trace = Trace()
+        self.frames = self.now_us = self.lost = 0
+        self.failed, self.ended = "", False
+
+    def take(self, heards: Sequence[Heard]) -> list[Meant]:
+        """Take what was heard; return it with what it means."""
+        meant = [(heard, self.decoder.take(heard)) for heard in heards]
+        for heard, decoded in meant:
+            self.board.take(heard, decoded)
+            self.trace.take(heard, decoded)
+        self.top.take_meant(meant)
+        self.frames += len(meant)
+        if meant:
+            self.now_us = meant[-1][0].at_us
+        return meant
+
+    def clear(self) -> None:
+        """Forget what was counted and traced; what was learnt of the nodes stays."""
+        self.top.traffic.clear()
+        self.trace.clear()
