@@ -24,6 +24,7 @@ from tickrig.host.rtc import (
     RtComponent,
     ServicePort,
 )
+from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.serial_link import SerialLink
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
 from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
@@ -139,10 +140,9 @@ class RefHardRh3(RtComponent):
             self._master = ModbusMaster(self._open_link(self.device.value))
         except LinkError as error:
             return self._failed(str(error))
-        per_rad = self._counts_per_rad
-        limits = (self.velocity_limit.value * per_rad, self.acceleration_limit.value * per_rad)
         gains = (gain.value for gain in self.gains)
-        settings = (*gains, *(word for limit in limits for word in wide(round(limit))))
+        limits = (self._limit(self.velocity_limit), self._limit(self.acceleration_limit))
+        settings = (*gains, *(word for limit in limits for word in wide(limit)))
         self._orders.append(_MODE)
         self._orders.append(_write(Address.GAIN_P, *settings))
         self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
@@ -150,29 +150,19 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Stop the base, take its power, and give the line back."""
+        """Stop the base on its ramp, and give the line back."""
         if self._master is not None:
             try:
                 self._master.begin(_write(Address.COMMAND, Command.STOP))
             except LinkError as error:
                 _LOG.warning("%s: %s", self.instance_name, error)
-        self._close()
+            self._master.close()
+        self._master = None
         return ReturnCode.RTC_OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Give the line back; `on_activated` clears the fault in the base."""
-        self._close()
+        """Leave Error; `on_activated` clears the fault in the base."""
         return ReturnCode.RTC_OK
-
-    def on_finalize(self) -> ReturnCode:
-        """Give the line back."""
-        self._close()
-        return ReturnCode.RTC_OK
-
-    def _close(self) -> None:
-        if self._master is not None:
-            self._master.close()
-        self._master = None
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take the answer of the period before."""
@@ -204,6 +194,9 @@ class RefHardRh3(RtComponent):
     @property
     def _counts_per_rad(self) -> float:
         return self.gear.value * self.encoder.value / tau
+
+    def _limit(self, parameter: Parameter[float]) -> int:
+        return min(round(parameter.value * self._counts_per_rad), _TURN // 2 - 1)
 
     def _cycle(self) -> Request:
         """Return the exchange of a period: speeds there, report back."""
