@@ -21,6 +21,7 @@ from tickrig.host.monitor.logs.log_reader import LogError, LogReader, read_log
 from tickrig.host.monitor.replay.lateness import Lateness
 from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, ReplayPlan
 from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import FieldError, WireError
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.transmitter import Transmitter
@@ -118,13 +119,21 @@ def _loops(text: str) -> int:
     return int(text)
 
 
-def _can_id(text: str | None) -> int | None:
-    if text is not None and _CAN_ID.fullmatch(text) is None:
-        raise Refused(f"--wait-rx {text!r} is no CAN-ID of 3 or 8 hex digits, as 581")
-    return None if text is None else int(text, 16)
+def _can_id(text: str | None) -> CanFrame | None:
+    """Return a frame with the CAN-ID that is waited for."""
+    if text is None:
+        return None
+    try:
+        if _CAN_ID.fullmatch(text) is None:
+            raise FieldError(f"{text!r} is no CAN-ID of 3 or 8 hex digits, as 581")
+        return CanFrame.parse(f"{text}#")
+    except WireError as error:
+        raise Refused(f"--wait-rx {error}") from None
 
 
-def _play(plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: int | None) -> None:
+def _play(
+    plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: CanFrame | None
+) -> None:
     late, pace = Lateness(), Pace()
     with until_interrupted(), until_unread():
         if wait_rx is not None:
@@ -152,13 +161,17 @@ def _due(plan: ReplayPlan) -> Iterator[Due]:
         raise SourceFailed(str(error)) from error
 
 
-def _wait_for(can_id: int, buses: Sequence[Transmitter]) -> None:
-    """Return when one of the buses carried a data frame with this CAN-ID."""
+def _wait_for(wanted: CanFrame, buses: Sequence[Transmitter]) -> None:
+    """Return when one of the buses carried a frame with this CAN-ID."""
     while True:
         for bus in buses:
-            for heard in bus.poll(POLL_US // len(buses)):
-                if isinstance(heard.frame, CanFrame) and heard.frame.can_id == can_id:
+            for _, _, frame, _ in bus.poll(POLL_US // len(buses)):
+                if isinstance(frame, CanFrame) and _same_id(frame, wanted):
                     return
+
+
+def _same_id(one: CanFrame, other: CanFrame) -> bool:
+    return (one.can_id, one.extended) == (other.can_id, other.extended)
 
 
 def _ask(what: str) -> None:

@@ -137,10 +137,11 @@ def test_frames_are_played_one_by_one(wire: Wire, log: str) -> None:
 
 @pytest.mark.realtime
 def test_a_replay_begins_when_a_frame_is_received(wire: Wire, log: str) -> None:
-    with wire.calling("581#"):
-        result = canmon("play", log, wire.word, "--speed", "max", "--wait-rx", "581")
-    assert result.exit_code == 0
-    assert wire.all() == ["080#", "705#05", "181#0102", "182#R"]
+    for word in ("581", "00000581"):
+        with wire.calling(f"{word}#"):
+            result = canmon("play", log, wire.word, "--speed", "max", "--wait-rx", word)
+        assert result.exit_code == 0
+        assert wire.all() == ["080#", "705#05", "181#0102", "182#R"]
 
 
 @pytest.mark.parametrize(
@@ -152,6 +153,7 @@ def test_a_replay_begins_when_a_frame_is_received(wire: Wire, log: str) -> None:
         (["--from", "9s", "--to", "3s"], "from 9000000 us to 3000000 us there is nothing"),
         (["--to", "x"], "'x' is not a time"),
         (["--wait-rx", "5"], "--wait-rx '5' is no CAN-ID of 3 or 8 hex digits"),
+        (["--wait-rx", "FFF"], "--wait-rx CAN-ID 0xFFF is not 11-bit"),
         (["can9"], "both take all of it; write can9=RECORDED"),
         (["=can0"], "'=can0' is not BUS=RECORDED, once for each recorded bus"),
     ],
