@@ -68,7 +68,7 @@ def _heartbeat(row: NodeStatus, now_us: int) -> str:
     about = "~" if row.learnt else ""
     words = [f"{bar} {age_us // 1_000}/{about}{period_us // 1_000} ms"]
     words += ["LATE"] if row.is_late(now_us) else []
-    words += [f"{row.late} were late"] if row.late else []
+    words += [f"late so far: {row.late}"] if row.late else []
     return " ".join(words)
 
 

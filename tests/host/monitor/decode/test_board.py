@@ -81,7 +81,7 @@ def test_a_gap_between_heartbeats_is_counted() -> None:
     board = beats(0, 100, 200, 500, 600)
     (row,) = board.rows()
     assert row.late == 1
-    assert render_board(board, 600_000, WIDE, 10)[1].endswith("1 were late")
+    assert render_board(board, 600_000, WIDE, 10)[1].endswith("late so far: 1")
 
 
 def test_a_boot_up_that_nobody_asked_for_is_counted() -> None:
