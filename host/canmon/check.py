@@ -12,7 +12,7 @@ import click
 
 from tickrig.host.canmon.check_options import read_rules, rule_options
 from tickrig.host.canmon.ending import report, until_interrupted
-from tickrig.host.canmon.listening import listen, patience_us, span_option
+from tickrig.host.canmon.listening import bit_rate_of, listen, patience_us, span_option
 from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
@@ -65,16 +65,16 @@ def command(
     words = [word for word in source if not word.endswith(RULE_FILE)]
     rules = read_rules([Path(word) for word in source if word.endswith(RULE_FILE)], options)
     bus = BusOptions(**{name: options[name] for name in NAMES})
+    bit_rate = _bit_rate(rules, words, bus)
     log = whole_log(words)
     frames = log or open_source(words, bus)
     verdict = Verdict(jsonl)
     try:
         if log is not None:
-            verdict.take(_at_once(log, rules, bus.bitrate))
+            verdict.take(_at_once(log, rules, bit_rate))
         else:
-            _one_by_one(frames, rules, bus.bitrate, verdict, span_us or patience_us(frames, words))
-    except ValueError as error:
-        raise Refused(str(error)) from None
+            checker = Checker(rules, bit_rate)
+            _one_by_one(frames, checker, verdict, span_us or patience_us(frames, words))
     finally:
         frames.close()
     if report_path is not None:
@@ -126,16 +126,24 @@ def finding_json(finding: Finding) -> str:
     return json.dumps(said, ensure_ascii=False)
 
 
+def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
+    """Return the bit rate; Refused if a rule needs it and nobody names it."""
+    bit_rate = bit_rate_of(words, bus)
+    try:
+        rules.load(bit_rate)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    return bit_rate
+
+
 def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]:
     from tickrig.host.monitor.check.column_check import check_columns  # noqa: PLC0415 - numpy
 
     return check_columns(log.columns, rules, bit_rate, log.words())
 
 
-def _one_by_one(
-    source: Source, rules: Rules, bit_rate: int | None, verdict: Verdict, span_us: int | None
-) -> None:
-    checker, watch = Checker(rules, bit_rate), Stopwatch()
+def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int | None) -> None:
+    watch = Stopwatch()
 
     def take(heards: Sequence[Heard]) -> None:
         watch.take(heards)

@@ -9,6 +9,8 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.source import Source
+from tickrig.host.canmon.source_word import BusWord, parse_source
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused
@@ -30,6 +32,13 @@ span_option: Final[Decorator] = click.option(
     "--for", "span_us", metavar="TIME", callback=_span, help="End after 10s, 500ms."
 )
 """Add the option `--for`, in microseconds."""
+
+
+def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
+    """Return the bit rate that -b or a SOURCE word names, as can0@500k; None if none does."""
+    buses = (word for word in map(parse_source, words) if isinstance(word, BusWord))
+    named = (word.bitrate for word in buses if word.bitrate is not None)
+    return next(named, None) if options.bitrate is None else options.bitrate
 
 
 def listen(source: Source, take: Callable[[list[Heard]], None], span_us: int | None) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.ending import report, until_interrupted
-from tickrig.host.canmon.listening import listen, patience_us, span_option
+from tickrig.host.canmon.listening import bit_rate_of, listen, patience_us, span_option
 from tickrig.host.canmon.source import explain_sources, open_source
 from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.whole_log import whole_log
@@ -52,6 +52,7 @@ def command(
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
+    bit_rate = bit_rate_of(source, bus)
     log = whole_log(source)
     frames = log or open_source(source, bus)
     traffic = Traffic()
@@ -67,7 +68,7 @@ def command(
         frames.close()
     snapshot = log.snapshot() if log else traffic.snapshot()
     with until_unread():
-        click.echo("\n".join((_jsonl if jsonl else _tables)(snapshot, by, bus.bitrate)))
+        click.echo("\n".join((_jsonl if jsonl else _tables)(snapshot, by, bit_rate)))
     report(frames, strict)
 
 

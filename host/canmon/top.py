@@ -17,7 +17,14 @@ from tickrig.host.canmon.decode_options import (
     read_filter,
 )
 from tickrig.host.canmon.ending import report, until_interrupted
-from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us, span_option
+from tickrig.host.canmon.listening import (
+    POLL_US,
+    bit_rate_of,
+    is_over,
+    listen,
+    patience_us,
+    span_option,
+)
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.screen import Screen
 from tickrig.host.canmon.source import Source, explain_sources, open_source
@@ -71,7 +78,7 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    chosen, model = read_filter(wanted), TopModel(bus.bitrate)
+    chosen, model = read_filter(wanted), TopModel(bit_rate_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
     take = model.take if plain else _meant(model, Meaning(make_decoder(eds, dbc), chosen))
     log = whole_log(source) if plain else None

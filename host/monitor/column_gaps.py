@@ -13,6 +13,8 @@ from tickrig.host.monitor.runs import Ints, Runs
 
 MANTISSA_BITS: Final = 52
 EXPONENT_BIAS: Final = 1023
+COARSE: Final = -1 << 12
+"""Leaves as many bits of the longest times as the mantissa has."""
 
 
 def column_gaps(runs: Runs, gaps_us: Ints) -> list[Gaps]:
@@ -47,8 +49,10 @@ def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     """Return the bucket of each time, as `bucket_of` does.
 
     A bucket is the exponent and the first bits of the mantissa of a floating-point number: both
-    are read off its bits. Times up to 2**53 us are exact in it.
+    are read off its bits. Longer times than it is exact for lose low bits first, so that none is
+    rounded up.
     """
-    bits = times_us.astype(np.float64).view(np.int64) >> MANTISSA_BITS - SUB_BITS
+    exact = np.where(times_us >> MANTISSA_BITS, times_us & COARSE, times_us)
+    bits = exact.astype(np.float64).view(np.int64) >> MANTISSA_BITS - SUB_BITS
     wide = bits - (EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)
     return np.where(times_us < EXACT_US, times_us, wide).astype(np.int16)

@@ -117,6 +117,12 @@ def test_the_load_is_checked_against_the_bit_rate(log: str) -> None:
     assert result.stdout == "(1.000000) max-load: can0: load 3.0 %, at most 1 % is right\n"
 
 
+def test_a_source_may_name_the_bit_rate() -> None:
+    words = ("--for", "50ms", "--max-load", "50")
+    assert check("virtual:check@500k", *words).exit_code == 0
+    assert check("virtual:check", *words).exit_code == 2
+
+
 @pytest.mark.parametrize(
     ("words", "status", "reason"),
     [
