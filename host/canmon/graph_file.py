@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -59,5 +60,6 @@ def _write(path: Path, series: Sequence[Series], view: View, size: tuple[int, in
         case _:
             from tickrig.host.monitor.graph.png import write_png  # noqa: PLC0415
 
-            with path.open("wb") as picture:
-                write_png(picture, series, view, *size)
+            picture = BytesIO()
+            write_png(picture, series, view, *size)
+            path.write_bytes(picture.getvalue())

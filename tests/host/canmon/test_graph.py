@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 import struct
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -126,6 +127,16 @@ def test_a_file_that_cannot_be_written_ends_with_status_3(log: str) -> None:
         "Error: /nowhere/g.svg: No such file or directory\n",
     )
     assert canmon("/nowhere/run.log", "185[0]").exit_code == 3
+
+
+def test_a_png_without_matplotlib_is_refused_with_what_to_install(
+    log: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    file = tmp_path / "g.png"
+    result = canmon(log, "185[0]", "-o", str(file))
+    said = f"Error: {file}: PNG needs matplotlib: pip install 'tickrig[plot]'\n"
+    assert (result.exit_code, result.stderr, file.exists()) == (2, said, False)
 
 
 @pytest.mark.realtime

@@ -106,6 +106,9 @@ class Unplugged(can.BusABC):
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         raise can.CanOperationError("Network is down")
 
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        raise can.CanOperationError("Network is down")
+
 
 def test_a_bus_that_is_gone_ends_with_status_3(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("can.interfaces.virtual.VirtualBus.send", Unplugged.send)
@@ -230,6 +233,16 @@ def test_a_sequence_that_is_not_answered_ends_with_status_1(wire: Wire, tmp_path
     result = canmon("seq", wire.word, str(path), "-q")
     assert result.exit_code == 1
     assert result.stdout.endswith(f" ? {path}:2: no 705#05 within 2 ms\n")
+
+
+def test_a_bus_that_is_gone_ends_a_sequence_with_status_3(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text('[[step]]\nexpect = "705#05"\n')
+    monkeypatch.setattr("can.interfaces.virtual.VirtualBus.recv", Unplugged.recv)
+    result = canmon("seq", "virtual:alone", str(path))
+    assert (result.exit_code, result.stderr) == (3, "Error: alone: Network is down\n")
 
 
 def test_a_dry_run_opens_no_bus(start: str) -> None:
