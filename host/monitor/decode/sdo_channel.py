@@ -86,9 +86,10 @@ class SdoChannel:
         if running and is_block_segment(running, Direction.DOWNLOAD, data):
             return Step(take_block_segment(running, data), running.entry)
         try:
-            return self._step(at_us, self._take_request(at_us, parse_request(data), data))
+            message = parse_request(data)
         except WireError as error:
             return Step(str(error))
+        return self._step(at_us, self._take_request(at_us, message, data), message)
 
     def response(self, at_us: int, data: bytes) -> Step:
         """Take a frame of the server."""
@@ -96,18 +97,21 @@ class SdoChannel:
         if running and is_block_segment(running, Direction.UPLOAD, data):
             return Step(take_block_segment(running, data), running.entry)
         try:
-            return self._step(at_us, self._take_response(at_us, parse_response(data)))
+            message = parse_response(data)
         except WireError as error:
             return Step(str(error))
+        return self._step(at_us, self._take_response(at_us, message), message)
 
-    def _step(self, at_us: int, text: str) -> Step:
+    def _step(self, at_us: int, text: str, message: Request | Response) -> Step:
         """Close what is done, and tell what ended."""
         running = self._running
         if running and running.done:
             self._end(running.close(at_us, Outcome.DONE))
         ended, self._ended = tuple(self._ended), []
-        entry = ended[-1].entry if ended else None
-        return Step(text, self._running.entry if self._running else entry, ended)
+        entry = _named(message)
+        if entry is None:
+            entry = running.entry if running else None
+        return Step(text, entry, ended)
 
     def _end(self, transfer: Transfer) -> None:
         self._latest, self._running = transfer, None
@@ -194,6 +198,12 @@ class SdoChannel:
         code = message.code
         self._end(running.close(at_us, Outcome.ABORTED, code=code, by_client=by_client))
         return "aborted"
+
+
+def _named(message: Request | Response) -> tuple[int, int] | None:
+    """Return the index and sub-index that a frame names itself."""
+    index, sub = getattr(message, "index", None), getattr(message, "sub", None)
+    return None if index is None or sub is None else (index, sub)
 
 
 def _given_up(running: OpenTransfer, at_us: int) -> Transfer:

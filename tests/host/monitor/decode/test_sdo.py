@@ -155,6 +155,11 @@ def test_a_late_answer_leaves_the_next_transfer_alone() -> None:
     assert (done.partial, done.entry, done.value) == (False, (0x1001, 0), 7)
 
 
+def test_a_frame_that_names_an_object_is_about_that_one() -> None:
+    late = last("605#4000100000000000 605#4001100000000000 585#4300100092010200")
+    assert late.entry == (0x1000, 0)
+
+
 def test_segments_of_an_upload_without_beginning_are_a_value_of_an_unknown_object() -> None:
     (found,) = transfers("605#7000000000000000 585#1173697800000000")
     assert (found.entry, found.partial, found.data) == (None, True, b"six\0\0\0\0")
