@@ -1,4 +1,4 @@
-"""The golden trace of a drive, and what decoders made of it."""
+"""The golden traces, and what decoders made of them."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from tickrig.wire.candump import parse_log
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "canmon"
 TRACE = GOLDEN / "drive.log"
+NOISE = GOLDEN / "noise.log"
 
 
-def heard() -> list[Heard]:
+def heard(path: Path = TRACE) -> list[Heard]:
     """Return the frames."""
-    return [Heard(*line) for line in parse_log(TRACE.read_text())]
+    return [Heard(*line) for line in parse_log(path.read_text())]
 
 
-def decoded() -> list[Decoded]:
+def decoded(path: Path = TRACE) -> list[Decoded]:
     """Return what our decoder says of each."""
     decoder = Decoder()
-    return [decoder.take(item) for item in heard()]
+    return [decoder.take(item) for item in heard(path)]
 
 
 def peer(name: str) -> list[dict[str, str]]:

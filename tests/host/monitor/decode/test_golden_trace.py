@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.host.monitor.decode.drive_trace import GOLDEN, decoded, heard, line, peer
+from tests.host.monitor.decode.drive_trace import GOLDEN, NOISE, decoded, heard, line, peer
 
 WIRESHARK_KINDS = {
     "nmt": ("NMT:",),
@@ -17,6 +17,13 @@ WIRESHARK_KINDS = {
     "tpdo1": ("PDO1 (tx)",),
     "rpdo1": ("PDO1 (rx)",),
     "unmapped": ("PDO2 (tx)",),
+}
+NUMBERS = {
+    "emcy": ("canopen.em.err_code", "canopen.em.err_reg"),
+    "heartbeat": ("canopen.nmt_guard.state",),
+    "boot-up": ("canopen.nmt_guard.state",),
+    "guard": ("canopen.nmt_guard.state",),
+    "time": ("canopen.time_stamp_days", "canopen.time_stamp_ms"),
 }
 LENS_KINDS = {"boot-up": "HEARTBEAT", "guard": "HEARTBEAT", "unmapped": "TPDO2"}
 
@@ -53,6 +60,21 @@ def test_wireshark_sees_the_same_abort_codes_emcys_and_states() -> None:
             assert mine.signals[0].value == int(error, 16)
         if state := other["canopen.nmt_guard.state"]:
             assert mine.signals[0].value == int(state, 16)
+
+
+def test_wireshark_reads_noise_in_the_same_way() -> None:
+    for mine, other in zip(decoded(NOISE), peer("noise.tshark.txt"), strict=True):
+        kinds = ("PDO",) if mine.kind == "unmapped" else WIRESHARK_KINDS[mine.kind]
+        assert other["_ws.col.Info"].startswith(kinds)
+        if mine.node is not None and mine.kind != "nmt":
+            assert mine.node == int(other["canopen.node_id"], 16)
+        if code := other["canopen.sdo.abort_code"]:
+            assert mine.transfers[-1].abort_code == int(code, 16)
+        if index := other["canopen.sdo.main_idx"]:
+            assert mine.entry == (int(index, 16), int(other["canopen.sdo.sub_idx"], 16))
+        values = [signal.value for signal in mine.signals]
+        if columns := NUMBERS.get(mine.kind):
+            assert values == [int(other[column], 0) for column in columns]
 
 
 def test_canopen_lens_sees_the_same_services() -> None:
