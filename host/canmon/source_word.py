@@ -63,7 +63,7 @@ def parse_source(word: str) -> FileWord | BusWord | None:
     path = Path(name)
     if path.is_file() or path.suffix.lower() in (*SUFFIXES, COMPRESSED):
         return _file(name, filters)
-    if path.is_dir():
+    if name and path.is_dir():
         raise Refused(f"SOURCE {name!r} is a folder")
     return _bus(name, filters)
 
