@@ -77,8 +77,7 @@ def command(
             _one_by_one(frames, checker, verdict, span_us or patience_us(frames, words))
     finally:
         frames.close()
-    if report_path is not None:
-        _write(report_path, junit(" ".join(words), rules.names(), verdict.findings))
+    _write(report_path, junit(" ".join(words), rules.names(), verdict.findings))
     click.echo(verdict.summary(), err=True)
     report(frames, strict)
     if verdict.findings:
@@ -155,7 +154,9 @@ def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int
     verdict.take(checker.end(watch.now_us if source.live else watch.latest_us, lost))
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path | None, text: str) -> None:
+    if path is None:
+        return
     try:
         path.write_text(text, "utf-8")
     except OSError as error:

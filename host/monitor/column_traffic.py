@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from tickrig.host.monitor.bits import BitRow
 from tickrig.host.monitor.column_bits import column_bits
 from tickrig.host.monitor.column_changes import column_changes
 from tickrig.host.monitor.column_gaps import column_gaps
 from tickrig.host.monitor.column_rows import by_channel, frames_of, heards, select
 from tickrig.host.monitor.controller import Controller
+from tickrig.host.monitor.gaps import Gaps
+from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.ident import ERROR
 from tickrig.host.monitor.load import WINDOW_US, Load, Window
 from tickrig.host.monitor.logs.columns import Columns
@@ -80,27 +83,31 @@ def _id_rows(channel: str, frames: Columns, bits: Ints) -> list[IdRow]:
         return []
     runs = Runs.of(frames.ident)
     gaps_us = runs.gaps_us(frames.at_us)
-    changes = column_changes(runs, frames.payload)
-    run_bits = runs.sums(bits[runs.order]).tolist()
-    firsts_us = frames.at_us[runs.order[runs.begins]].tolist()
-    latest = heards(frames, runs.order[runs.ends - 1])
-    last_gaps_us = gaps_us[runs.ends - 1].tolist()
-    rows = []
-    for run, gaps in enumerate(column_gaps(runs, gaps_us)):
-        frame = latest[run].frame
-        assert isinstance(frame, CanFrame)
-        rows.append(
-            IdRow(
-                channel,
-                int(runs.idents[run]),
-                gaps.count + 1,
-                firsts_us[run],
-                latest[run].at_us,
-                frame,
-                last_gaps_us[run] if gaps.count else None,
-                gaps.row(),
-                run_bits[run],
-                changes[run],
-            )
-        )
-    return rows
+    columns = zip(
+        runs.idents.tolist(),
+        frames.at_us[runs.order[runs.begins]].tolist(),
+        heards(frames, runs.order[runs.ends - 1]),
+        gaps_us[runs.ends - 1].tolist(),
+        column_gaps(runs, gaps_us),
+        runs.sums(bits[runs.order]).tolist(),
+        column_changes(runs, frames.payload),
+        strict=True,
+    )
+    return [_id_row(channel, *values) for values in columns]
+
+
+def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
+    channel: str,
+    ident: int,
+    first_us: int,
+    latest: Heard,
+    gap_us: int,
+    gaps: Gaps,
+    bits: int,
+    changed: BitRow,
+) -> IdRow:
+    frame = latest.frame
+    assert isinstance(frame, CanFrame)
+    known_us = gap_us if gaps.count else None
+    times = (gaps.count + 1, first_us, latest.at_us)
+    return IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)

@@ -24,7 +24,7 @@ NODE_MASK: Final = 0x7F
 
 
 class FrameRule:
-    """A rule that is about frames only: none that is missing breaks it.
+    """A rule with nothing to say at the end, unless it has an `end` of its own.
 
     Attributes:
         name: as findings have it.
