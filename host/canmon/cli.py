@@ -16,10 +16,12 @@ VERBS: Final[dict[str, str]] = {
     "top": "top",
     "stats": "stats",
     "check": "check",
+    "graph": "graph",
     "nodes": "nodes",
     "send": "send",
     "seq": "seq",
     "play": "play",
+    "tui": "tui_verb",
 }
 """Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 

@@ -6,7 +6,8 @@ The decoder is imported when it is wanted: a verb that does without starts faste
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -47,21 +48,39 @@ filter_option: Final = click.option(
 
 def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
     """Read what `--eds` names; Refused if there is no such node or file, or it is no EDS."""
-    return {node: _read(node, path) for node, path in map(_split, words)}
+    return read_eds_paths(eds_paths(words))
+
+
+def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
+    """Read files by node-ID; Refused if one cannot be read, or is no EDS."""
+    return {node: _read(node, path) for node, path in paths.items()}
 
 
 def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
     """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
-    from tickrig.host.monitor.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
-    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415
+    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - slow
 
     objects = read_eds_files(eds)
-    try:
+    with refusing_dbc():
         return Decoder(objects, dbc)
+
+
+@contextmanager
+def refusing_dbc() -> Iterator[None]:
+    """Refuse, as `--dbc` does, files that are no DBC."""
+    from tickrig.host.monitor.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
+
+    try:
+        yield
     except OSError as error:
         refuse_path("--dbc", error)
     except DbcError as error:
         raise Refused(f"--dbc {error}") from None
+
+
+def eds_paths(words: Sequence[str]) -> dict[int, Path]:
+    """Return the files that `--eds` names, by node-ID; Refused if a word is wrong."""
+    return dict(map(_split, words))
 
 
 def read_filter(text: str | None) -> Filter | None:

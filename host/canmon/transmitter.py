@@ -50,11 +50,7 @@ class Transmitter:
 
     def send(self, frame: CanFrame) -> None:
         """Send a frame; SourceFailed if the bus is gone or takes none for 1 s."""
-        try:
-            self._bus.send(to_message(frame), SEND_TIMEOUT_S)
-        except (can.CanError, OSError, ValueError) as error:
-            reason = " ".join(str(error).split())
-            raise SourceFailed(f"cannot send on {self.name}: {reason}") from error
+        send_on(self._bus, self.name, frame)
 
     def poll(self, timeout_us: int) -> list[Heard]:
         """Wait for a first frame, then return all that are there.
@@ -74,6 +70,15 @@ class Transmitter:
             self._bus.shutdown()
         else:
             self._source.close()
+
+
+def send_on(bus: can.BusABC, name: str, frame: CanFrame) -> None:
+    """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
+    try:
+        bus.send(to_message(frame), SEND_TIMEOUT_S)
+    except (can.CanError, OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise SourceFailed(f"cannot send on {name}: {reason}") from error
 
 
 @contextmanager

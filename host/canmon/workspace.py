@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.monitor.toml_place import line_of
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
     from tomlkit.container import Container
     from tomlkit.items import Table
+
+
+NEW_MODE: Final = 0o644
 
 
 class SettingError(ValueError):
@@ -78,6 +81,10 @@ class Workspace:
         except UnicodeDecodeError:
             raise WorkspaceError(f"{path} is no text") from None
 
+    def sections(self) -> list[str]:
+        """Return the names of all sections."""
+        return list(self._document)
+
     def section(self, name: str) -> dict[str, Any]:
         """Return the settings of a section; empty if it is not there.
 
@@ -106,35 +113,33 @@ class Workspace:
         """All of it, as it would be written."""
         return self._document.as_string()
 
-    def write(self) -> bool:
+    def write(self, *, over: bool = False) -> bool:
         """Write the file if anything has changed; return whether it has.
+
+        Args:
+            over: whatever is in the file now.
 
         Raises:
             WorkspaceError: it cannot be written, or is not as it was last read or written.
         """
         text, path = self.text, self.path
-        if path is None or text == self._text:
+        if path is None or (text == self._text and not over):
             return False
         try:
-            if path.exists() and path.read_bytes() != self._text.encode():
+            if not over and self._differs(path):
                 raise WorkspaceError(f"{path} was changed by somebody else: not saved")
-            _replace(path, text)
+            _replace(path.resolve(), text)
         except OSError as error:
             raise WorkspaceError(f"{path}: {error.strerror}: not saved") from None
         self._text = text
         return True
 
-    def export(self, path: Path) -> None:
-        """Write it to another file, over what is there, and keep to that file from now on.
-
-        Raises:
-            WorkspaceError: it cannot be written.
-        """
+    def _differs(self, path: Path) -> bool:
+        """Say whether a file is not as it was last read or written."""
         try:
-            _replace(path, self.text)
-        except OSError as error:
-            raise WorkspaceError(f"{path}: {error.strerror}: not saved") from None
-        self.path, self._text = path, self.text
+            return path.read_bytes() != self._text.encode()
+        except FileNotFoundError:
+            return False
 
 
 def _reason(error: Exception) -> str:
@@ -173,16 +178,15 @@ def _are_tables(value: object) -> bool:
 
 
 def _replace(path: Path, text: str) -> None:
+    """Write a file beside it and put that in its place."""
+    mode = path.stat().st_mode & 0o777 if path.exists() else NEW_MODE
     with NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
         beside = Path(file.name)
         try:
             file.write(text.encode())
             file.flush()
             os.fsync(file.fileno())
-            if path.exists():
-                beside.chmod(path.stat().st_mode & 0o777)
-            else:
-                beside.chmod(0o644)
+            beside.chmod(mode)
             beside.replace(path)
         except BaseException:
             beside.unlink(missing_ok=True)

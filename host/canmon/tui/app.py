@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import sys
 from collections.abc import Sequence
 from typing import ClassVar, Final
 
+import click
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Footer, TabbedContent, TabPane
 
+from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.tui.bench import Bench
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.status_line import StatusLine
+from tickrig.host.canmon.workspace import Workspace
 
 PAINT_S: Final = 0.1
+SAVE_S: Final = 2.0
+SWITCH_S: Final = 0.000_5
+"""How long the screen may keep the session from running."""
+
 ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -25,6 +34,7 @@ class Monitor(App[None]):
     Args:
         session: what is heard, and how to send; it is started by whoever runs the app.
         panels: the tabs.
+        bench: keeps their settings; without one nothing is kept until it is exported.
     """
 
     TITLE = "canmon"
@@ -41,9 +51,12 @@ class Monitor(App[None]):
         Binding("ctrl+c", "quit", "quit", show=False, priority=True),
     ]
 
-    def __init__(self, session: Session, panels: Sequence[Panel]) -> None:
+    def __init__(
+        self, session: Session, panels: Sequence[Panel], bench: Bench | None = None
+    ) -> None:
         super().__init__()
         self.session, self.panels = session, tuple(panels)
+        self.bench = bench or Bench(Workspace(), BenchSetup(), panels)
 
     def compose(self) -> ComposeResult:
         """Lay out the tabs."""
@@ -60,6 +73,28 @@ class Monitor(App[None]):
         for number in ENDING:
             loop.add_signal_handler(number, self.exit)
         self.set_interval(PAINT_S, self.look)
+        self.set_interval(SAVE_S, self.save)
+        if unknown := self.bench.unknown():
+            self.notify(f"not known here, and kept: {', '.join(unknown)}", severity="warning")
+
+    def run_session(self) -> None:
+        """Read the source in a thread and show the panels until they are left."""
+        before_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
+        self.session.start()
+        try:
+            self.run()
+        finally:
+            self.session.close()
+            sys.setswitchinterval(before_s)
+        self.session.check()
+        if trouble := self.bench.save():
+            click.echo(trouble, err=True)
+
+    def save(self) -> None:
+        """Keep the settings."""
+        if trouble := self.bench.save():
+            self.notify(trouble, severity="error", timeout=10)
 
     @property
     def shown(self) -> Panel:

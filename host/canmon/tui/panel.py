@@ -59,5 +59,8 @@ class Panel(Vertical):
         """
 
     def save(self) -> dict[str, Any]:
-        """Return its settings as TOML values: tables, arrays, text, numbers, truth."""
+        """Return all its settings as TOML values: tables, arrays, text, numbers, truth.
+
+        It is asked also while the panel is on no screen: do not look at widgets.
+        """
         return {}
