@@ -59,7 +59,7 @@ def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
         rules = parse_rules(joined(words, given))
     except ValueError as error:
         raise Refused(str(error)) from None
-    if rules == Rules():
+    if rules == Rules(bit_rate=rules.bit_rate):
         raise Refused("no rule: give --no-emcy, --max-load or others, or a file rules.toml")
     return rules
 

@@ -22,6 +22,8 @@ ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
 
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
 TERMINAL: Final = "/dev/tty"
+CONTROL_CHARACTERS: Final = 6
+"""Their place in what `termios.tcgetattr` returns."""
 
 
 class Screen:
@@ -42,6 +44,9 @@ class Screen:
     def __enter__(self) -> Self:
         """Take the terminal."""
         tty.setcbreak(self._terminal)
+        modes = termios.tcgetattr(self._terminal)
+        modes[CONTROL_CHARACTERS][termios.VSUSP] = b"\0"  # Ctrl-Z would leave it half taken
+        termios.tcsetattr(self._terminal, termios.TCSANOW, modes)
         self._write(ENTER)
         return self
 

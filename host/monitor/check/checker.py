@@ -63,6 +63,10 @@ class Checker:
         found = [one for channel, window in windows for one in self.judge_window(channel, window)]
         return found + ended(self._rules, self._made, _latest(self._last_us), end_us, lost)
 
+    def missing(self, now_us: int) -> list[Finding]:
+        """Return what is missing until now; listening goes on."""
+        return ended(self._rules, self._made, _latest(self._last_us), now_us, ())
+
     def judge_window(self, channel: str, window: Window) -> list[Finding]:
         """Return what is wrong with a second of a bus."""
         text = self._load.judge(channel, window) if self._load else None

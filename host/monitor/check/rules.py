@@ -25,6 +25,7 @@ class Rules:
 
     Attributes:
         max_load: percent of the bit rate in any second, None for no limit.
+        bit_rate: bits a second, where nothing else tells it; no rule by itself.
         no_emcy: no EMCY but error reset.
         no_sdo_abort: no aborted SDO transfer.
         no_error_frames: no error frame.
@@ -37,6 +38,7 @@ class Rules:
     """
 
     max_load: float | None = None
+    bit_rate: int | None = None
     no_emcy: bool = False
     no_sdo_abort: bool = False
     no_error_frames: bool = False
@@ -69,6 +71,7 @@ class Rules:
         """Return the rule about load; ValueError if it needs a bit rate and there is none."""
         if self.max_load is None:
             return None
+        bit_rate = self.bit_rate if bit_rate is None else bit_rate
         if bit_rate is None:
             raise ValueError("a limit of the load needs the bit rate: give -b, as -b 500000")
         return MaxLoad(self.max_load, bit_rate)

@@ -15,7 +15,9 @@ Words = Mapping[str, object]
 """Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
 
 SWITCHES: Final = ("no_emcy", "no_sdo_abort", "no_error_frames", "no_reboot", "no_loss")
-VALUES: Final = ("max_load", "heartbeat", "nodes", "max_gap", "known")
+NUMBERS: Final = ("max_load", "bitrate")
+LISTS: Final = ("heartbeat", "nodes", "max_gap", "known")
+VALUES: Final = (*NUMBERS, *LISTS)
 
 _HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
 _MAX_NODE: Final = 127
@@ -42,6 +44,7 @@ def parse_rules(words: Words) -> Rules:
     return Rules(
         **switches,
         max_load=_percent(words.get("max_load")),
+        bit_rate=_bit_rate(words.get("bitrate")),
         heartbeats=tuple(_heartbeat(text) for text in _texts("heartbeat", words)),
         nodes=tuple(sorted(nodes)),
         max_gaps=tuple((parse_ident(ident), _time_us(time)) for ident, _, time in gaps),
@@ -57,7 +60,7 @@ def joined(first: Words, second: Words) -> Words:
     """
     out = dict(first)
     for name, value in second.items():
-        both = name in VALUES[1:] and name in first
+        both = name in LISTS and name in first
         out[name] = [*_texts(name, first), *_texts(name, second)] if both else value
     return out
 
@@ -73,6 +76,14 @@ def _percent(value: object) -> float | None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
         raise ValueError(f"max_load {value!r} is not 0 to 100 percent")
+    return value
+
+
+def _bit_rate(value: object) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or value <= 0:
+        raise ValueError(f"bitrate {value!r} is not a number of bits a second, as 500000")
     return value
 
 

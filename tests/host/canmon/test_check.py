@@ -117,6 +117,13 @@ def test_the_load_is_checked_against_the_bit_rate(log: str) -> None:
     assert result.stdout == "(1.000000) max-load: can0: load 3.0 %, at most 1 % is right\n"
 
 
+def test_a_rule_file_may_name_the_bit_rate(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", "max_load = 1\nbitrate = 10000\n")
+    assert check(log, rules).exit_code == 1
+    assert check(log, rules, "-b", "1000000").exit_code == 0
+    assert check(log, write(tmp_path / "none.toml", "bitrate = 10000\n")).exit_code == 2
+
+
 def test_a_source_may_name_the_bit_rate() -> None:
     words = ("--for", "50ms", "--max-load", "50")
     assert check("virtual:check@500k", *words).exit_code == 0

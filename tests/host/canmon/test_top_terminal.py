@@ -74,6 +74,15 @@ def test_the_modes_of_the_terminal_come_back(bus: can.BusABC) -> None:
     assert terminal.end() == 0
 
 
+def test_it_cannot_be_left_half_by_ctrl_z(bus: can.BusABC) -> None:
+    terminal = top()
+    terminal.child.sendcontrol("z")
+    send(bus, 0x181, "DEAD")
+    terminal.wait_for("DE AD")
+    by_key(terminal)
+    assert terminal.end() == 0
+
+
 def test_a_wider_window_has_more_columns(bus: can.BusABC) -> None:
     terminal = top(columns=60)
     assert "jitter" not in terminal.text()

@@ -21,6 +21,7 @@ from tickrig.wire.can import CanFrame
 RULES = parse_rules(
     {
         "max_load": 10,
+        "bitrate": 500_000,
         "no_emcy": True,
         "no_sdo_abort": True,
         "no_error_frames": True,

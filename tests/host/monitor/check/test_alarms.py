@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import pytest
+
+from tests.host.monitor.heard_log import hear
+from tickrig.host.monitor.check.alarm_text import render_alarms
+from tickrig.host.monitor.check.alarms import GRACE_US, KEPT, RECENT_US, Alarms, State
+from tickrig.host.monitor.check.words import parse_rules
+
+S = 1_000_000
+
+
+def alarms(**words: object) -> Alarms:
+    made = Alarms(parse_rules(words))
+    made.look(0)
+    return made
+
+
+def taken(made: Alarms, text: str) -> Alarms:
+    for heard in hear(text):
+        made.take(heard)
+        made.look(heard.at_us)
+    return made
+
+
+def states(made: Alarms, now_us: int) -> list[State]:
+    made.look(now_us)
+    return [alarm.state(now_us) for alarm in made.rows()]
+
+
+def test_a_rule_is_broken_for_a_while_and_then_was_until_it_is_acknowledged() -> None:
+    made = taken(alarms(no_emcy=True), "1.0 083#3081110000000000")
+    assert states(made, S + RECENT_US - 1) == [State.BROKEN]
+    assert made.broken(S) == 1
+    assert states(made, S + RECENT_US) == [State.WAS_BROKEN]
+    made.acknowledge()
+    assert states(made, S + RECENT_US) == [State.HOLDS]
+    assert [alarm.count for alarm in made.rows()] == [1]
+
+
+def test_a_heartbeat_that_stops_is_one_finding_however_long_it_lasts() -> None:
+    made = taken(alarms(heartbeat="5=100ms±20%"), "2.9 705#05\n3.0 705#05")
+    assert states(made, 3 * S + 120_000) == [State.HOLDS]
+    for now_us in range(3_200_000, 9_000_000, 100_000):
+        assert states(made, now_us) == [State.BROKEN]
+    (alarm,) = made.rows()
+    assert (alarm.count, len(made.findings)) == (1, 1)
+    assert alarm.finding is not None
+    assert alarm.finding.text.startswith("node 5: 5900.0 ms since its last heartbeat")
+
+
+def test_a_heartbeat_that_is_back_was_broken() -> None:
+    made = taken(alarms(heartbeat="5=100ms±20%"), "3.0 705#05")
+    made.look(5 * S)
+    for now_us in range(50, 80):
+        taken(made, f"{now_us / 10} 705#05")
+    assert states(made, 7_950_000) == [State.WAS_BROKEN]
+
+
+def test_what_has_never_come_is_missed_after_a_time_of_grace() -> None:
+    made = alarms(nodes="3,4")
+    assert states(made, GRACE_US - 1) == [State.HOLDS]
+    assert states(made, GRACE_US) == [State.BROKEN]
+    assert made.findings[0].text == "node 3 was never heard; node 4 was never heard"
+
+
+def test_frames_that_get_lost_are_found_as_they_do() -> None:
+    made = alarms(no_loss=True)
+    made.look(S, 5)
+    made.look(2 * S, 5)
+    assert [finding.text for finding in made.findings] == ["5 frames were lost"]
+
+
+def test_a_loss_before_the_rules_is_none_of_theirs() -> None:
+    made = Alarms(parse_rules({"no_loss": True}))
+    made.look(0, 7)
+    assert not made.findings
+
+
+def test_clearing_begins_anew() -> None:
+    made = taken(alarms(no_emcy=True), "1.0 083#3081110000000000")
+    made.clear()
+    assert (states(made, S), list(made.findings)) == ([State.HOLDS], [])
+
+
+def test_only_the_latest_findings_are_kept_and_all_are_counted() -> None:
+    made = alarms(no_error_frames=True)
+    taken(made, "1.0 20000004#0000000000000000\n" * (KEPT + 1))
+    assert (len(made.findings), made.rows()[0].count) == (KEPT, KEPT + 1)
+
+
+def test_a_limit_of_the_load_needs_the_bit_rate() -> None:
+    with pytest.raises(ValueError, match="needs the bit rate"):
+        Alarms(parse_rules({"max_load": 50}))
+
+
+TABLE = """\
+RULE                 STATE       COUNT      AGO  LATEST
+no-emcy              BROKEN          1    0.5 s  node 3: EMCY 8130h life guard error or heartbeat error
+no-reboot            holds           0
+
+FINDINGS, latest first: 1
+(1.000000) no-emcy: node 3: EMCY 8130h life guard error or heartbeat error [can0 083#3081110000000000]"""  # noqa: E501 - as it is shown
+
+
+def test_alarms_are_shown_like_this() -> None:
+    made = taken(alarms(no_emcy=True, no_reboot=True), "1.0 083#3081110000000000")
+    assert "\n".join(render_alarms(made, 1_500_000)) == TABLE
