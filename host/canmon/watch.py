@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.sequence.heard_condition import HeardCondition
 from tickrig.host.monitor.sequence.steps import Condition
 
 
@@ -21,19 +20,12 @@ class Watch:
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
         self.eds = eds
-        self._decoder = Decoder(eds)
-        self._latest: tuple[Heard, Decoded] | None = None
+        self._decoder, self._latest = Decoder(eds), HeardCondition()
 
     def take(self, heard: Heard) -> None:
         """Decode a frame; conditions are asked about it next."""
-        self._latest = heard, self._decoder.take(heard)
+        self._latest.take(heard, self._decoder.take(heard))
 
     def condition(self, text: str) -> Condition:
         """Return the condition of a filter expression; ValueError if it is none."""
-        chosen = parse_filter(text)
-
-        def matches(heard: Heard) -> bool:
-            latest = self._latest
-            return latest is not None and latest[0] is heard and chosen.matches(*latest)
-
-        return Condition(text, matches)
+        return self._latest.condition(text)

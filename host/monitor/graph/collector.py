@@ -35,18 +35,36 @@ class Collector:
     def __init__(
         self, words: Sequence[SignalWord], decoder: Decoder | None = None, most: int = 0
     ) -> None:
-        self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
-        self._decoder = decoder
+        self.series: list[Series] = []
+        self._decoder, self._most = decoder, most
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
         self._objects: list[_Object] = []
-        for word, series in zip(words, self.series, strict=True):
-            if isinstance(word.source, FrameSlice):
-                self._slices[word.source.key].append((word.source, series))
-            else:
-                self._objects.append(_Object(word, word.source, series))
+        for word in words:
+            self.add(word)
+
+    def add(self, word: SignalWord) -> None:
+        """Take the values of one more signal from now on."""
+        series = Series(word.label or word.text, word.axis, most=self._most)
+        self.series.append(series)
+        if isinstance(word.source, FrameSlice):
+            self._slices[word.source.key].append((word.source, series))
+        else:
+            self._objects.append(_Object(word, word.source, series))
+
+    def remove(self, number: int) -> None:
+        """Forget a signal."""
+        gone = self.series.pop(number)
+        for pairs in self._slices.values():
+            pairs[:] = [pair for pair in pairs if pair[1] is not gone]
+        self._objects = [wanted for wanted in self._objects if wanted.series is not gone]
 
     def take(self, heard: Heard) -> None:
         """Take the values in a frame."""
+        wanted = self._objects and self._decoder
+        self.take_meant(heard, wanted.take(heard) if wanted else None)
+
+    def take_meant(self, heard: Heard, decoded: Decoded | None) -> None:
+        """Take the values in a frame that somebody has decoded, or whose objects nobody wants."""
         at_us, _, frame, _ = heard
         if not isinstance(frame, ErrorFrame) and not frame.remote:
             key = frame.can_id | EXTENDED if frame.extended else frame.can_id
@@ -54,11 +72,9 @@ class Collector:
                 value = cut.value(frame.data)
                 if value is not None:
                     series.append(at_us, value)
-        if self._objects and self._decoder is not None:
-            decoded = self._decoder.take(heard)
-            if decoded.signals:
-                for wanted in self._objects:
-                    wanted.take(at_us, decoded)
+        if decoded is not None and decoded.signals:
+            for wanted in self._objects:
+                wanted.take(at_us, decoded)
 
     def take_all(self, heards: Iterable[Heard]) -> None:
         """Take the values in frames."""
@@ -79,7 +95,7 @@ class _Object:
     """An object that is waited for."""
 
     def __init__(self, word: SignalWord, wanted: ObjectName, series: Series) -> None:
-        self._word, self._wanted, self._series = word, wanted, series
+        self._word, self._wanted, self.series = word, wanted, series
         self._found: tuple[int | None, str] | None = None
 
     def take(self, at_us: int, decoded: Decoded) -> None:
@@ -91,15 +107,15 @@ class _Object:
             if self._found is None and signal.name.lower().startswith(self._wanted.name):
                 self._find(place, signal.unit)
             if place == self._found and (value := self._wanted.value(signal)) is not None:
-                self._series.append(at_us, value)
+                self.series.append(at_us, value)
 
     def _find(self, place: tuple[int | None, str], unit: str) -> None:
         """Keep to the first that fits, and call the curve so."""
         self._found = place
         if self._wanted.bit is None:
-            self._series.unit = unit
+            self.series.unit = unit
         if not self._word.label:
             node, name = place
             begun = self._word.text.lower().rfind(self._wanted.name)
             bit = self._word.text[begun + len(self._wanted.name) :]
-            self._series.label = f"{'' if node is None else f'{node}.'}{name}{bit}"
+            self.series.label = f"{'' if node is None else f'{node}.'}{name}{bit}"
