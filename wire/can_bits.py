@@ -68,7 +68,11 @@ def _checksum(stream: bytes) -> bytes:
 
 
 def crc16(stream: bytes) -> int:
-    """Return the CRC of a bit stream, times two."""
+    """Return the CRC of a bit stream, times two.
+
+    >>> crc16(bytes([1])) == CRC_POLYNOMIAL << 1
+    True
+    """
     crc: int = _crc16(stream)
     return crc
 
