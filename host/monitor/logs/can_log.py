@@ -56,14 +56,16 @@ class CanLogReader:
     def __iter__(self) -> Iterator[Heard]:
         """Read the file."""
         self.tally = Tally()
+        names: dict[Any, str] = {}
         for message in self._messages():
-            heard = to_heard(message, self._channel(message), self.tally)
+            if message.channel not in names:
+                names[message.channel] = self._name(message.channel)
+            heard = to_heard(message, names[message.channel], self.tally)
             if heard is not None:
                 yield heard
 
-    def _channel(self, message: can.Message) -> str:
+    def _name(self, channel: object) -> str:
         """Return the name of a bus; of TRC alone python-can leaves the count from one."""
-        channel = message.channel
         if self._kind is LogFormat.TRC and isinstance(channel, int) and channel > 0:
             return channel_name(channel - 1)
         return channel_name(channel)
