@@ -30,6 +30,7 @@ class Links:
     ) -> None:
         self._nodes, self._note = nodes, note
         self.links = list(links)
+        self._made: dict[PdoLink, int] = {}  # by which CAN-ID
 
     def add(self, now_us: int, link: PdoLink) -> None:
         """Want a link, and make it; ServerRefused if it cannot be now."""
@@ -46,11 +47,14 @@ class Links:
             raise ServerRefused(f"{link.source} and {link.target} are not linked")
         own = self.layout(link.target).cob_id
         self.links.remove(link)
+        self._made.pop(link, None)
         self._write(now_us, link, own, linked=False)
 
     def make(self, now_us: int, node_id: int) -> None:
-        """Make those of a node that has become ready."""
+        """Make those of a node that has become ready; a target that stayed still has its own."""
         for link in self.links:
+            if link.target.node == node_id:
+                self._made.pop(link, None)
             ends = (link.source.node, link.target.node)
             if node_id in ends and all(self._ready(end) for end in ends):
                 try:
@@ -81,7 +85,9 @@ class Links:
 
     def _make(self, now_us: int, link: PdoLink) -> None:
         """Give the RPDO the COB-ID of the TPDO."""
-        self._write(now_us, link, self.layout(link.source).cob_id, linked=True)
+        cob_id = self.layout(link.source).cob_id
+        if self._made.get(link) != cob_id:
+            self._write(now_us, link, cob_id, linked=True)
 
     def _write(self, now_us: int, link: PdoLink, cob_id: int, *, linked: bool) -> None:
         node, text = self._nodes[link.target.node], f"{link.source} to {link.target}"
@@ -90,6 +96,8 @@ class Links:
             for sink in node.proxy.sinks if node.proxy else ():
                 if sink.layout.index == link.target.index:
                     sink.linked = linked
+            if linked:
+                self._made[link] = cob_id
             kind = EventKind.PDO_LINKED if linked else EventKind.PDO_UNLINKED
             self._note(kind, node.entry.id, f"{text}: {cob_id:03X}h")
 

@@ -14,6 +14,7 @@ from tickrig.host.rtc.port import AnyPort
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, SystemDefinition
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import Event
+from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, proxy_index
 from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
 from tickrig.host.rtc_canopen.server import Server
 
@@ -45,11 +46,15 @@ class PdoView:
         name: as `16.tpdo2`.
         cob_id: its CAN-ID; an RPDO that is linked has that of its source meanwhile.
         bits: its length.
+        index: of its communication parameter in the device.
+        proxy_index: of the same in the proxy.
     """
 
     name: PdoName
     cob_id: int
     bits: int
+    index: int
+    proxy_index: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,10 +212,7 @@ class ServerView:
             "" if proxy is None else proxy.state.name,
             node.problem,
             tuple(_port(port) for port in proxy.ports.values()) if proxy else (),
-            tuple(
-                PdoView(PdoName(node.entry.id, pdo.name), pdo.cob_id, pdo.bits)
-                for pdo in node.layouts
-            ),
+            tuple(_pdo(node.entry.id, pdo) for pdo in node.layouts),
         )
 
 
@@ -219,3 +221,13 @@ def _port(port: AnyPort) -> PortView:
     ends = (end for connector in port.connectors for end in connector.profile.ports)
     peers = tuple(end for end in ends if end != port.full_name)
     return PortView(port.full_name, port.data_type.__name__, isinstance(port, OutPort), peers)
+
+
+def _pdo(node_id: int, layout: PdoLayout) -> PdoView:
+    return PdoView(
+        PdoName(node_id, layout.name),
+        layout.cob_id,
+        layout.bits,
+        layout.index,
+        proxy_index(layout.index),
+    )

@@ -136,3 +136,14 @@ def test_bus_off_of_the_server_leaves_all_in_error_until_they_are_reset() -> Non
     bench.server.manager.reset("Palette0", "Motor0")
     bench.run_ms(300)
     assert (bench.state(16), bench.state(32)) == (INACTIVE, INACTIVE)
+
+
+def test_a_link_is_made_again_when_its_target_comes_back_and_kept_when_its_source_does() -> None:
+    bench = running(CONNECTED + "pdo_links: [{from: 16.tpdo2, to: 32.rpdo2}]\n")
+    for node_id, links in ((16, 1), (32, 2)):
+        unplug(bench, node_id)
+        bench.run_until(EventKind.PROXY_REMOVED, node_id)
+        bench.devices[node_id].physical["unplugged"].write(0)
+        bench.run_until(EventKind.PROXY_MADE, node_id)
+        bench.run_ms(50)
+        assert len(bench.events(EventKind.PDO_LINKED)) == links

@@ -48,8 +48,8 @@ def test_a_node_is_shown_with_its_states_ports_and_pdos() -> None:
         PortView("Motor0.rpdo2", "TimedShortSeq", out=False, peers=("Palette0.tpdo2",)),
     )
     assert palette.pdos[:2] == (
-        PdoView(PdoName(16, "rpdo1"), 0x210, 8),
-        PdoView(PdoName(16, "tpdo1"), 0x190, 8),
+        PdoView(PdoName(16, "rpdo1"), 0x210, 8, 0x1400, 0x1800),
+        PdoView(PdoName(16, "tpdo1"), 0x190, 8, 0x1800, 0x1400),
     )
     view.disconnect("Palette0.tpdo2", "Motor0.rpdo2")
     assert view.nodes[1].ports[1].peers == ()
