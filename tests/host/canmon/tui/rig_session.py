@@ -1,0 +1,69 @@
+"""A session of the monitor on our EPOS-like drive as node 5, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_host import CanHost
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig, Station
+from tickrig.host.canmon.tui.model import Model
+from tickrig.host.canmon.tui.session import Session
+from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.heard import Heard
+from tickrig.wire.can import CanFrame
+
+EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
+NODE = 5
+BUS = "can0"
+
+
+class RigSource:
+    """The rig's wire as a source; its time passes while it is polled."""
+
+    live, ended, lost, failed = True, False, 0, ""
+
+    def __init__(self, host: CanHost) -> None:
+        self._host = host
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        frames: Sequence[CanFrame] = self._host.receive(max(1, timeout_us))
+        return [Heard(self._host.now_us, BUS, frame) for frame in frames]
+
+    def words(self) -> list[str]:
+        return []
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+class RigSession(Session):
+    """A session that is stepped by hand.
+
+    Attributes:
+        drive: the drive on the wire.
+        frames: what was sent, in candump text.
+    """
+
+    def __init__(self, *, eds: bool = True, bit_rate: int | None = None) -> None:
+        wire = CanWire()
+        slave = make_slave(epos.dictionary(), NODE, application=epos.make)
+        self.drive = epos.Epos.of(slave)
+        self._host = host = CanHost(Rig(Station(slave, wire.end())), wire.end())
+        self.frames: list[str] = []
+        described = {NODE: read_eds(EPOS, NODE)} if eds else {}
+        model = Model(described, bit_rate=bit_rate)
+        super().__init__(RigSource(host), model, {BUS: self._put}, lambda: host.now_us)
+
+    def _put(self, frame: CanFrame) -> None:
+        self.frames.append(str(frame))
+        self._host.send((frame,))
+
+    def run(self, span_us: int) -> None:
+        """Let time pass."""
+        end_us = self.now_us + span_us
+        while self.now_us < end_us:
+            self.step(end_us - self.now_us)
