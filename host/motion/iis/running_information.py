@@ -1,0 +1,75 @@
+"""The running information interface of IIS: how a robot moves, every 10 ms or more often."""
+
+from __future__ import annotations
+
+import logging
+from math import cos, sin
+from typing import ClassVar, Final
+
+from tickrig.host.motion.geometry import Pose, wrap
+from tickrig.host.motion.ports import arrived, to_pose
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.extended_2d import Velocity2D
+
+PERIOD_US: Final = 10_000
+"""What IIS recommends at most."""
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class RunningInformation(RtComponent):
+    """Makes velocities in the robot's frame out of its poses, and writes one each period.
+
+    A pose that is older than `timeout` says nothing any more: the velocity is then 0. Give
+    it an execution context of 100 Hz or more; slower ones are told in the log. `tm` is the
+    time of the later pose.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.timeout = self.configuration.bind("timeout", 0.1, "x>0", unit="s")
+        self.position = self.add_port(InPort("position", iis.TimedPose2D))
+        self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
+        self._forget()
+
+    def _forget(self) -> None:
+        self._pose: Pose | None = None
+        self._taken_us = self._seen_us = 0
+        self._velocity = iis.TimedVelocity2D()
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at standstill."""
+        self._forget()
+        if ec.period_us > PERIOD_US:
+            _LOG.warning(
+                "%s: period %d us, IIS recommends %d us at most",
+                *(self.instance_name, ec.period_us, PERIOD_US),
+            )
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take new poses, write the velocity."""
+        for sample in arrived(self.position):
+            if (pose := to_pose(sample.data)) is not None:
+                self._take(sample.tm, pose)
+                self._seen_us = ec.now_us
+        if ec.now_us - self._seen_us > self.timeout.value * 1e6:
+            self._velocity = iis.TimedVelocity2D(Time.from_us(ec.now_us))
+        self.velocity.write(self._velocity)
+        return ReturnCode.RTC_OK
+
+    def _take(self, tm: Time, pose: Pose) -> None:
+        before, taken_us = self._pose, tm.us
+        elapsed_s = (taken_us - self._taken_us) / 1e6
+        self._pose, self._taken_us = pose, taken_us
+        if before is None or elapsed_s <= 0:
+            return
+        turn = wrap(pose.heading - before.heading)
+        middle = before.heading + turn / 2
+        dx, dy = (pose.x - before.x) / elapsed_s, (pose.y - before.y) / elapsed_s
+        vx, vy = dx * cos(middle) + dy * sin(middle), dy * cos(middle) - dx * sin(middle)
+        self._velocity = iis.TimedVelocity2D(tm, data=Velocity2D(vx, vy, turn / elapsed_s))
