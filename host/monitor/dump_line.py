@@ -61,13 +61,13 @@ class DumpLines:
         last_us, self._last_us = self._last_us, at_us
         match self._stamp:
             case Stamp.ABSOLUTE:
-                return f" ({_seconds(at_us, 10)})"
+                return f" ({seconds_text(at_us, 10)})"
             case Stamp.DATE:
-                return f" ({_date(at_us)})"
+                return f" ({date_text(at_us)})"
             case Stamp.ZERO:
-                return f" ({_seconds(at_us - self._first_us, 3)})"
+                return f" ({seconds_text(at_us - self._first_us, 3)})"
             case Stamp.DELTA:
-                return f" ({_seconds(at_us - last_us, 3)})"
+                return f" ({seconds_text(at_us - last_us, 3)})"
             case _:
                 assert_never(self._stamp)
 
@@ -87,13 +87,14 @@ def _data(frame: CanFrame | ErrorFrame) -> str:
     return f"[{len(frame.data)}] {' ' * bool(data)}{data}"
 
 
-def _seconds(span_us: int, digits: int) -> str:
+def seconds_text(span_us: int, digits: int) -> str:
     """Write seconds; a time that runs backwards has a sign."""
     seconds, micros = divmod(abs(span_us), 1_000_000)
     return f"{'-' * (span_us < 0)}{seconds:0{digits}d}.{micros:06d}"
 
 
-def _date(at_us: int) -> str:
+def date_text(at_us: int) -> str:
+    """Write a time since the epoch as the local date and time."""
     from datetime import datetime  # noqa: PLC0415 - seldom wanted
 
     seconds, micros = divmod(at_us, 1_000_000)

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 CAPACITY: Final = 100_000
 
+Key = tuple[str, int]
+"""Bus and identifier."""
+
 
 class TraceRow(NamedTuple):
     """One frame of the trace.
@@ -36,7 +39,59 @@ class TraceRow(NamedTuple):
     decoded: Decoded | None = None
 
 
-class Trace:
+class Ring:
+    """Rows with running numbers, the latest kept.
+
+    Args:
+        capacity: how many are kept.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._rows: deque[TraceRow] = deque(maxlen=capacity)
+        self._count = 0
+
+    @property
+    def count(self) -> int:
+        """How many rows were taken."""
+        return self._count
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest row that is kept."""
+        return self._count - len(self._rows)
+
+    def append(self, row: TraceRow) -> None:
+        """Add a row at the end."""
+        self._rows.append(row)
+        self._count += 1
+
+    def rows(self, begin: int, count: int) -> list[TraceRow]:
+        """Return rows by number; those that are given up or not there yet are left out."""
+        first = min(max(begin, self.first), self._count)
+        end = min(max(begin + count, first), self._count)
+        if first - self.first < self._count - end:
+            return list(islice(self._rows, first - self.first, end - self.first))
+        found = islice(reversed(self._rows), self._count - end, self._count - first)
+        return list(found)[::-1]  # the latest are near this end
+
+    def tail(self, count: int) -> list[TraceRow]:
+        """Return the latest rows."""
+        return self.rows(self._count - count, count)
+
+    def copy(self) -> Ring:
+        """Return one that no further row is added to."""
+        found = Ring(self._rows.maxlen or CAPACITY)
+        found._rows.extend(self._rows)
+        found._count = self._count
+        return found
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._rows.clear()
+        self._count = 0
+
+
+class Trace(Ring):
     """Keeps the latest frames; what is older is given up, and counted.
 
     Times that go back count as 0.
@@ -46,59 +101,40 @@ class Trace:
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
-        self._rows: deque[TraceRow] = deque(maxlen=capacity)
-        self._latest: dict[tuple[str, int], tuple[int, int]] = {}
+        super().__init__(capacity)
+        self._latest: dict[Key, tuple[int, int]] = {}
         self._last_us: int | None = None
-        self._count = 0
-
-    @property
-    def count(self) -> int:
-        """How many frames were taken."""
-        return self._count
-
-    @property
-    def first(self) -> int:
-        """The number of the oldest frame that is kept."""
-        return self._count - len(self._rows)
 
     def take(self, heard: Heard, decoded: Decoded | None = None) -> TraceRow:
         """Add a frame at the end."""
-        at_us, channel, frame, _ = heard
-        key = channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+        at_us, _, frame, _ = heard
+        key = key_of(heard)
         payload = int.from_bytes(frame.data, "little")
         before_us, before = self._latest.get(key, (None, payload))
         row = TraceRow(
-            self._count,
+            self.count,
             heard,
             _since(at_us, self._last_us),
             _since(at_us, before_us),
             payload ^ before,
             decoded,
         )
-        self._rows.append(row)
+        self.append(row)
         self._latest[key] = at_us, payload
         self._last_us = at_us
-        self._count += 1
         return row
-
-    def rows(self, begin: int, count: int) -> list[TraceRow]:
-        """Return frames by number; those that are given up or not there yet are left out."""
-        first = min(max(begin, self.first), self._count)
-        end = min(max(begin + count, first), self._count)
-        if first - self.first < self._count - end:
-            return list(islice(self._rows, first - self.first, end - self.first))
-        found = islice(reversed(self._rows), self._count - end, self._count - first)
-        return list(found)[::-1]  # the latest are near this end
-
-    def tail(self, count: int) -> list[TraceRow]:
-        """Return the latest frames."""
-        return self.rows(self._count - count, count)
 
     def clear(self) -> None:
         """Begin anew."""
-        self._rows.clear()
+        super().clear()
         self._latest.clear()
-        self._last_us, self._count = None, 0
+        self._last_us = None
+
+
+def key_of(heard: Heard) -> Key:
+    """Return bus and identifier; error frames are a kind of their own."""
+    frame = heard.frame
+    return heard.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
 
 
 def _since(at_us: int, before_us: int | None) -> int | None:

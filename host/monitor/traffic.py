@@ -142,8 +142,9 @@ class Traffic:
         """
         at_us = self._last_us if now_us is None else now_us
         buses = [self._buses[name] for name in sorted(self._buses)]
-        return Snapshot(
-            at_us,
-            tuple(bus.row(at_us) for bus in buses),
-            tuple(row for bus in buses for row in bus.id_rows()),
-        )
+        rows = tuple(row for bus in buses for row in bus.id_rows())
+        return Snapshot(at_us, self.buses(at_us), rows)
+
+    def buses(self, now_us: int) -> tuple[BusRow, ...]:
+        """Return the rows of the buses alone, which takes less time."""
+        return tuple(self._buses[name].row(now_us) for name in sorted(self._buses))

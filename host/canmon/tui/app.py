@@ -5,20 +5,24 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
 from typing import ClassVar, Final
 
 import click
-from textual.app import App, ComposeResult
+from textual.app import App, ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
+from textual.screen import Screen
 from textual.widgets import Footer, TabbedContent, TabPane
 
 from tickrig.host.canmon.bench_setup import BenchSetup
 from tickrig.host.canmon.tui.bench import Bench
+from tickrig.host.canmon.tui.export_screen import ExportScreen
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.workspace import Workspace
+from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 
 PAINT_S: Final = 0.1
 SAVE_S: Final = 2.0
@@ -47,6 +51,7 @@ class Monitor(App[None]):
         Binding("A", "arm", "arm"),
         Binding("f9", "stop", "stop all", priority=True, key_display="F9"),
         *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
+        Binding("w", "export", "save as"),
         Binding("q,ctrl+q", "quit", "quit", key_display="q"),
         Binding("ctrl+c", "quit", "quit", show=False, priority=True),
     ]
@@ -90,6 +95,8 @@ class Monitor(App[None]):
         self.session.check()
         if trouble := self.bench.save():
             click.echo(trouble, err=True)
+        if self.return_code:
+            raise SystemExit(self.return_code)
 
     def save(self) -> None:
         """Keep the settings."""
@@ -136,6 +143,31 @@ class Monitor(App[None]):
             self.session.arm()
         else:
             self.notify("nothing is sent into a log", severity="warning")
+
+    def action_export(self) -> None:
+        """Ask for a file and keep the settings there."""
+        path = self.bench.workspace.path
+        self.push_screen(ExportScreen("" if path is None else str(path)), self._export)
+
+    def _export(self, name: str | None) -> None:
+        if name:
+            try:
+                self.bench.export(Path(name))
+            except WorkspaceError as error:
+                self.notify(str(error), severity="error")
+                return
+            self.notify(f"settings are kept in {name}")
+
+    def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
+        """Offer the tabs, and the keys of the frame and of the panel on the screen, by name."""
+        yield from super().get_system_commands(screen)
+        for number, panel in enumerate(self.panels, 1):
+            yield SystemCommand(panel.title, f"show tab {number}", partial(self.action_tab, number))
+        for owner in (self, self.shown):
+            for _, binding in owner._bindings:
+                if binding.show:
+                    run = partial(self.run_action, binding.action, owner)
+                    yield SystemCommand(binding.description, f"key {binding.key}", run)
 
     def action_stop(self) -> None:
         """Stop all that sends, at once."""

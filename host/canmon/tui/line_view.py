@@ -15,20 +15,12 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-Line = tuple[tuple[str, str], ...]
-"""Pieces of text, each with a style as `bold red`; empty for none."""
+from tickrig.host.canmon.tui.line import Line, line_text, line_width, plain
 
-CURSOR: Final = "reverse"
+__all__ = ["Line", "LineView", "line_text", "plain"]
 
-
-def plain(text: str, style: str = "") -> Line:
-    """Return a line of one piece."""
-    return ((text, style),)
-
-
-def line_text(line: Line) -> str:
-    """Return a line without its styles."""
-    return "".join(text for text, _ in line)
+KEPT_STRIPS: Final = 1_000
+"""A few screens of lines, ready to be painted again."""
 
 
 class LineView(ScrollView, can_focus=True):
@@ -41,8 +33,10 @@ class LineView(ScrollView, can_focus=True):
         begin: the number of the first of them, from 0.
     """
 
+    DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
+
     class Moved(Message):
-        """Other lines are in view."""
+        """Lines are in view that are not there."""
 
     def __init__(self, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -76,7 +70,7 @@ class LineView(ScrollView, can_focus=True):
         before, was = self.lines, self.begin
         self.lines, self.begin = list(lines), begin
         height = len(self.lines) if total is None else total
-        width = max((sum(len(text) for text, _ in line) for line in lines), default=0)
+        width = max(map(line_width, lines), default=0)
         if self.virtual_size != (size := Size(width, height)):
             self.virtual_size = size
         for number in range(self.top, self.top + self.rows):
@@ -84,9 +78,15 @@ class LineView(ScrollView, can_focus=True):
                 self.refresh_line(number - self.top)
 
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
-        """Tell that others are in view."""
+        """Tell that lines came into view that are not there."""
         super().watch_scroll_y(old_value, new_value)
-        self.post_message(self.Moved())
+        shown = min(self.rows, int(self.virtual_size.height) - self.top)
+        if self.top < self.begin or self.top + shown > self.begin + len(self.lines):
+            self.post_message(self.Moved())
+
+    def show_end(self) -> None:
+        """Scroll to the last line, at once."""
+        self.scroll_to(y=self.virtual_size.height, animate=False, immediate=True, force=True)
 
     def render_line(self, y: int) -> Strip:
         """Return what is painted on a line of the screen."""
@@ -94,7 +94,7 @@ class LineView(ScrollView, can_focus=True):
         line = self.line_at(number)
         strip = self._strips.get(line)
         if strip is None:
-            if len(self._strips) > 1_000:
+            if len(self._strips) > KEPT_STRIPS:
                 self._strips.clear()
             strip = self._strips[line] = Strip(
                 [Segment(text, Style.parse(style)) for text, style in line]

@@ -63,8 +63,3 @@ class Model:
         if meant:
             self.now_us = meant[-1][0].at_us
         return meant
-
-    def clear(self) -> None:
-        """Forget what was counted and traced; what was learnt of the nodes stays."""
-        self.top.traffic.clear()
-        self.trace.clear()

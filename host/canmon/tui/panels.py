@@ -6,6 +6,8 @@ from typing import Final
 
 from tickrig.host.canmon.tui.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
+from tickrig.host.canmon.tui.trace_panel import TracePanel
 
-PANELS: Final[tuple[type[Panel], ...]] = (NodesPanel,)
+PANELS: Final[tuple[type[Panel], ...]] = (TracePanel, NodesPanel, StatisticsPanel)
 """Key 1 shows the first, and so on."""

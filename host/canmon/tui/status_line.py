@@ -92,7 +92,7 @@ class StatusLine(Widget):
         self._counts = [*self._counts[-10:], model.frames]
         return Status(
             session.armed,
-            model.top.traffic.snapshot(model.now_us).buses,
+            model.top.traffic.buses(model.now_us),
             model.top.view.bit_rate,
             model.frames,
             model.frames - self._counts[0],
