@@ -41,6 +41,8 @@ class Rs485Line:
         buffer_bytes: size of each receiver's buffer, and of what a sender may queue.
         ends: how many stations there are.
         echo: each end hears its own bytes too.
+        bursts: a receiver takes what was sent back to back when it has ended, as one does
+            that waits for an idle line; else it takes each byte.
 
     Attributes:
         ends: the stations' ends.
@@ -52,7 +54,7 @@ class Rs485Line:
     b'who?'
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - all but the first have defaults
         self,
         baud: int = 115_200,
         frame_bits: int = 10,
@@ -60,10 +62,12 @@ class Rs485Line:
         ends: int = 2,
         *,
         echo: bool = False,
+        bursts: bool = False,
     ) -> None:
         if min(baud, frame_bits, buffer_bytes) < 1 or ends < 2:
             raise ValueError("baud rate, frame bits and buffer size must be at least 1, ends 2")
         self._baud, self._byte_cost, self._echo = baud, frame_bits * 1_000_000, echo
+        self._bursts = bursts
         self.ends = tuple(Rs485End(self, buffer_bytes) for _ in range(ends))
         self.collisions = 0
         self._air: list[_Burst] = []
@@ -97,10 +101,16 @@ class Rs485Line:
         return -(-count * self._byte_cost // self._baud)
 
     def passed(self, burst: _Burst, now_us: int) -> int:
-        """Return how many bytes of a burst have passed."""
+        """Return how many bytes of a burst a receiver can take."""
         if now_us >= burst.end_us:
             return len(burst.data)
+        if self._bursts:
+            return 0
         return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
+
+    def arrival_us(self, burst: _Burst, taken: int) -> int:
+        """Return when a receiver can take more of a burst than what it took."""
+        return burst.end_us if self._bursts else burst.start_us + self.after(taken + 1)
 
     def unsent(self, duration_us: int) -> int:
         """Return how many bytes are still to be sent for so long."""
@@ -137,12 +147,10 @@ class Rs485End:
 
     @property
     def due_us(self) -> int:
-        """When the next byte will have arrived here."""
-        after = self._line.after
-        return min(
-            (b.start_us + after(n + 1) for b, n in zip(self._inbox, self._taken, strict=True)),
-            default=NEVER,
-        )
+        """When there will be something to take."""
+        if not self._inbox:
+            return NEVER
+        return min(map(self._line.arrival_us, self._inbox, self._taken))
 
     @property
     def idle_us(self) -> int:
@@ -163,6 +171,8 @@ class Rs485End:
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Queue bytes behind those that this end is still sending."""
+        if not traffic:
+            return
         accepted = traffic[: self.room(now_us)]
         self.lost += len(traffic) - len(accepted)
         if accepted:

@@ -39,12 +39,22 @@ class Pose:
         >>> Pose().moved(1.0, 1.0, 0.4)
         Pose(x_m=1.0, y_m=0.0, heading_rad=0.0)
         """
-        turn_rad = (right_m - left_m) / tread_m
-        half_rad = turn_rad / 2
-        chord_m = (left_m + right_m) / 2 * (sin(half_rad) / half_rad if half_rad else 1.0)
-        middle_rad = self.heading_rad + half_rad
-        return Pose(
-            self.x_m + chord_m * cos(middle_rad),
-            self.y_m + chord_m * sin(middle_rad),
-            self.heading_rad + turn_rad,
-        )
+        return Pose(*arc((self.x_m, self.y_m, self.heading_rad), left_m, right_m, tread_m))
+
+
+def arc(
+    place: tuple[float, float, float], left_m: float, right_m: float, tread_m: float
+) -> tuple[float, float, float]:
+    """Return x, y and heading after an arc; `Pose.moved` in plain numbers, for each step."""
+    x_m, y_m, heading_rad = place
+    turn_rad = (right_m - left_m) / tread_m
+    half_rad = turn_rad / 2
+    chord_m = (left_m + right_m) / 2
+    if half_rad:
+        chord_m *= sin(half_rad) / half_rad
+    middle_rad = heading_rad + half_rad
+    return (
+        x_m + chord_m * cos(middle_rad),
+        y_m + chord_m * sin(middle_rad),
+        heading_rad + turn_rad,
+    )

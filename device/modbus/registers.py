@@ -74,6 +74,11 @@ class Registers:
         """Set a number, as the device itself does."""
         self._values[name] = value
 
+    def check(self, first: int, count: int) -> None:
+        """Raise Refusal if a register is not there."""
+        for address in range(first, first + count):
+            self._find(address)
+
     def read(self, first: int, count: int) -> list[int]:
         """Return registers; Refusal if one is not there."""
         found = [self._find(address) for address in range(first, first + count)]

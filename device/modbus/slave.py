@@ -91,7 +91,7 @@ class ModbusSlave:
         try:
             request = parse_request(message)
             if request.read is not None:
-                registers.read(*request.read)  # nothing is written if this is refused
+                registers.check(*request.read)  # nothing is written if this is refused
             if request.write is not None:
                 self._written(registers.write(*request.write))
             if request.read is not None:

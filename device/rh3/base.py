@@ -10,7 +10,7 @@ from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
 from tickrig.device.rh3.ground import Ground
 from tickrig.device.rh3.look import READ, Look
-from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.rh3.terminals import INPUTS, OUTPUTS
 
 TICK_US: Final = 1_000
@@ -113,10 +113,10 @@ class Rh3Base:
 
     def _catch_up(self, now_us: int) -> None:
         """Make the steps of the milliseconds before this one."""
-        driver = self._driver
-        while self._moving and driver.now_us < now_us - TICK_US:
+        driver, step, before_us = self._driver, self._step, now_us - TICK_US
+        while self._moving and driver.now_us < before_us:
             driver.now_us += TICK_US
-            self._step()
+            step()
         self._now_us = driver.now_us = now_us
 
     def _step(self) -> None:
@@ -126,8 +126,8 @@ class Rh3Base:
         else:
             driver.coast()
         left, right = self.sides
-        ground.step(left.wheel.turned_rad, right.wheel.turned_rad)
-        self._moving = not (driver.resting and ground.resting)
+        ground.step(left.wheel.speed / COUNTS_PER_RAD, right.wheel.speed / COUNTS_PER_RAD)
+        self._moving = not (ground.resting and driver.resting)
         self._unseen |= self._moving
 
     def _touched(self) -> None:

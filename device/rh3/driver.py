@@ -87,7 +87,8 @@ class Driver:
 
     def written(self, values: Mapping[str, int]) -> None:
         """Take what a master wrote, at once or after the delay."""
-        self._configure()
+        if values.keys() - DELAYED:
+            self._configure()
         if values.keys() & DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 

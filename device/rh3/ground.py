@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.device.body.contact import Contact
-from tickrig.device.body.pose import Pose
+from tickrig.device.body.pose import Pose, arc
 from tickrig.device.chance import Chance
 from tickrig.device.rh3.parameters import BaseParameters
 
@@ -22,7 +22,6 @@ class Ground:
         parameters: of the base.
 
     Attributes:
-        pose: where the middle of the axle is; it may be put elsewhere.
         speed_m_s: forward, in the latest step.
         turn_rad_s: to the left, in the latest step.
         left: the left wheel's contact.
@@ -34,13 +33,18 @@ class Ground:
         self.left = Contact(parameters.radius_left_m, share_kg, friction)
         self.right = Contact(parameters.radius_right_m, share_kg, friction)
         self._tread_m, self._noise = parameters.tread_m, parameters.noise
+        self._grips = friction is None
         self._chance = Chance(parameters.seed, "ground")
         self.pose, self.speed_m_s, self.turn_rad_s = Pose(), 0.0, 0.0
 
     @property
-    def contacts(self) -> tuple[Contact, Contact]:
-        """Left and right wheel on the ground."""
-        return self.left, self.right
+    def pose(self) -> Pose:
+        """Where the middle of the axle is; it may be put elsewhere."""
+        return Pose(*self._place)
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        self._place = (pose.x_m, pose.y_m, pose.heading_rad)
 
     @property
     def resting(self) -> bool:
@@ -49,13 +53,17 @@ class Ground:
 
     def step(self, left_rad: float, right_rad: float) -> None:
         """Let a millisecond pass in which the wheels turned by so much."""
-        left_m, right_m = self.left.roll(left_rad, STEP_S), self.right.roll(right_rad, STEP_S)
+        left, right, tread_m = self.left, self.right, self._tread_m
+        if self._grips:
+            left_m, right_m = left_rad * left.radius_m, right_rad * right.radius_m
+        else:
+            left_m, right_m = left.roll(left_rad, STEP_S), right.roll(right_rad, STEP_S)
         if self._noise:
             left_m, right_m = self._roughened(left_m), self._roughened(right_m)
         if left_m or right_m:
-            self.pose = self.pose.moved(left_m, right_m, self._tread_m)
+            self._place = arc(self._place, left_m, right_m, tread_m)
         self.speed_m_s = (left_m + right_m) / 2 / STEP_S
-        self.turn_rad_s = (right_m - left_m) / self._tread_m / STEP_S
+        self.turn_rad_s = (right_m - left_m) / tread_m / STEP_S
 
     def _roughened(self, way_m: float) -> float:
         """Return a way with the noise of the ground: uniform, from one step to the next anew."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, floor
 from typing import Final
 
-from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
+from tickrig.device.rh3.parameters import BaseParameters
 
 SLOW: Final = 0.5
 """Counts/ms below which friction can hold a wheel."""
@@ -41,16 +41,6 @@ class Wheel:
     def counts(self) -> int:
         """What the encoder has counted."""
         return floor(self.travel)
-
-    @property
-    def angle_rad(self) -> float:
-        """Angle since the start of the rig."""
-        return self.travel / COUNTS_PER_RAD
-
-    @property
-    def turned_rad(self) -> float:
-        """Angle of the latest step."""
-        return self.speed / COUNTS_PER_RAD
 
     def held(self, torque: float) -> bool:
         """Whether it stands and stays so under a torque."""

@@ -57,7 +57,7 @@ class ClosedLoop:
 
     def __init__(self, *parameters: BaseParameters, seed: int = 0, dense: bool = False) -> None:
         bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
-        lines = [Rs485Line(BAUD) for _ in bases]
+        lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
         ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
         self.rig = Rig(*map(Station, bases, ports), dense=dense)
         self.manager = Manager()

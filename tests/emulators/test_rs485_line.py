@@ -18,6 +18,15 @@ def test_a_byte_arrives_at_all_others_when_its_stop_bit_has_passed() -> None:
     assert second.due_us == second.idle_us == NEVER
 
 
+def test_a_receiver_of_bursts_takes_what_was_sent_back_to_back_at_once() -> None:
+    line = Rs485Line(baud=100_000, bursts=True)
+    line.a.send(50, b"ab")
+    line.a.send(60, b"c")
+    assert line.b.due_us == 250
+    assert [line.b.poll(t) for t in (249, 250, 349, 350)] == [b"", b"ab", b"", b"c"]
+    assert line.b.due_us == NEVER
+
+
 def test_an_end_waits_for_itself() -> None:
     line = Rs485Line(baud=100_000)
     line.a.send(0, b"ab")

@@ -1,0 +1,110 @@
+"""What a cart did on its way, and how well (rh3-control, customary measures)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+from math import sqrt
+from typing import Final, NamedTuple
+
+from tickrig.host.motion.geometry import Pose, Twist, wrap
+from tickrig.host.motion.limiter import Limits
+
+LONG_M: Final = 1.0
+"""A leg from here on is judged by its cross-track error."""
+
+_ROUNDING: Final = 1e-9
+
+
+class Sample(NamedTuple):
+    """A cart in one period.
+
+    Attributes:
+        time_s: since the start of the journey.
+        pose: where it is.
+        twist: the velocity that is commanded.
+        line: the line it follows towards this pose, None while it turns or stands.
+    """
+
+    time_s: float
+    pose: Pose
+    twist: Twist
+    line: Pose | None
+
+
+class CrossTrack(NamedTuple):
+    """Distance from the line: root of the mean square, and most, m."""
+
+    rms: float
+    most: float
+
+
+@dataclass(slots=True)
+class Journey:
+    """A way from a pose to a goal.
+
+    Attributes:
+        goal: where it was to end.
+        samples: one for each period.
+        finished: the goal was reached, as the chain says.
+    """
+
+    goal: Pose
+    samples: list[Sample] = field(default_factory=list)
+    finished: bool = False
+
+    @property
+    def duration_s(self) -> float:
+        """How long it took."""
+        return self.samples[-1].time_s
+
+    @property
+    def end(self) -> Pose:
+        """Where the cart stands."""
+        return self.samples[-1].pose
+
+    @property
+    def error_m(self) -> float:
+        """How far from the goal it stands."""
+        return self.end.distance(self.goal)
+
+    @property
+    def heading_error_rad(self) -> float:
+        """How far it is turned from the heading of the goal, without sign."""
+        return abs(wrap(self.end.heading - self.goal.heading))
+
+    @property
+    def turning_rad_s(self) -> float:
+        """The sum of all changes of the commanded angular velocity."""
+        return sum(abs(b.twist.w - a.twist.w) for a, b in pairwise(self.samples))
+
+    @property
+    def cross_track(self) -> CrossTrack:
+        """How far it was beside its long legs."""
+        errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
+            0.0
+        ]
+        square = sum(error * error for error in errors) / len(errors)
+        return CrossTrack(sqrt(square), max(map(abs, errors)))
+
+    def violations(self, limits: Limits) -> int:
+        """Return how many commands were beyond a limit."""
+        return sum(_violates(a.twist, b.twist, limits) for a, b in pairwise(self.samples))
+
+    def _long_legs(self) -> Sequence[tuple[Pose, list[Sample]]]:
+        legs = [(line, list(leg)) for line, leg in groupby(self.samples, lambda s: s.line)]
+        return [
+            (line, leg)
+            for line, leg in legs
+            if line is not None and leg[0].pose.distance(line) >= LONG_M
+        ]
+
+
+def _violates(before: Twist, now: Twist, limits: Limits) -> bool:
+    return (
+        abs(now.v) > limits.v + _ROUNDING
+        or abs(now.w) > limits.w + _ROUNDING
+        or abs(now.v - before.v) > limits.dv + _ROUNDING
+        or abs(now.w - before.w) > limits.dw + _ROUNDING
+    )
