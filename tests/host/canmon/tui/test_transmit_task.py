@@ -35,7 +35,7 @@ def test_an_enabled_row_is_sent_in_each_period_and_others_by_hand() -> None:
     sender.enable(1)
     assert sender.sent(99_000) == ["080#"] * 10
     sender.once(0)
-    assert sender.sent(1_000) == ["000#0105"]
+    assert sender.sent(500) == ["000#0105"]
     assert sender.session.model.board.rows()[0].commanded is not None
 
 
