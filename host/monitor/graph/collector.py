@@ -35,21 +35,22 @@ class Collector:
     def __init__(
         self, words: Sequence[SignalWord], decoder: Decoder | None = None, most: int = 0
     ) -> None:
-        self.series: list[Series] = []
-        self._decoder, self._most = decoder, most
+        self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
+        self._decoder = decoder
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
         self._objects: list[_Object] = []
-        for word in words:
-            self.add(word)
+        for word, series in zip(words, self.series, strict=True):
+            if isinstance(word.source, FrameSlice):
+                self._slices[word.source.key].append((word.source, series))
+            else:
+                self._objects.append(_Object(word, word.source, series))
 
-    def add(self, word: SignalWord) -> None:
-        """Take the values of one more signal from now on."""
-        series = Series(word.label or word.text, word.axis, most=self._most)
-        self.series.append(series)
-        if isinstance(word.source, FrameSlice):
-            self._slices[word.source.key].append((word.source, series))
-        else:
-            self._objects.append(_Object(word, word.source, series))
+    def join(self, other: Collector) -> None:
+        """Take over the signals of another one, with their samples."""
+        self.series += other.series
+        self._objects += other._objects
+        for key, pairs in other._slices.items():
+            self._slices[key] += pairs
 
     def remove(self, number: int) -> None:
         """Forget a signal."""

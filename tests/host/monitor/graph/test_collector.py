@@ -132,8 +132,7 @@ def test_any_text_is_a_signal_or_refused(text: str) -> None:
 def test_signals_come_and_go_while_others_go_on() -> None:
     collector = Collector([parse_signal("181[0]")])
     collector.take(Heard(1, "can0", CanFrame.parse("181#07")))
-    collector.add(parse_signal("181[0]*2"))
-    collector.add(parse_signal("5.position"))
+    collector.join(Collector([parse_signal("181[0]*2"), parse_signal("5.position")]))
     collector.take(Heard(2, "can0", CanFrame.parse("181#08")))
     assert [list(series.values) for series in collector.series] == [[7, 8], [16], []]
     collector.remove(2)
