@@ -66,24 +66,18 @@ class PositionInput(RtComponent):
         Raises:
             ValueError: fewer points, or a number that is none.
         """
-        if len(poses) < 2:
-            raise ValueError(f"a path has 2 points or more, got {len(poses)}")
-        inner = [INTERMEDIATE_POINT] * (len(poses) - 2)
-        ids = (START_POINT, *inner, END_POINT)
-        self._commands.append(
-            tuple(_point(pose, ident) for ident, pose in zip(ids, poses, strict=True))
-        )
+        self._commands.append(_points(poses))
 
-    def replace(self, pose: Pose) -> None:
-        """Enter a goal that takes the place of what runs and waits.
+    def replace(self, *poses: Pose) -> None:
+        """Enter a goal, or a path of several points, in the place of what runs and waits.
 
         Raises:
-            ValueError: a number that is none; what runs goes on.
+            ValueError: no point, or a number that is none; what runs goes on.
         """
-        point = _point(pose)
+        command = (_point(*poses),) if len(poses) == 1 else _points(poses)
         self._commands.clear()
         self._running = False
-        self._commands.append((point,))
+        self._commands.append(command)
 
     def end(self) -> None:
         """Go into Error when all has finished, as the original does after its last command."""
@@ -103,6 +97,14 @@ class PositionInput(RtComponent):
         if self._ending and self.idle:
             return ReturnCode.RTC_ERROR
         return ReturnCode.RTC_OK
+
+
+def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:
+    if len(poses) < 2:
+        raise ValueError(f"a path has 2 points or more, got {len(poses)}")
+    inner = [INTERMEDIATE_POINT] * (len(poses) - 2)
+    ids = (START_POINT, *inner, END_POINT)
+    return tuple(_point(pose, ident) for ident, pose in zip(ids, poses, strict=True))
 
 
 def _point(pose: Pose, *ids: int) -> iis.TimedPose2D:
