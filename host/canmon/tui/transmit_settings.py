@@ -1,0 +1,37 @@
+"""A row of the transmit list in a workspace.
+
+>>> read_row({"send": "080#", "every": "10ms"}).every
+'10ms'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tickrig.host.canmon.tui.nested_settings import texts_of
+from tickrig.host.canmon.tui.settings import text_of
+from tickrig.host.monitor.transmit.transmit_words import TransmitWords
+
+
+def read_row(settings: Mapping[str, Any]) -> TransmitWords:
+    """Return what a row says; SettingError if a setting is none."""
+    return TransmitWords(
+        text_of(settings, "send", ""),
+        text_of(settings, "every", ""),
+        texts_of(settings, "counter"),
+        texts_of(settings, "checksum"),
+        text_of(settings, "name", ""),
+    )
+
+
+def row_settings(words: TransmitWords) -> dict[str, Any]:
+    """Return it as settings; what is empty is left out."""
+    settings: dict[str, Any] = {
+        "send": words.frame,
+        "every": words.every,
+        "counter": list(words.counters),
+        "checksum": list(words.checksums),
+        "name": words.name,
+    }
+    return {name: value for name, value in settings.items() if value}
