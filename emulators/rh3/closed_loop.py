@@ -72,6 +72,16 @@ class ClosedLoop:
         return self.carts[0]
 
     @property
+    def chain(self) -> MotionChain:
+        """The components of the first cart."""
+        return self.cart.chain
+
+    @property
+    def pose(self) -> Pose:
+        """Where the first cart truly is."""
+        return self.cart.truth
+
+    @property
     def now_us(self) -> int:
         """The present time."""
         return self.rig.now_us

@@ -10,7 +10,7 @@ from tickrig.host.motion.components.omni_to_2wd import OmniTo2WD
 from tickrig.host.motion.components.path_follower import PathFollower
 from tickrig.host.motion.components.position_input import PositionInput
 from tickrig.host.motion.components.ref_hard import Opener, RefHardRh3
-from tickrig.host.rtc import ExecutionContext, Manager
+from tickrig.host.rtc import ExecutionContext, LifeCycleState, Manager
 from tickrig.host.serial_link import SerialLink
 
 RATE_HZ: Final = 50.0
@@ -84,6 +84,12 @@ class MotionChain:
             self.navigation,
             self.path_follower,
         )
+
+    @property
+    def in_error(self) -> tuple[str, ...]:
+        """Names of the components in Error."""
+        names = (component.instance_name for component in self.components)
+        return tuple(n for n in names if self._manager.state_of(n) is LifeCycleState.ERROR)
 
     def use(self, set_id: str) -> None:
         """Let the configuration set of a name hold in all components that have it."""

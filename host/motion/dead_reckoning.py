@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 from math import cos, sin
+from typing import NamedTuple
 
 from tickrig.host.motion.geometry import Pose, Twist, wrap
+
+
+class Wheels(NamedTuple):
+    """What an odometry takes for the geometry of its cart: radii and axle, m."""
+
+    left: float
+    right: float
+    axle: float
 
 
 def wheel_speeds(

@@ -47,16 +47,16 @@ class Journey:
     Attributes:
         goal: where it was to end.
         samples: one for each period.
-        finished: the goal was reached, as the chain says.
+        reached_s: when the goal was reached, as the components say; None if it was not.
     """
 
     goal: Pose
     samples: list[Sample] = field(default_factory=list)
-    finished: bool = False
+    reached_s: float | None = None
 
     @property
     def duration_s(self) -> float:
-        """How long it took."""
+        """How long it was watched."""
         return self.samples[-1].time_s
 
     @property

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tickrig.host.motion.conf_file import read_conf
-from tickrig.host.motion.dead_reckoning import moved
+from tickrig.host.motion.dead_reckoning import Wheels, moved
 from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.motion.ports import arrived, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
@@ -34,6 +34,7 @@ class Odometry(RtComponent):
         self.left_radius = bind("radiusOfLeftWheel", 0.0995, "x>0", unit="m")
         self.right_radius = bind("radiusOfRightWheel", 0.0995, "x>0", unit="m")
         self.axle = bind("lengthOfAxle", 0.464, "x>0", unit="m")
+        self._geometry = (self.left_radius, self.right_radius, self.axle)
         bind("radiusOfBodyArea", 0.45, unit="m")
         self.initial = (
             bind("initialPose_x", 0.0, unit="m"),
@@ -56,6 +57,16 @@ class Odometry(RtComponent):
         for set_id, values in read_conf(path).items():
             held = self.configuration.sets.get(set_id, {})
             self.configuration.add_set(set_id, {**held, **values})
+
+    def calibrate(self, wheels: Wheels) -> None:
+        """Set radii and axle; RtcRefused if one is not above 0."""
+        for parameter, value in zip(self._geometry, wheels, strict=True):
+            self.configuration.set(parameter.name, repr(value))
+
+    @property
+    def wheels(self) -> Wheels:
+        """Radii and axle that hold."""
+        return Wheels(*(parameter.value for parameter in self._geometry))
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin at the initial pose."""
