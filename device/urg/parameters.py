@@ -1,0 +1,44 @@
+"""What a sensor is like: a URG-04LX unless said otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.wire.scip.description import Specification
+
+URG_04LX: Final = Specification(
+    "URG-04LX(Hokuyo Automatic Co.,Ltd.)", 20, 5_600, 1_024, 44, 725, 384, 600
+)
+"""As one tells of itself (URG network, status information)."""
+
+LAST_STEP: Final = 768
+"""The highest step that may be asked for (SCIP 2.0, measurement direction and points)."""
+
+BIT_RATE: Final = 19_200
+"""Of RS-232C after power-up; on USB it means nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrgParameters:
+    """A sensor.
+
+    Attributes:
+        serial: its serial number, letters and digits.
+        noise: share of the accuracy of 10 mm below 1 m and 1 % above, 0..1.
+        seed: of the noise.
+
+    Raises:
+        ValueError: a value that cannot be.
+    """
+
+    serial: str = "H0614967"
+    noise: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if not (self.serial.isascii() and self.serial.isalnum()):
+            raise ValueError(f"serial {self.serial!r} is not letters and digits")
+        if not 0 <= self.noise <= 1:
+            raise ValueError(f"noise {self.noise} is not in 0..1")

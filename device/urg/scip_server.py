@@ -1,0 +1,227 @@
+"""The sensor's side of SCIP 2.0: what each command does, and what is answered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from tickrig.device.body.pose import Pose
+from tickrig.device.core import NEVER
+from tickrig.device.urg.parameters import URG_04LX, UrgParameters
+from tickrig.device.urg.rotation import Rotation
+from tickrig.device.urg.settings import Settings
+from tickrig.device.urg.stream import Stream, flaw
+from tickrig.device.urg.texts import CONDITION, version
+from tickrig.device.urg.view import View
+from tickrig.device.urg.world import World
+from tickrig.wire.scip import status
+from tickrig.wire.scip.command import LETTERS, MOST_STRING, SIZES, Command
+from tickrig.wire.scip.description import encode_lines
+from tickrig.wire.scip.encoding import encode_number, with_sum
+from tickrig.wire.scip.reply import Reply
+
+TIMER: Final = 2**24
+"""Milliseconds after which the timer begins again."""
+
+LEVELS: Final = range(11)
+DEFAULT_LEVEL: Final = 99
+
+Answer = tuple[str, tuple[bytes, ...]]
+"""Status and lines."""
+
+
+class ScipServer:
+    """Obeys commands and gives scans out (SCIP 2.0, sensor commands).
+
+    Not emulated: SCIP 1.1 and the switch from it, DB, the firmware update mode, the statuses
+    21..49 and 98 of a sensor that checks itself; SS is obeyed and changes no line.
+
+    Args:
+        parameters: of the sensor.
+
+    Attributes:
+        laser: whether it is on.
+        rotation: of the mirror.
+        trouble: status of what is broken, empty if nothing is.
+        served: commands that were answered.
+        scans: scans that were measured.
+        due_us: when the scan ends that is measured.
+    """
+
+    def __init__(self, parameters: UrgParameters) -> None:
+        self.parameters, self.trouble = parameters, ""
+        self._commands: Mapping[str, Callable[[int, Command], Answer]] = {
+            **dict.fromkeys(("MD", "MS"), self._stream),
+            "BM": self._laser_on,
+            "QT": self._quit,
+            "RS": self._reset,
+            "TM": self._time,
+            "SS": lambda now_us, command: (self._settings.set_rate(command.parameters), ()),
+            "CR": self._speed,
+            "HS": lambda now_us, command: (self._settings.set_sensitivity(command.parameters), ()),
+            "VV": lambda now_us, command: _told(version(self.parameters.serial)),
+            "PP": lambda now_us, command: (status.OK, URG_04LX.lines),
+            "II": lambda now_us, command: _told(self._state(now_us)),
+        }
+        self.power_up(0)
+
+    def power_up(self, now_us: int) -> None:
+        """Begin as after power-up."""
+        self.served = self.scans = 0
+        self._begin(now_us)
+
+    def _begin(self, now_us: int) -> None:
+        self.rotation = Rotation(URG_04LX.speed_rpm)
+        self.rotation.began_us = self._zero_us = now_us
+        self._adjusting, self._settings = False, Settings()
+        self.stop()
+
+    def stop(self) -> None:
+        """Switch the laser off and forget what was asked for."""
+        self.laser, self.due_us = False, NEVER
+        self._running: Stream | None = None
+        self._waiting: Stream | None = None
+        self._latest: View | None = None
+
+    def obey(self, now_us: int, line: bytes) -> bytes:
+        """Return what is answered to a line at once."""
+        command = Command.parse(line)
+        self.served += 1
+        code = self._refusal(command)
+        if code:
+            return Reply(command.echo, code).encode()
+        if command.symbol in ("GD", "GS"):
+            return self._single(now_us, command)
+        code, lines = self._commands[command.symbol](now_us, command)
+        return Reply(command.echo, code, lines).encode()
+
+    def fail(self, code: str) -> bytes:
+        """Stop for trouble; tell whoever waits for a scan."""
+        self.trouble = code
+        waiting = [stream for stream in (self._waiting, self._running) if stream]
+        self.stop()
+        return b"".join(Reply(stream.command.echo, code).encode() for stream in waiting)
+
+    def end_scan(self, pose: Pose, world: World) -> bytes:
+        """End the scan that was measured; return what is sent of it."""
+        ended_us, period_us = self.due_us, self.rotation.period_us
+        self.due_us += period_us
+        time_ms = self._timer(ended_us - period_us)
+        view = View(self.scans, time_ms, pose, world, URG_04LX, self.parameters)
+        self.scans, self._latest = self.scans + 1, view
+        sent = b""
+        if (waiting := self._waiting) is not None:
+            sent, self._waiting = waiting.reply(view, status.OK, waiting.command.echo), None
+        if (running := self._running) is not None:
+            sent += running.take(ended_us, view)
+            if not (running.left or running.endless):
+                self.stop()
+        return sent
+
+    def _refusal(self, command: Command) -> str:
+        """Return the status for what is no command, or not now."""
+        if command.symbol not in SIZES:
+            return status.UNKNOWN
+        if len(command.string) > MOST_STRING + 1:
+            return status.STRING_TOO_LONG
+        if not LETTERS.issuperset(command.string[1:]):
+            return status.STRING_LETTERS
+        wanted = sum(SIZES[command.symbol])
+        if len(command.parameters) != wanted:
+            return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
+        if self._adjusting and command.symbol not in ("TM", "RS"):
+            return status.NO_REPLY
+        return ""
+
+    def _light(self, now_us: int) -> None:
+        if not self.laser:
+            self.laser, self.due_us = True, self.rotation.whole_end_us(now_us)
+
+    def _single(self, now_us: int, command: Command) -> bytes:
+        code = flaw(command) or self.trouble
+        if not (code or self.laser):
+            code = status.LASER_OFF
+        if not code and self._waiting is not None:
+            code = status.REPEATED
+        if code:
+            return Reply(command.echo, code).encode()
+        stream = Stream(command, now_us)
+        if self._latest is not None:
+            return stream.reply(self._latest, status.OK, command.echo)
+        self._waiting = stream
+        return b""
+
+    def _stream(self, now_us: int, command: Command) -> Answer:
+        code = flaw(command) or self.trouble
+        if not code and self._running is not None:
+            code = status.REPEATED
+        if code:
+            return code, ()
+        self._light(now_us)
+        begins_us = self.rotation.whole_end_us(now_us)
+        self._running = Stream(command, begins_us, int(command.fields[-1]))
+        return status.OK, ()
+
+    def _laser_on(self, now_us: int, command: Command) -> Answer:
+        if self.trouble:
+            return "01", ()
+        if self.laser:
+            return "02", ()
+        self._light(now_us)
+        return status.OK, ()
+
+    def _quit(self, now_us: int, command: Command) -> Answer:
+        self.stop()
+        return status.OK, ()
+
+    def _reset(self, now_us: int, command: Command) -> Answer:
+        self._begin(now_us)
+        return status.OK, ()
+
+    def _time(self, now_us: int, command: Command) -> Answer:
+        match command.parameters:
+            case "0" | "2" as code:
+                on = code == "0"
+                if on == self._adjusting:
+                    return ("02" if on else "03"), ()
+                self._adjusting = on
+                self.stop()
+                return status.OK, ()
+            case "1":
+                if not self._adjusting:
+                    return "04", ()
+                return status.OK, (with_sum(encode_number(self._timer(now_us), 4)),)
+            case _:
+                return "01", ()
+
+    def _speed(self, now_us: int, command: Command) -> Answer:
+        if not command.parameters.isdecimal():
+            return "01", ()
+        level = int(command.parameters)
+        level = 0 if level == DEFAULT_LEVEL else level
+        if level not in LEVELS:
+            return "02", ()
+        if level == self.rotation.level:
+            return "03", ()
+        self.rotation.change(now_us, level)
+        if self.laser:
+            self.due_us = self.rotation.whole_end_us(now_us)
+        return status.OK, ()
+
+    def _timer(self, at_us: int) -> int:
+        return (at_us - self._zero_us) // 1_000 % TIMER
+
+    def _state(self, now_us: int) -> Mapping[str, str]:
+        return {
+            "MODL": URG_04LX.model,
+            "LASR": "ON" if self.laser else "OFF",
+            "SCSP": self.rotation.text,
+            "MESM": self._settings.mode if self.laser else "IDLE",
+            "SBPS": self._settings.rate_text,
+            "TIME": f"{self._timer(now_us):06X}",
+            "STAT": CONDITION[self.trouble],
+        }
+
+
+def _told(values: Mapping[str, str]) -> Answer:
+    return status.OK, encode_lines(values)

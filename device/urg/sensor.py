@@ -1,0 +1,137 @@
+"""A scanning range finder on its serial line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf
+from typing import Final
+
+from tickrig.device.body.pose import Pose
+from tickrig.device.physical import Output, QuantityBank
+from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.scip_server import ScipServer
+from tickrig.device.urg.terminals import GROUPS, INPUTS, OUTPUTS
+from tickrig.device.urg.world import Post, World
+from tickrig.wire.lines import LineSplitter
+from tickrig.wire.scip import status
+
+TICK_US: Final = 1_000
+
+
+class Urg:
+    """A URG-04LX on USB; a `Device[bytes]`.
+
+    In each tick: what the world does to it, the end of a scan, commands. A scan is seen
+    from where the sensor is when the scan ends; the time stamp is that of its beginning.
+
+    Not emulated: RS-232C and its bit rates, warming up, current, the LED; see `View` for what
+    is not there of optics and `ScipServer` for what is not there of the protocol.
+
+    Args:
+        parameters: what it is like.
+        world: what is around it.
+
+    Attributes:
+        inputs: what the world does to it, see `terminals.INPUTS`.
+        world: it may be changed; the next scan sees it.
+    """
+
+    def __init__(self, parameters: UrgParameters | None = None, world: World | None = None) -> None:
+        self.parameters, self.world = parameters or UrgParameters(), world or World()
+        self.inputs = QuantityBank(INPUTS, GROUPS)
+        self._server, self._lines = ScipServer(self.parameters), LineSplitter()
+        self._on, self._restarted = True, False
+
+    @property
+    def tick_us(self) -> int:
+        """How finely it keeps time."""
+        return TICK_US
+
+    @property
+    def due_us(self) -> int:
+        """When anything would happen without input."""
+        if self.inputs.changed or self._restarted:
+            return 0
+        return self._server.due_us
+
+    @property
+    def outputs(self) -> Mapping[str, Output]:
+        """What `read` knows."""
+        return _OUTPUTS
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+        return Pose(*(self.inputs[name] for name in GROUPS["pose"]))
+
+    @property
+    def surroundings(self) -> World:
+        """The world, with whoever stands there."""
+        x_m, y_m, radius_m = (self.inputs[name] for name in GROUPS["post"])
+        return self.world.with_posts(Post(x_m, y_m, radius_m)) if radius_m else self.world
+
+    def reset(self) -> None:
+        """Begin as after power-up."""
+        self._restarted = True
+
+    def read(self, name: str, /) -> float:
+        """Return one of `outputs`; KeyError if unknown."""
+        return _READ[name](self)
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        """Take what arrived, and go on to now."""
+        if self._restarted:
+            self._power_up(now_us)
+        sent = self._touched(now_us) if self.inputs.changed else b""
+        if not self._on:
+            return b""
+        server = self._server
+        if server.due_us <= now_us:
+            sent += server.end_scan(self.pose, self.surroundings)
+        for line in self._lines.push(rx.replace(b"\r", b"\n")):
+            if line:
+                sent += server.obey(now_us, line)
+        return sent
+
+    def _power_up(self, now_us: int) -> None:
+        self._restarted = False
+        self._lines.clear()
+        self._server.power_up(now_us)
+
+    def _touched(self, now_us: int) -> bytes:
+        inputs, server = self.inputs, self._server
+        inputs.changed = False
+        on = not inputs["power_cut"]
+        if on != self._on:
+            self._on = on
+            self._power_up(now_us)
+        code = ""
+        if inputs["laser_broken"]:
+            code = status.LASER_TROUBLE
+        elif inputs["motor_jammed"]:
+            code = status.MOTOR_TROUBLE
+        if code == server.trouble:
+            return b""
+        return server.fail(code)
+
+    @property
+    def _ahead_m(self) -> float:
+        pose = self.pose
+        ahead_m = self.surroundings.distance_m(pose.x_m, pose.y_m, pose.heading_rad)
+        return -1.0 if ahead_m == inf else ahead_m
+
+    @property
+    def _speed_rpm(self) -> int:
+        turning = self._on and not self.inputs["motor_jammed"]
+        return self._server.rotation.present_rpm if turning else 0
+
+
+_OUTPUTS: Final = {output.name: output for output in OUTPUTS}
+
+_READ: Final[Mapping[str, Callable[[Urg], float]]] = {
+    "laser": lambda urg: urg._server.laser,
+    "speed_rpm": lambda urg: urg._speed_rpm,
+    "ahead_m": lambda urg: urg._ahead_m,
+    "scans": lambda urg: urg._server.scans,
+    "served": lambda urg: urg._server.served,
+}
