@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tickrig.host.link import NEVER, Link
 from tickrig.host.rtc_canopen.definition import SystemDefinition
+from tickrig.host.rtc_canopen.definition_file import read_definition
 from tickrig.host.rtc_canopen.device_file import DeviceFile, read_device_file
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.wire.can import Frames
@@ -27,6 +28,17 @@ def serve(
         received = link.receive(max(0, min(server.due_us, until_us) - link.now_us))
         if sent := server.tick(link.now_us, received):
             link.send(sent)
+
+
+def open_server(path: Path) -> Server:
+    """Make a server of a System Definition and the EDS files beside it.
+
+    Raises:
+        OSError: the definition cannot be read.
+        DefinitionError: it or an EDS cannot be used; the line says where and why.
+    """
+    definition = read_definition(path)
+    return Server(definition, read_files(definition, path.parent))
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:

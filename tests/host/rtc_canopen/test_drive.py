@@ -12,7 +12,7 @@ from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 BEEGO = (
-    (SYSTEMS / "beego.yaml").read_text("utf-8")
+    (SYSTEMS / "beego.yaml").read_text("utf-8").partition("rt_connections:")[0]
     + """
 rt_connections:
 - {from: Knob0.out, to: Left.set_60FF_00}

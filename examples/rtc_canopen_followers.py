@@ -1,0 +1,40 @@
+"""A leader and two followers, whose connections are changed while all of them run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tickrig.emulators.can_host import CanHost
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.canopen.bench import make_bench
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes
+from tickrig.emulators.canopen.rig_file import read_rig
+from tickrig.host.rtc_canopen.definition import PdoName
+from tickrig.host.rtc_canopen.serve import open_server, serve
+from tickrig.host.rtc_canopen.view import ServerView
+from tickrig.wire.rtc_types.basic import Time, TimedShort
+
+HERE = Path(__file__).parent
+
+
+def main() -> None:
+    """Let one follow through the PC, then the other, then both, one of them by PDO link."""
+    nodes = describe_nodes(read_rig(HERE / "rigs" / "followers.toml").nodes)
+    bench = make_bench(wire := CanWire(), make_nodes(nodes, wire))
+    server = open_server(HERE / "rtc_canopen" / "followers.yaml")
+    view, link = ServerView(server), CanHost(bench.rig, wire.end())
+    serve(server, link, until_us=1_000_000)
+    view.connect("Leader.angle", "Second.reference")
+    for degrees in (30, 60, 90):
+        if degrees == 60:
+            view.disconnect("Leader.angle", "Second.reference")
+            view.connect("Leader.angle", "Third.reference")
+        server.put("Leader.reference", TimedShort(Time(), degrees * 32_767 // 180))
+        serve(server, link, link.now_us + 1_000_000)
+        print(*(f"{float(bench.device.read(f'{n}/angle_deg')):.1f}" for n in (32, 33, 34)))
+        if degrees == 60:
+            view.link(PdoName(32, "tpdo2"), PdoName(33, "rpdo2"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Components that drive robots through the proxies of their drives."""
