@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.model import Meant
+from tickrig.host.canmon.tui.session import NEVER
 from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
@@ -22,6 +23,9 @@ Node = tuple[str, int]
 NOW: Final = 0
 """When frames are due that have not been sent yet."""
 
+WATCH_US: Final = 1_000_000
+"""How often watched objects are read."""
+
 
 class DictionaryTask:
     """A client of the default SDO of one node at a time (1200h).
@@ -35,6 +39,7 @@ class DictionaryTask:
         channel: the bus it sends on; empty for the first.
         said: how the latest transfer ended, in words.
         left: transfers that have not ended.
+        watched: objects that are read again and again.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -44,11 +49,13 @@ class DictionaryTask:
         self._out: list[CanFrame] = []
         self._node: Node | None = None
         self._dialogue = Dialogue(1, self._send)
+        self.watched: set[Entry] = set()
+        self._watch_us = NEVER
 
     @property
     def due_us(self) -> int:
         """When it next wants to be called without a frame."""
-        return NOW if self._out else self._dialogue.due_us
+        return NOW if self._out else min(self._dialogue.due_us, self._watch_us)
 
     def objects(self, node: Node) -> NodeDictionary:
         """Return the objects of a node."""
@@ -72,6 +79,11 @@ class DictionaryTask:
         """Write an object of the chosen node."""
         self._start(now_us, f"write {write_entry(entry)}", download(*entry, data))
 
+    def watch(self, now_us: int, entry: Entry) -> None:
+        """Read an object of the chosen node each second, or no more if it is watched."""
+        self.watched ^= {entry}
+        self._watch_us = now_us if self.watched else NEVER
+
     def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
         """Take values and answers; return requests."""
         for one, decoded in heard:
@@ -83,14 +95,25 @@ class DictionaryTask:
             if node == self._node and decoded.kind == "sdo" and isinstance(one.frame, CanFrame):
                 self._hear(now_us, one.frame)
         self._dialogue.tick(now_us)
+        if now_us >= self._watch_us:
+            self._read_watched(now_us)
         out, self._out = tuple(self._out), []
         return out
 
     def stop(self) -> None:
-        """Give up all transfers."""
+        """Give up all transfers; nothing is watched."""
+        self.watched.clear()
+        self._watch_us = NEVER
         self._dialogue.clear()
         self._out.clear()
         self.left = 0
+
+    def _read_watched(self, now_us: int) -> None:
+        """Read what is watched, unless earlier transfers go on."""
+        self._watch_us += (now_us - self._watch_us) // WATCH_US * WATCH_US + WATCH_US
+        if not self.left:
+            for entry in sorted(self.watched):
+                self.read(now_us, entry)
 
     def _hear(self, now_us: int, frame: CanFrame) -> None:
         if self._node and frame.can_id == RESPONSE_COB_ID + self._node[1] and not frame.remote:

@@ -95,6 +95,28 @@ def test_transfers_are_given_up(ending: str) -> None:
     assert (client.session.frames, client.task.left) == ([], 0)
 
 
+def test_a_watched_object_is_read_each_second_until_it_is_watched_no_more() -> None:
+    client = Client()
+    client.task.watch(client.session.now_us, STATUSWORD)
+    client.session.run(2_500_000)
+    assert client.session.frames == ["605#4041600000000000"] * 3
+    client.task.watch(client.session.now_us, STATUSWORD)
+    client.session.run(2_500_000)
+    assert len(client.session.frames) == 3
+
+
+def test_a_watched_object_that_is_not_answered_is_asked_for_again_after_its_time_out() -> None:
+    client = Client()
+    client.task.choose((BUS, 9))
+    client.task.watch(client.session.now_us, NAME)
+    client.session.run(2_400_000)
+    client.session.disarm()
+    client.session.run(2_000_000)
+    assert client.session.frames == ["609#4008100000000000", "609#8008100000000405"] * 2 + [
+        "609#4008100000000000"
+    ]
+
+
 def test_values_of_pdos_are_heard() -> None:
     client = Client()
     client.session.arm()
