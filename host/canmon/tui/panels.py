@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.host.canmon.tui.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.tui.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panel import Panel
@@ -17,5 +18,6 @@ PANELS: Final[tuple[type[Panel], ...]] = (
     StatisticsPanel,
     DictionaryPanel,
     TransmitPanel,
+    AlarmsPanel,
 )
 """Key 1 shows the first, and so on."""

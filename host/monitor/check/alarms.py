@@ -104,7 +104,9 @@ class Alarms:
             lost: frames that were lost until now.
         """
         if self._begin_us is None:
-            self._begin_us, self._lost = now_us, lost
+            self._lost = lost
+        if self._begin_us is None or now_us < self._begin_us:  # until a frame has told its time
+            self._begin_us = now_us
         if lost > self._lost and self.rules.no_loss:
             self._found(Finding(now_us, NO_LOSS, f"{lost - self._lost} frames were lost"))
         self._lost = lost

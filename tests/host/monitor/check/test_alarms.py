@@ -64,6 +64,13 @@ def test_what_has_never_come_is_missed_after_a_time_of_grace() -> None:
     assert made.findings[0].text == "node 3 was never heard; node 4 was never heard"
 
 
+def test_the_grace_begins_with_the_time_of_the_source() -> None:
+    made = Alarms(parse_rules({"nodes": 3}))
+    made.look(1_700_000_000 * S)
+    assert states(made, 5 * S) == [State.HOLDS]
+    assert states(made, 5 * S + GRACE_US) == [State.BROKEN]
+
+
 def test_frames_that_get_lost_are_found_as_they_do() -> None:
     made = alarms(no_loss=True)
     made.look(S, 5)
