@@ -7,6 +7,11 @@ import os
 import socket
 import stat
 from pathlib import Path
+from typing import Final
+
+
+MAX_PATH_BYTES: Final = 107
+"""What the kernel takes, beside the zero at the end (unix(7), sun_path)."""
 
 
 def listen_at(path: Path) -> socket.socket:
@@ -23,21 +28,30 @@ def listen_at(path: Path) -> socket.socket:
             raise FileExistsError(errno.EEXIST, "another process listens there", str(path))
         path.unlink()
     listener = socket.socket(socket.AF_UNIX)
-    mask = os.umask(0o177)
     try:
-        listener.bind(str(path))
-        listener.listen()
+        _publish(listener, path)
     except OSError as error:
         listener.close()
-        if error.errno == errno.EADDRINUSE:
-            raise FileExistsError(errno.EEXIST, "File exists", str(path)) from None
         raise OSError(
             error.errno or errno.EINVAL, error.strerror or str(error), str(path)
         ) from None
-    finally:
-        os.umask(mask)
     listener.setblocking(False)
     return listener
+
+
+def _publish(listener: socket.socket, path: Path) -> None:
+    """Listen first, then be found: who sees the path can connect."""
+    if len(os.fsencode(path)) > MAX_PATH_BYTES:
+        raise OSError(errno.ENAMETOOLONG, "AF_UNIX path too long", str(path))
+    hidden = path.with_name(f".{os.getpid()}")
+    mask = os.umask(0o177)
+    try:
+        listener.bind(str(hidden))
+        listener.listen()
+        os.link(hidden, path)
+    finally:
+        os.umask(mask)
+        hidden.unlink(missing_ok=True)
 
 
 def _is_socket(path: Path) -> bool:
