@@ -26,7 +26,7 @@ $(READY): pyproject.toml
 	    { echo "tickrig needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.12"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --upgrade pip
-	$(VENV)/bin/python -m pip install --quiet --editable '.[tui,plot,fast,dbc]' --group dev
+	$(VENV)/bin/python -m pip install --quiet --editable '.[tui,plot,fast,dbc,rtc]' --group dev
 	@touch $(READY)
 
 clean:
