@@ -107,7 +107,7 @@ def _check(bus: Mapping[str, Any]) -> None:
             if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
                 raise SettingError((name,), "is no array of texts")
         elif name in _WHOLE:
-            if not isinstance(value, int) or value < 1:
+            if type(value) is not int or value < 1:
                 raise SettingError((name,), f"{value!r} is not a number of bit/s")
         elif name in _OPTIONS and not isinstance(value, str):
             raise SettingError((name,), f"{value!r} is no text")

@@ -60,6 +60,7 @@ class Monitor(App[None]):
         self, session: Session, panels: Sequence[Panel], bench: Bench | None = None
     ) -> None:
         super().__init__()
+        self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
         self.bench = bench or Bench(Workspace(), BenchSetup(), panels)
 
@@ -118,9 +119,8 @@ class Monitor(App[None]):
 
     def on_tabbed_content_tab_activated(self) -> None:
         """Let the keys go to the panel, and paint it at once."""
-        panel = self.shown
-        if not panel.query("*:focus"):
-            self.screen.focus_next(f"#{panel.id} *")
+        if not self.shown.query("*:focus"):
+            self.shown.enter()
         self.look()
 
     def action_tab(self, number: int) -> None:

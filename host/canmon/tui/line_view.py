@@ -31,6 +31,7 @@ class LineView(ScrollView, can_focus=True):
     Attributes:
         lines: those that are there.
         begin: the number of the first of them, from 0.
+        follows: the last line shall stay in view: nobody has scrolled up from it.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
@@ -41,7 +42,8 @@ class LineView(ScrollView, can_focus=True):
     def __init__(self, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self.lines: list[Line] = []
-        self.begin = 0
+        self.begin, self.follows = 0, True
+        self._shown = Size(), Size()
         self._strips: dict[Line, Strip] = {}
 
     @property
@@ -73,6 +75,7 @@ class LineView(ScrollView, can_focus=True):
         width = max(map(line_width, lines), default=0)
         if self.virtual_size != (size := Size(width, height)):
             self.virtual_size = size
+        self._shown = self.size, size
         for number in range(self.top, self.top + self.rows):
             if _at(before, number - was) != _at(self.lines, number - begin):
                 self.refresh_line(number - self.top)
@@ -80,6 +83,8 @@ class LineView(ScrollView, can_focus=True):
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
         """Tell that lines came into view that are not there."""
         super().watch_scroll_y(old_value, new_value)
+        if self._shown == (self.size, self.virtual_size):  # not by another size of the window
+            self.follows = self.at_end
         shown = min(self.rows, int(self.virtual_size.height) - self.top)
         if self.top < self.begin or self.top + shown > self.begin + len(self.lines):
             self.post_message(self.Moved())

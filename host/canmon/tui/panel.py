@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from textual.containers import Vertical
 
+from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.session import Session
 
@@ -36,6 +37,13 @@ class Panel(Vertical):
     def __init__(self, session: Session) -> None:
         super().__init__(id=self.section)
         self.session = session
+
+    def enter(self) -> None:
+        """Let the keys go to it; it has come onto the screen."""
+        for widget in (*self.query(LineView), *self.query("*")):
+            if widget.focusable:
+                widget.focus()
+                return
 
     def look(self) -> None:
         """Take a snapshot of the model, and paint it."""

@@ -207,7 +207,7 @@ class TracePanel(Panel):
         self.look()
 
     def _follows(self, view: LineView) -> bool:
-        return view.at_end and self.paused is None
+        return view.follows and self.paused is None
 
     def _fit(self, passed: Ring, latest: Sequence[Latest]) -> None:
         """Make room for what is there: buses, and the first time."""

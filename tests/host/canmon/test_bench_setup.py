@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.workspace import Workspace, WorkspaceError
+from tickrig.host.cli.can_options import BusOptions
+
+TEXT = """\
+[bus]
+source = ["can0", "run.log"]
+bitrate = 500000
+dbc = ["car.dbc"]
+bus_kwargs = ["port=1"]
+[nodes.3]
+eds = "drive.eds"
+name = "left wheel"
+"""
+
+
+def test_paths_are_taken_from_the_folder_of_the_file(tmp_path: Path) -> None:
+    setup = BenchSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
+    assert setup == BenchSetup(
+        source=("can0", str(tmp_path / "run.log")),
+        options=BusOptions(bitrate=500_000, bus_kwargs=("port=1",)),
+        eds={3: tmp_path / "drive.eds"},
+        dbc=(tmp_path / "car.dbc",),
+    )
+
+
+def test_it_is_written_as_it_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    workspace = Workspace(TEXT, tmp_path / "bench.toml")
+    monkeypatch.chdir("/")
+    BenchSetup.read(workspace).write(workspace)
+    assert workspace.text == TEXT
+
+
+def test_the_command_line_goes_before(tmp_path: Path) -> None:
+    kept = BenchSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
+    assert kept.under(BenchSetup()) == kept
+    said = BenchSetup(source=("can1",), eds={4: Path("io.eds")})
+    both = kept.under(said)
+    assert (both.source, both.options) == (("can1",), BusOptions(bitrate=500_000))
+    assert both.eds == {3: tmp_path / "drive.eds", 4: Path("io.eds")}
+    other = kept.under(BenchSetup(options=BusOptions(interface="virtual", channel="a")))
+    assert other.source == ()
+    assert other.options.interface == "virtual"
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[bus]\nsource = 'can0'\n", "line 2: bus.source: is no array of texts"),
+        ("[bus]\n\nbitrate = 'fast'\n", "line 3: bus.bitrate: 'fast' is not a number of bit/s"),
+        ("[bus]\ninterface = 3\n", "line 2: bus.interface: 3 is no text"),
+        ("[nodes.3]\n[nodes.200]\neds = ''\n", "line 2: nodes.200: is not a node-ID 1..127"),
+        ("[nodes]\nx = {}\n", "line 2: nodes.x: is not a node-ID 1..127"),
+        ("[nodes]\n3 = 'a.eds'\n", "line 2: nodes.3: is no table with eds"),
+    ],
+)
+def test_a_wrong_setting_is_told_with_its_line(text: str, reason: str) -> None:
+    with pytest.raises(WorkspaceError, match=reason):
+        BenchSetup.read(Workspace(text, Path("bench.toml")))

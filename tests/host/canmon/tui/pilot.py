@@ -1,0 +1,92 @@
+"""The monitor without a terminal, stepped by hand."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from tests.host.canmon.wire import Wire
+from tickrig.host.canmon.file_source import FileSource
+from tickrig.host.canmon.source_word import FileWord
+from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.bench import Bench
+from tickrig.host.canmon.tui.line import line_text
+from tickrig.host.canmon.tui.line_view import LineView
+from tickrig.host.canmon.tui.model import Model
+from tickrig.host.canmon.tui.nodes_panel import NodesPanel
+from tickrig.host.canmon.tui.opening import open_session
+from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
+from tickrig.host.canmon.tui.trace_panel import TracePanel
+from tickrig.host.cli.can_options import BusOptions
+
+DRIVE = Path(__file__).parents[3] / "golden/canmon/drive.log"
+OURS = (TracePanel, NodesPanel, StatisticsPanel)
+SIZE = (120, 30)
+PATIENCE_US = 10_000_000
+
+Act = Callable[[Monitor, Any], Awaitable[None]]
+
+
+def drive_session() -> Session:
+    """A session on the recorded drive, all of it taken."""
+    session = Session(FileSource([FileWord(DRIVE)]), Model())
+    while not session.model.ended:
+        session.step()
+    return session
+
+
+def wire_session(wire: Wire) -> Session:
+    """A session on a bus whose far end a test holds."""
+    return open_session([wire.word], BusOptions(bitrate=None), Model(bit_rate=500_000))
+
+
+def hear(session: Session, wire: Wire, *frames: str) -> None:
+    """Send frames at the far end and let the session take them."""
+    count = session.model.frames + len(frames)
+    for frame in frames:
+        wire.send(frame)
+    while session.model.frames < count:
+        before = session.model.frames
+        session.step(PATIENCE_US)
+        assert session.model.frames > before
+
+
+def on_monitor(
+    session: Session,
+    act: Act,
+    *,
+    panels: Iterable[type[Panel]] = OURS,
+    size: tuple[int, int] = SIZE,
+    bench: Callable[[list[Panel]], Bench] | None = None,
+) -> Monitor:
+    """Run a monitor while something is done with it."""
+
+    async def main() -> Monitor:
+        made = [panel(session) for panel in panels]
+        monitor = Monitor(session, made, bench(made) if bench else None)
+        async with monitor.run_test(size=size) as pilot:
+            await pilot.pause()
+            await act(monitor, pilot)
+        return monitor
+
+    try:
+        return asyncio.run(main())
+    finally:
+        session.close()
+        session.source.close()
+
+
+def shown(monitor: Monitor) -> list[str]:
+    """Return the lines of the panel on the screen, as they are now."""
+    monitor.look()
+    return [line_text(line).rstrip() for line in monitor.shown.query_one(LineView).lines]
+
+
+def screen_text(monitor: Monitor) -> str:
+    """Return all that is on the screen."""
+    strips = monitor.screen._compositor.render_strips()
+    return "\n".join(strip.text.rstrip() for strip in strips)
