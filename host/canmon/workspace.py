@@ -104,7 +104,7 @@ class Workspace:
         return WorkspaceError(f"{self.path}, line {place}: {name}")
 
     def put(self, name: str, settings: Mapping[str, Any]) -> None:
-        """Set the settings of a section; other keys in it stay."""
+        """Set the settings of a section; a key that is None is taken out, other keys stay."""
         if settings:
             _merge(self._document, {name: settings})
 
@@ -150,12 +150,14 @@ def _merge(table: Container | Table | Any, settings: Mapping[str, Any]) -> None:
     """Set what differs; tables and arrays of tables are gone through key by key."""
     for key, value in settings.items():
         before = table.get(key)
-        if isinstance(value, Mapping) and isinstance(before, Mapping):
+        if value is None:
+            table.pop(key, None)
+        elif isinstance(value, Mapping) and isinstance(before, Mapping):
             _merge(before, value)
         elif _are_tables(value) and _are_tables(before):
             _merge_array(before, value)
         elif before != value:
-            table[key] = value
+            table[key] = _given(value)
 
 
 def _merge_array(tables: Any, values: Sequence[Mapping[str, Any]]) -> None:
@@ -163,9 +165,16 @@ def _merge_array(tables: Any, values: Sequence[Mapping[str, Any]]) -> None:
         if place < len(tables):
             _merge(tables[place], value)
         else:
-            tables.append(value)
+            tables.append(_given(value))
     while len(tables) > len(values):
         del tables[-1]
+
+
+def _given(value: Any) -> Any:
+    """Return a setting without what is None in it."""
+    if isinstance(value, Mapping):
+        return {name: _given(item) for name, item in value.items() if item is not None}
+    return [_given(item) for item in value] if isinstance(value, list) else value
 
 
 def _are_tables(value: object) -> bool:

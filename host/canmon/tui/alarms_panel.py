@@ -20,7 +20,7 @@ from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarm_text import HEAD, render_alarms
 from tickrig.host.monitor.check.alarms import State
-from tickrig.host.monitor.check.words import parse_rules
+from tickrig.host.monitor.check.words import SWITCHES, VALUES, parse_rules
 
 STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
 
@@ -93,8 +93,9 @@ class AlarmsPanel(Panel):
         self.rules_text = rules_toml(words)
 
     def save(self) -> dict[str, Any]:
-        """Return them."""
-        return {"rules": tomllib.loads(self.rules_text)}
+        """Return them; those that do not hold are None, so that a workspace leaves them out."""
+        rules = dict.fromkeys((*SWITCHES, *VALUES))
+        return {"rules": {**rules, **tomllib.loads(self.rules_text)}}
 
     def action_acknowledge(self) -> None:
         """Take note of all that was broken."""

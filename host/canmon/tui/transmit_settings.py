@@ -26,12 +26,11 @@ def read_row(settings: Mapping[str, Any]) -> TransmitWords:
 
 
 def row_settings(words: TransmitWords) -> dict[str, Any]:
-    """Return it as settings; what is empty is left out."""
-    settings: dict[str, Any] = {
+    """Return it as settings; what is empty is None, so that a workspace leaves it out."""
+    return {
         "send": words.frame,
-        "every": words.every,
-        "counter": list(words.counters),
-        "checksum": list(words.checksums),
-        "name": words.name,
+        "every": words.every or None,
+        "counter": list(words.counters) or None,
+        "checksum": list(words.checksums) or None,
+        "name": words.name or None,
     }
-    return {name: value for name, value in settings.items() if value}

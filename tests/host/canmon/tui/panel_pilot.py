@@ -14,6 +14,7 @@ from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.line import line_text
 from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.workspace import Workspace
 
 P = TypeVar("P", bound=Panel)
 SIZE = (120, 30)
@@ -87,3 +88,10 @@ def at_desk(
         return panel
 
     return asyncio.run(main())
+
+
+def kept(panel: Panel) -> dict[str, Any]:
+    """Return the settings as they come back from a workspace."""
+    workspace = Workspace()
+    workspace.put(panel.section, panel.save())
+    return Workspace(workspace.text).section(panel.section)

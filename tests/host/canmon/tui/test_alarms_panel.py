@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from textual.widgets import TextArea
 
-from tests.host.canmon.tui.panel_pilot import Desk, at_desk
+from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import BUS, RigSession
 from tickrig.host.canmon.tui.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.workspace import SettingError
@@ -40,7 +40,7 @@ def test_findings_are_shown_acknowledged_and_cleared() -> None:
         await desk.press("f5")
 
     panel = at_desk(AlarmsPanel, act, settings={"rules": {"no_sdo_abort": True}})
-    assert panel.save() == {"rules": {"no_sdo_abort": True}}
+    assert kept(panel) == {"rules": {"no_sdo_abort": True}}
 
 
 def test_rules_are_written_and_held() -> None:
@@ -61,7 +61,7 @@ def test_rules_are_written_and_held() -> None:
         assert not area.display
 
     panel = at_desk(AlarmsPanel, act)
-    assert panel.save() == {"rules": {"no_emcy": True}}
+    assert kept(panel) == {"rules": {"no_emcy": True}}
 
 
 @pytest.mark.parametrize(

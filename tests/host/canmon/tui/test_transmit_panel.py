@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from tests.host.canmon.tui.panel_pilot import Desk, at_desk
+from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.transmit_panel import TransmitPanel
 from tickrig.host.canmon.workspace import SettingError
@@ -116,7 +116,7 @@ def test_settings_come_back_and_no_row_is_enabled() -> None:
         await desk.press("A", "space")
 
     panel = at_desk(TransmitPanel, act, settings=ROWS)
-    assert panel.save() == {"bus": "", **ROWS}
+    assert kept(panel) == {"bus": "", **ROWS}
 
 
 @pytest.mark.parametrize(
