@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +9,19 @@ import canopen
 import click
 
 from tickrig.emulators.fig120 import demo as fig120_demo
-from tickrig.emulators.fig120.plot import FORMATS, write_plot
+from tickrig.emulators.fig120.plot import write_plot
 from tickrig.emulators.fig120.samples import Sample
 from tickrig.emulators.fig120.stage import VirtualStage, bus_stage
+from tickrig.emulators.picture import check_plot
 from tickrig.emulators.rrc.demo import run_demo
 from tickrig.emulators.rtc_lite.demo import play as rtc_lite_demo
 from tickrig.emulators.rtc_lite.demo.stage import VirtualStage as VirtualLines
 from tickrig.emulators.rtc_lite.demo.stage import pty_stage
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.refused import refuse_path
 from tickrig.host.errors import DeviceRefused, LinkError
 from tickrig.host.rtc.errors import RtcRefused
-
-PLOTTER = "matplotlib"
 
 
 @click.group()
@@ -74,7 +72,7 @@ def fig120(plot: Path | None, **options: Any) -> None:
     tickrig demo fig120 -i socketcan -c vcan0
     """  # noqa: D301 - click wants the backspace
     if plot is not None:
-        _check_plot(plot)
+        check_plot(plot)
     bus = BusOptions(**options)
     try:
         samples = _play_fig120(bus)
@@ -93,13 +91,3 @@ def _play_fig120(bus: BusOptions) -> list[Sample]:
         return fig120_demo.run_demo(VirtualStage(), click.echo)
     with bus_stage(bus) as stage:
         return fig120_demo.run_demo(stage, click.echo)
-
-
-def _check_plot(path: Path) -> None:
-    """Refuse before the demonstration what could not be written after it."""
-    if path.suffix.lower() not in FORMATS:
-        raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
-    if find_spec(PLOTTER) is None:
-        raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
-    if not path.parent.is_dir():
-        raise Refused(f"--plot {path}: no directory {path.parent}")

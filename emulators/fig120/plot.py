@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.emulators.fig120.samples import Sample
+from tickrig.emulators.picture import new_figure, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS: Final = (".png", ".svg", ".html")
 TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32"
 
 
@@ -22,17 +21,11 @@ def write_plot(samples: Sequence[Sample], path: Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    figure = _draw(samples)
-    if path.suffix.lower() == ".html":
-        path.write_text(_page(figure), "utf-8")
-    else:
-        figure.savefig(path, format=path.suffix.lower().removeprefix("."))
+    write_figure(_draw(samples), TITLE, path)
 
 
 def _draw(samples: Sequence[Sample]) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415 - heavy, and an extra
-
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = new_figure(9, 6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
     times = [sample.time_s for sample in samples]
     figure.suptitle(TITLE)
@@ -48,13 +41,3 @@ def _draw(samples: Sequence[Sample]) -> Figure:
     for axes in (above, below):
         axes.grid(visible=True, alpha=0.3)
     return figure
-
-
-def _page(figure: Figure) -> str:
-    drawing = io.StringIO()
-    figure.savefig(drawing, format="svg")
-    picture = drawing.getvalue()
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{TITLE}</title>'
-        f"</head>\n<body>\n{picture[picture.index('<svg') :]}</body>\n</html>\n"
-    )

@@ -8,34 +8,17 @@ import click
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.emulator import LineKind
-from tickrig.emulators.rh3.build import NAME, config_to_trace, parameters_of
+from tickrig.emulators.rh3.base_options import NAMES, base_options, read_parameters
+from tickrig.emulators.rh3.build import NAME, config_to_trace
 from tickrig.emulators.rh3.frame_log import frame_splitter
 from tickrig.emulators.rh3.verbs import verbs
 from tickrig.emulators.rs485_line import Rs485Line
 from tickrig.emulators.serial_options import line_options
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
 from tickrig.emulators.wire_log import WireLine
-from tickrig.host.cli.options import Decorator, add_options
-from tickrig.host.cli.refused import Refused
 
 CYCLE: Final = b"01 17 "
 """What -v leaves out: the traffic of each period."""
-
-
-def _number(name: str, text: str) -> Decorator:
-    return click.option(f"--{name}", type=float, metavar="NUMBER", help=text)
-
-
-_PARAMETERS: Final = add_options(
-    click.option("--address", type=int, metavar="1..247", help="Modbus address.  [1]"),
-    _number("radius-left-m", "Effective radius of the left wheel.  [0.0995]"),
-    _number("radius-right-m", "Effective radius of the right wheel.  [0.0995]"),
-    _number("tread-m", "Effective distance between the wheels.  [0.464]"),
-    _number("friction", "Coefficient between wheels and ground; without it they never slip."),
-    _number("response-s", "Time constant of the speed loop.  [0.05]"),
-    click.option("--delay-ms", type=int, metavar="MS", help="From a command to its effect.  [0]"),
-    _number("noise", "Spread of a wheel's way over the ground, as a share of it.  [0]"),
-)
 
 
 @click.command()
@@ -45,7 +28,8 @@ _PARAMETERS: Final = add_options(
     default=115_200,
     help="Bit rate of the line, 8N1.  [115200]",
 )
-@_PARAMETERS
+@click.option("--address", type=int, metavar="1..247", help="Modbus address.  [1]")
+@base_options
 @line_options("flip, drop, dup, cut")
 @click.pass_context
 def main(context: click.Context, /, baud: int, **options: Any) -> None:
@@ -67,13 +51,8 @@ def main(context: click.Context, /, baud: int, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_RH3_EMU_COMPLETE=bash_source rh3-emu)"
     """  # noqa: D301 - click wants the backspace
-    names = ("address", "radius_left_m", "radius_right_m", "tread_m", "friction", "response_s")
-    settings = {name: options.pop(name) for name in (*names, "delay_ms", "noise")}
-    given = {name: value for name, value in settings.items() if value is not None}
-    try:
-        parameters = parameters_of({**given, "seed": options["seed"]})
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    settings = {name: options.pop(name) for name in ("address", *NAMES)}
+    parameters = read_parameters({**settings, "seed": options["seed"]})
     kind = Kind(
         NAME,
         "RH3 base",

@@ -83,13 +83,17 @@ def run_umbmark(
         true_pose: measures where the cart is at the end of a run.
         runs: how many each way.
         watch: told each sample.
+
+    Raises:
+        TimeoutError: a square that did not end.
     """
     errors: dict[bool, list[Error]] = {True: [], False: []}
     returns = []
     for number in range(2 * runs):
         clockwise = number % 2 == 0
         ride = begin(number)
-        drive(ride, square(clockwise=clockwise), watch)
+        if drive(ride, square(clockwise=clockwise), watch).reached_s is None:
+            raise TimeoutError(f"square {number + 1} did not end")
         truth, thought = true_pose(ride), ride.chain.odometry.pose
         errors[clockwise].append((truth.x - thought.x, truth.y - thought.y))
         returns.append(truth.distance(Pose()))

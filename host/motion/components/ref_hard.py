@@ -80,6 +80,7 @@ class RefHardRh3(RtComponent):
 
     Attributes:
         report: what the base said last.
+        trouble: why it went into Error last.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")
@@ -95,6 +96,7 @@ class RefHardRh3(RtComponent):
             port = self.add_port(ServicePort(port_name))
             port.provide(Provider[RefHard](service, "RefHard", self))
         self._counts, self._angles = (0, 0), [0.0, 0.0]
+        self.trouble = ""
         self._forget()
 
     def _bind(self) -> None:
@@ -235,6 +237,7 @@ class RefHardRh3(RtComponent):
         self._counts = counts
 
     def _failed(self, why: str) -> ReturnCode:
+        self.trouble = why
         _LOG.error("%s: %s", self.instance_name, why)
         return ReturnCode.RTC_ERROR
 

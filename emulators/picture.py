@@ -1,0 +1,55 @@
+"""Pictures of curves in files; needs matplotlib (the extra `plot`)."""
+
+from __future__ import annotations
+
+import io
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.cli.refused import Refused
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS: Final = (".png", ".svg", ".html")
+PLOTTER: Final = "matplotlib"
+
+
+def check_plot(path: Path) -> None:
+    """Refuse before a run what could not be written after it."""
+    if path.suffix.lower() not in FORMATS:
+        raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
+    if find_spec(PLOTTER) is None:
+        raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
+    if not path.parent.is_dir():
+        raise Refused(f"--plot {path}: no directory {path.parent}")
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - heavy, and an extra
+
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def write_figure(figure: Figure, title: str, path: Path) -> None:
+    """Write a figure as PNG, SVG or HTML, by the name of the file.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    if path.suffix.lower() == ".html":
+        path.write_text(_page(figure, title), "utf-8")
+    else:
+        figure.savefig(path, format=path.suffix.lower().removeprefix("."))
+
+
+def _page(figure: Figure, title: str) -> str:
+    drawing = io.StringIO()
+    figure.savefig(drawing, format="svg")
+    picture = drawing.getvalue()
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{title}</title>'
+        f"</head>\n<body>\n{picture[picture.index('<svg') :]}</body>\n</html>\n"
+    )

@@ -1,0 +1,47 @@
+"""What a base on a command line is like: options for `BaseParameters`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import click
+
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.emulators.rh3.build import parameters_of
+from tickrig.host.cli.options import Decorator, add_options
+from tickrig.host.cli.refused import Refused
+
+NAMES: Final = (
+    "radius_left_m",
+    "radius_right_m",
+    "tread_m",
+    "friction",
+    "response_s",
+    "delay_ms",
+    "noise",
+)
+
+
+def _number(name: str, text: str) -> Decorator:
+    return click.option(f"--{name}", type=float, metavar="NUMBER", help=text)
+
+
+base_options: Final = add_options(
+    _number("radius-left-m", "Effective radius of the left wheel.  [0.0995]"),
+    _number("radius-right-m", "Effective radius of the right wheel.  [0.0995]"),
+    _number("tread-m", "Effective distance between the wheels.  [0.464]"),
+    _number("friction", "Coefficient between wheels and ground; without it they never slip."),
+    _number("response-s", "Time constant of the speed loop.  [0.05]"),
+    click.option("--delay-ms", type=int, metavar="MS", help="From a command to its effect.  [0]"),
+    _number("noise", "Spread of a wheel's way over the ground, as a share of it.  [0]"),
+)
+"""Add the parameters in `NAMES` as options."""
+
+
+def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
+    """Return a base of options, those left out as they are; Refused for one that cannot be."""
+    try:
+        return parameters_of({name: v for name, v in options.items() if v is not None})
+    except ValueError as error:
+        raise Refused(str(error)) from None

@@ -1,0 +1,156 @@
+"""The command `rh3`: let a cart of Reference Hardware 3 drive."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.emulators.rh3.base_options import NAMES, base_options, read_parameters
+from tickrig.emulators.rh3.journey_table import limits_of, table
+from tickrig.emulators.rh3.outing import Outing, demand_arrival, stopped_at_the_end, watched
+from tickrig.emulators.rh3.path_file import read_path
+from tickrig.emulators.rh3.squares import play_squares
+from tickrig.emulators.rh3.track_plot import write_track
+from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.motion.drive import drive
+from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.ports import sound
+
+COORDINATES: Final = {"ignore_unknown_options": True}
+"""So that `-1` is a number and no option."""
+
+_SHARED: Final[Decorator] = add_options(
+    click.option(
+        "--set",
+        "set_id",
+        type=click.Choice(["default", "tuned"]),
+        default="default",
+        show_default=True,
+        help="Configuration set: the specification's, or the more precise one.",
+    ),
+    click.option("--device", metavar="URL", help="Serial port of a base; else one is emulated."),
+    click.option("--baud", type=click.IntRange(1_200, 4_000_000), default=115_200, help="Of it."),
+    click.option(
+        "--pace",
+        type=click.FloatRange(0.01, 1_000),
+        metavar="X",
+        help="So many times real time, 1 is real time; else as fast as it goes.",
+    ),
+    click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
+    click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
+    base_options,
+    click.option("--seed", type=int, default=0, help="Of the noise."),
+)
+
+
+_PLOT: Final[Decorator] = click.option(
+    "--plot", type=PATH, help="Draw the journey into FILE.png, .svg or .html."
+)
+
+
+@click.group()
+@click.version_option(package_name="tickrig", message="%(version)s")
+def main() -> None:
+    """Let a cart of Reference Hardware 3 drive: six components over a base.
+
+    The base is emulated, in virtual time; with --device it is real hardware or
+    rh3-emu, in real time. Ctrl-C stops it.
+
+    \b
+    rh3 goto 1 0.5 1.57 --set tuned --plot track.svg
+    rh3 path corners.txt --pace 10
+    rh3 square --tread-m 0.459
+    rh3 goto 1 0 0 --device /dev/ttyUSB0
+    """  # noqa: D301 - click wants the backspace
+    logging.getLogger("tickrig").addHandler(logging.NullHandler())  # a line on stderr is ours
+
+
+@main.command(context_settings=COORDINATES)
+@click.argument("x", type=float)
+@click.argument("y", type=float)
+@click.argument("theta", type=float)
+@_PLOT
+@_SHARED
+def goto(x: float, y: float, theta: float, **options: Any) -> None:
+    """Drive to X and Y in metres, and turn to THETA in radians.
+
+    \b
+    rh3 goto 1 0.5 1.57
+    rh3 goto -1 0 0 --set tuned
+    """  # noqa: D301
+    if not sound(x, y, theta):
+        raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
+    _drive(_outing(options), [Pose(x, y, theta)], f"rh3 goto {x:g} {y:g} {theta:g}")
+
+
+@main.command("path")
+@click.argument("file", type=PATH)
+@_PLOT
+@_SHARED
+def along_path(file: Path, **options: Any) -> None:
+    """Drive along the points of FILE: lines with x, y in metres, and a heading in radians.
+
+    Only the heading of the last point counts.
+
+    \b
+    printf '2 0\\n2 2\\n0 2\\n0 0 0\\n' > corners.txt
+    rh3 path corners.txt
+    """  # noqa: D301
+    try:
+        points = read_path(file)
+    except OSError as error:
+        refuse_path("path", error)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    _drive(_outing(options), points, f"rh3 path {file.name}")
+
+
+@main.command()
+@click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
+@click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
+@_SHARED
+def square(runs: int | None, save: Path | None, **options: Any) -> None:
+    """Drive squares of 4 m both ways (UMBmark), and calibrate the odometry by them.
+
+    After each square the true place of the cart is measured: of an emulated base
+    it is known, with --device it is asked for.
+
+    \b
+    rh3 square --tread-m 0.459 --save Odometry.conf
+    rh3 square --tread-m 0.459 --odometry-conf Odometry.conf
+    """  # noqa: D301
+    outing = _outing(options)
+    by_chance = outing.device is not None or outing.base.noise
+    play_squares(outing, runs or (5 if by_chance else 1), save)
+
+
+def _outing(options: dict[str, Any]) -> Outing:
+    given = {name: options.pop(name) for name in (*NAMES, "seed")}
+    if options["device"] is not None and options["pace"] is not None:
+        raise Refused("--pace is for the emulated base; a --device has real time")
+    if options["show_map"] is None:
+        options["show_map"] = sys.stdout.isatty()
+    outing = Outing(**options, base=read_parameters(given))
+    outing.check()
+    return outing
+
+
+def _drive(outing: Outing, points: Sequence[Pose], title: str) -> None:
+    ride = outing.begin()
+    began = ride.chain.odometry.pose
+    with watched(outing, [began, *points]) as watcher, stopped_at_the_end(ride):
+        journey = drive(ride, points, watcher.watch)
+        demand_arrival(ride, journey)
+    for line in table(journey, began, points, limits_of(ride.chain)):
+        click.echo(line)
+    if outing.plot is not None:
+        try:
+            write_track(journey, points, title, outing.plot)
+        except OSError as error:
+            refuse_path("plot", error)
