@@ -13,9 +13,12 @@ from tickrig.emulators.rrc.build import build_rrc
 from tickrig.emulators.rtc_lite.build import NAME as RTC_LITE
 from tickrig.emulators.rtc_lite.build import build_rtc_lite
 from tickrig.emulators.trace import Config
+from tickrig.emulators.urg.build import NAME as URG
+from tickrig.emulators.urg.build import build_urg
 
 DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {
     RRC: build_rrc,
     RTC_LITE: build_rtc_lite,
     RH3: build_rh3,
+    URG: build_urg,
 }

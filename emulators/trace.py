@@ -23,6 +23,7 @@ from typing import Final
 
 from tickrig.emulators.byte_text import escape, unescape
 from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.setting import Setting, parse_setting
 
 VERSION: Final = 1
 RESET: Final = "reset"
@@ -32,7 +33,7 @@ Config = Mapping[str, str | int | float | None]
 
 _HEADER: Final = re.compile(r"# tickrig-trace v([0-9]+) ([\w-]+) (\{.*\})")
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
-_INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18})", re.ASCII)
+_INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2})?)", re.ASCII)
 
 
 class TraceError(ValueError):
@@ -84,10 +85,10 @@ class Record:
         return f"{format_time(self.at_us)} {self.mark} {rest}".rstrip()
 
     @property
-    def change(self) -> tuple[str, int]:
+    def change(self) -> tuple[str, Setting]:
         """Which input changed to what, for `!`."""
         name, _, value = self.text.partition("=")
-        return name, int(value)
+        return name, parse_setting(value)
 
 
 def parse_header(line: str) -> Header:

@@ -1,0 +1,1 @@
+"""A scanning range finder on a pty or in virtual time: `urg-emu`."""

@@ -1,0 +1,99 @@
+"""The command `urg-emu`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import click
+
+from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.sensor import Urg
+from tickrig.device.urg.world import World, room
+from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.serial_options import line_options
+from tickrig.emulators.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.trace import Mark
+from tickrig.emulators.urg.build import (
+    NAME,
+    config_to_trace,
+    parse_numbers,
+    parse_post,
+    parse_wall,
+)
+from tickrig.emulators.wire_log import WireLine
+from tickrig.host.cli.options import add_options
+from tickrig.host.cli.refused import Refused
+
+USB_BAUD: Final = 12_000_000
+"""As fast as USB at full speed."""
+
+_WORLD: Final = add_options(
+    click.option("--room", "size", metavar="WIDTH,DEPTH", help="Four walls around the origin, m."),
+    click.option("--wall", "walls", multiple=True, metavar="X1,Y1,X2,Y2", help="A wall, m."),
+    click.option("--post", "posts", multiple=True, metavar="X,Y,RADIUS", help="A round post, m."),
+)
+
+
+@click.command()
+@click.option("--serial", default="H0614967", metavar="TEXT", help="Serial number.  [H0614967]")
+@click.option(
+    "--noise",
+    type=click.FloatRange(0, 1),
+    default=0.0,
+    help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(1_200, USB_BAUD),
+    default=USB_BAUD,
+    help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
+)
+@_WORLD
+@line_options("flip, drop, dup, cut")
+@click.pass_context
+def main(context: click.Context, /, serial: str, noise: float, baud: int, **options: Any) -> None:
+    """Emulate a scanning range finder URG-04LX (SCIP 2.0) on a pseudo-terminal.
+
+    It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
+    as fast as it goes, with the same transcript each time, exit status 1 if
+    something expected did not come. Together with --link or --control it is
+    played in real time.
+
+    \b
+    urg-emu --link /tmp/urg --control /tmp/urg.ctl --room 4,3 --post 1,0.5,0.1
+    tickrig ctl /tmp/urg.ctl set pose 0.5 0 1.57
+    tickrig ctl /tmp/urg.ctl set post 1 0 0.2
+    printf '0 send VV\\n1 expect 00P within 10ms' | urg-emu --scenario -
+
+    \b
+    Completion of options in the shell:
+    eval "$(_URG_EMU_COMPLETE=bash_source urg-emu)"
+    """  # noqa: D301 - click wants the backspace
+    try:
+        parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"])
+        world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    line = LineKind(baud)
+    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=_talk)
+    config = config_to_trace(parameters, world)
+    run = SerialRun(kind, Urg(parameters, world), config, Options(**options))
+    context.exit(run.run())
+
+
+def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
+    around = World()
+    if size is not None:
+        width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
+        around = room(width_m, depth_m)
+    more = tuple(parse_wall(text) for text in walls)
+    return World(around.walls + more, tuple(parse_post(text) for text in posts))
+
+
+def _talk(link: str) -> str:
+    return " Any program that speaks SCIP 2.0 can open this path."
+
+
+def _is_event(line: WireLine) -> bool:
+    return line.mark is Mark.TO_DEVICE

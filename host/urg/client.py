@@ -1,0 +1,98 @@
+"""A SCIP host that waits for nothing: ask, look for scans later."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.errors import DeviceRefused
+from tickrig.host.link import Link
+from tickrig.host.urg.scan import Scan
+from tickrig.wire.errors import WireError
+from tickrig.wire.scip import status
+from tickrig.wire.scip.command import Command
+from tickrig.wire.scip.description import Specification
+from tickrig.wire.scip.reply import Reply, ReplySplitter
+from tickrig.wire.scip.scan import WIDTHS, parse_scan
+
+SILENCE_US: Final = 500_000
+"""How long a sensor may be silent: five turns; more where scans are left out."""
+
+ENDLESS: Final = 0
+
+
+class UrgClient:
+    """Reads what kind of sensor it is, lets it measure without end, and takes its scans.
+
+    It begins with QT, so that a sensor which still measures for somebody before is quiet.
+    After the time of five scans without a word it begins again. A scan that came garbled
+    is left out.
+
+    Args:
+        link: the line.
+        cluster: steps for each number, 1..99.
+        interval: scans that are left out after each, 0..9.
+
+    Attributes:
+        kind: what the sensor told of itself, None before.
+        garbled: replies and scans that were none.
+        restarts: how often it began again.
+    """
+
+    def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:
+        self._link, self._cluster, self._interval = link, cluster, interval
+        self.kind: Specification | None = None
+        self.restarts = self._spoilt = 0
+        self._begin()
+
+    @property
+    def garbled(self) -> int:
+        """Replies and scans that were none."""
+        return self._spoilt + self._splitter.garbled
+
+    def poll(self) -> list[Scan]:
+        """Return the scans that have come.
+
+        Raises:
+            LinkClosed: the line is gone.
+            DeviceRefused: the sensor has a trouble, or cannot do what was asked.
+        """
+        scans, data = [], self._link.receive(0)
+        for reply in self._splitter.push(data):
+            self._heard_us = self._link.now_us
+            try:
+                scans += self._take(reply)
+            except WireError:
+                self._spoilt += 1
+        if self._link.now_us - self._heard_us > SILENCE_US * (1 + self._interval):
+            self.restarts += 1
+            self._spoilt = self.garbled
+            self._begin()
+        return scans
+
+    def close(self) -> None:
+        """Switch the laser off, and give the line back."""
+        self._link.send(Command("QT").encode())
+        self._link.close()
+
+    def _begin(self) -> None:
+        self._splitter, self._heard_us = ReplySplitter(), self._link.now_us
+        self._link.send(Command("QT").encode() + Command("PP").encode())
+
+    def _take(self, reply: Reply) -> list[Scan]:
+        command = Command.parse(reply.echo)
+        if command.symbol == "PP" and reply.status == status.OK:
+            self.kind = Specification.parse(reply.lines)
+            self._measure(self.kind)
+        if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
+            return []
+        if reply.status != status.DATA:
+            raise DeviceRefused(f"{reply.echo!r}: status {reply.status}", reply.status)
+        if self.kind is None:
+            return []
+        time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
+        return [Scan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
+
+    def _measure(self, kind: Specification) -> None:
+        steps = f"{kind.first:04}{kind.last:04}"
+        rest = f"{self._cluster:02}{self._interval}{ENDLESS:02}"
+        self._link.send(Command("MD", steps + rest).encode())

@@ -1,0 +1,31 @@
+"""A client with an emulated sensor, in virtual time."""
+
+from __future__ import annotations
+
+from tickrig.device.urg.sensor import Urg
+from tickrig.device.urg.world import World, room
+from tickrig.emulators.byte_faults import BYTE_FAULTS
+from tickrig.emulators.faults import FaultyPort
+from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.sim_link import SimLink
+from tickrig.host.urg.client import UrgClient
+from tickrig.host.urg.scan import Scan
+
+
+class SensorBench:
+    """The client polls every 10 ms."""
+
+    def __init__(self, world: World | None = None, cluster: int = 1, interval: int = 0) -> None:
+        self.urg, self.line = Urg(world=world or room(4, 3)), SerialLine(12_000_000)
+        self.port = FaultyPort(self.line.a, BYTE_FAULTS, seed=1)
+        self.rig = Rig(Station(self.urg, self.port))
+        self.link = SimLink(self.rig, self.line.b)
+        self.client = UrgClient(self.link, cluster, interval)
+
+    def run(self, duration_ms: int = 1_000) -> list[Scan]:
+        scans = []
+        for _ in range(duration_ms // 10):
+            self.rig.run_for(10_000)
+            scans += self.client.poll()
+        return scans
