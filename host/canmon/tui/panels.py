@@ -6,6 +6,7 @@ from typing import Final
 
 from tickrig.host.canmon.tui.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.tui.dictionary_panel import DictionaryPanel
+from tickrig.host.canmon.tui.graph_panel import GraphPanel
 from tickrig.host.canmon.tui.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
@@ -18,6 +19,7 @@ PANELS: Final[tuple[type[Panel], ...]] = (
     StatisticsPanel,
     DictionaryPanel,
     TransmitPanel,
+    GraphPanel,
     AlarmsPanel,
 )
 """Key 1 shows the first, and so on."""
