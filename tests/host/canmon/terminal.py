@@ -33,6 +33,8 @@ class Terminal:
         if feed is not None:
             command = ["/bin/sh", "-c", f"cat {feed} | {shlex.join(command)}"]
         env = {**os.environ, "TERM": "xterm-256color", "LANG": "C.UTF-8"}
+        for name in ("COLUMNS", "LINES"):  # of the runner: they would go before the window's
+            env.pop(name, None)
         self.child = pexpect.spawn(
             command[0],
             command[1:],
