@@ -59,6 +59,7 @@ class Registers:
         }
         self._measured = measured
         self._values: dict[str, int] = {}
+        self._asked, self._places = (0, 0), list[tuple[str, int]]()  # of the latest read
         self.reset()
 
     def reset(self) -> None:
@@ -76,17 +77,17 @@ class Registers:
 
     def check(self, first: int, count: int) -> None:
         """Raise Refusal if a register is not there."""
-        for address in range(first, first + count):
-            self._find(address)
+        if (first, count) == self._asked:
+            return
+        found = [self._find(address) for address in range(first, first + count)]
+        self._places = [(r.name, 16 * (r.words - 1 - word)) for r, word in found]
+        self._asked = (first, count)
 
     def read(self, first: int, count: int) -> list[int]:
         """Return registers; Refusal if one is not there."""
-        found = [self._find(address) for address in range(first, first + count)]
-        values = {register.name: self[register.name] for register, _ in found}
-        return [
-            values[register.name] >> 16 * (register.words - 1 - word) & 0xFFFF
-            for register, word in found
-        ]
+        self.check(first, count)
+        values = {name: self[name] for name in dict(self._places)}
+        return [values[name] >> shift & 0xFFFF for name, shift in self._places]
 
     def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
         """Write registers, all or none; return what was written, by name.

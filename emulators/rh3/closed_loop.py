@@ -97,7 +97,8 @@ class ClosedLoop:
         while (due_us := self.manager.due_us) <= t_us:
             self.rig.run_to(due_us)
             self.manager.tick(due_us)
-        self.rig.run_to(t_us)
+        if self.rig.now_us < t_us:
+            self.rig.run_to(t_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int, step_us: int = 20_000) -> bool:
         """Go on until something is so; False if it was not in time."""

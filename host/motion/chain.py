@@ -88,8 +88,8 @@ class MotionChain:
     @property
     def in_error(self) -> tuple[str, ...]:
         """Names of the components in Error."""
-        names = (component.instance_name for component in self.components)
-        return tuple(n for n in names if self._manager.state_of(n) is LifeCycleState.ERROR)
+        state_of, error = self.context.state_of, LifeCycleState.ERROR
+        return tuple(c.instance_name for c in self.components if state_of(c) is error)
 
     def use(self, set_id: str) -> None:
         """Let the configuration set of a name hold in all components that have it."""

@@ -25,8 +25,8 @@ def arrived(port: InPort[T]) -> Iterator[T]:
 def newest(port: InPort[T]) -> T | None:
     """Return what arrived last, None if nothing did; the rest is dropped."""
     latest = None
-    for value in arrived(port):
-        latest = value
+    while port.is_new:
+        latest = port.read()
     return latest
 
 

@@ -1,0 +1,1 @@
+"""Components around the chain: hands, eyes, and robots that go together."""
