@@ -15,12 +15,12 @@ from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.watch import Watch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.duration import format_time
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.sequence import steps
 from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
+from tickrig.host.monitor.sequence.note_text import note_line
 from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
 from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.host.monitor.sequence.variables import parse_variable
@@ -122,7 +122,7 @@ def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
 
 def _show(run: SequenceRun, quiet: bool) -> None:
     """Print what happened since the last time."""
-    for at_us, mark, text in run.notes:
-        if not quiet or mark is Mark.MISSED:
-            click.echo(f"{format_time(at_us)} {mark} {text}")
+    for note in run.notes:
+        if not quiet or note.mark is Mark.MISSED:
+            click.echo(note_line(note))
     run.notes.clear()

@@ -9,6 +9,7 @@ from tickrig.host.canmon.tui.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.graph_panel import GraphPanel
 from tickrig.host.canmon.tui.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.tui.sequence_panel import SequencePanel
 from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_panel import TracePanel
 from tickrig.host.canmon.tui.transmit_panel import TransmitPanel
@@ -19,6 +20,7 @@ PANELS: Final[tuple[type[Panel], ...]] = (
     StatisticsPanel,
     DictionaryPanel,
     TransmitPanel,
+    SequencePanel,
     GraphPanel,
     AlarmsPanel,
 )
