@@ -28,6 +28,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/canmon-model.md",
         "docs/canopen.md",
         "docs/device-rtc.md",
+        "docs/rh3.md",
         "docs/rtc-lite.md",
         "docs/rtc.md",
         "docs/rtc-canopen.md",
