@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -94,7 +93,7 @@ class NodesView:
 
     def lines(self, *, live: bool) -> list[str]:
         """Return the board for paper, or as wide as the terminal is."""
-        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else MANY
+        columns = _columns() if sys.stdout.isatty() else MANY
         return render_board(self._board, self._now_us(live), columns, MANY)
 
     def json(self, *, live: bool) -> list[str]:
@@ -117,6 +116,12 @@ class NodesView:
     def _now_us(self, live: bool) -> int:
         """Return the time at a live source, of a file its last frame's."""
         return self._watch.now_us if live else self._board.now_us
+
+
+def _columns() -> int:
+    from shutil import get_terminal_size  # noqa: PLC0415 - slow, and no pipe wants it
+
+    return get_terminal_size().columns
 
 
 explain_sources(command)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from decimal import Decimal
 from typing import Final
 
 _TIME: Final = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(s|ms|us)?")
@@ -22,7 +21,8 @@ def parse_time_us(text: str) -> int:
     match = _TIME.fullmatch(text)
     if match is None:
         raise ValueError(f"{text!r} is not a time: write 1.5s, 200ms or 250us")
-    return int(Decimal(match[1]) * _UNIT_US[match[2] or "s"])
+    whole, _, fraction = match[1].partition(".")
+    return int(f"{whole}{fraction:0<9}") * _UNIT_US[match[2] or "s"] // 1_000_000_000
 
 
 def format_time(t_us: int) -> str:

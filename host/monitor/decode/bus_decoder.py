@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.lss_messages import decode_lss
 from tickrig.host.monitor.decode.memory import DEVICE_TYPE, HEARTBEAT_TIME, NodeMemory
 from tickrig.host.monitor.decode.network_services import (
     decode_emcy,
@@ -20,13 +19,15 @@ from tickrig.host.monitor.decode.network_services import (
 )
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
-from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step
 from tickrig.host.monitor.decode.transfer import Direction, Outcome, Transfer, write_entry
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
 from tickrig.wire.canopen.nmt import NMT_COB_ID
 from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step
 
 Route = Callable[[int, CanFrame], Decoded]
 
@@ -36,12 +37,11 @@ PDO_IDS: Final = range(0x181, 0x580)
 NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 SDO_SERVERS: Final = range(0x1201, 0x1280)
+LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
 PRE_DEFINED: Final[dict[int, Route]] = {
     NMT_COB_ID: decode_nmt,
     SYNC_ID: decode_sync,
     TIME_ID: decode_time,
-    LSS_MASTER_COB_ID: decode_lss,
-    LSS_SLAVE_COB_ID: decode_lss,
 }
 
 
@@ -91,6 +91,8 @@ class BusDecoder:
         told = self._told.get(can_id) or PRE_DEFINED.get(can_id)
         if told is not None:
             return told
+        if can_id in LSS_IDS:
+            return _lss_route()
         layout = self._pdos.layout(can_id)
         if layout is not None:
             return layout.decode
@@ -110,6 +112,10 @@ class BusDecoder:
                 return partial(_unmapped, node) if can_id in PDO_IDS else _raw
 
     def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
+        from tickrig.host.monitor.decode.sdo_channel import (  # noqa: PLC0415 - not on every bus
+            SdoChannel,
+        )
+
         channel = self._channels.setdefault((node, request_id), SdoChannel(node))
         take = channel.request if can_id == request_id else channel.response
         return partial(self._sdo, node, take)
@@ -207,6 +213,14 @@ def _signals(transfer: Transfer) -> tuple[Signal, ...]:
         return ()
     name = transfer.name or write_entry(transfer.entry)
     return (Signal(name, transfer.value, transfer.unit, transfer.text),)
+
+
+def _lss_route() -> Route:
+    from tickrig.host.monitor.decode.lss_messages import (  # noqa: PLC0415 - on few buses
+        decode_lss,
+    )
+
+    return decode_lss
 
 
 def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -110,5 +109,7 @@ def _power_on(item: ODVariable) -> bytes | None:
     try:
         return kind.encode(value)
     except FieldError as error:
+        import logging  # noqa: PLC0415 - a verb on a small log starts without
+
         logging.getLogger(__name__).warning("%04Xh:%02X: %s", item.index, item.subindex, error)
         return None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
-from statistics import median
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
@@ -90,7 +90,7 @@ class NodeStatus:
         told = self.memory.number(*HEARTBEAT_TIME)
         if told or self.memory.was_heard(HEARTBEAT_TIME):
             return told * 1_000 if told else None
-        return round(median(self._gaps)) if self._gaps else None
+        return _median(self._gaps) if self._gaps else None
 
     @property
     def learnt(self) -> bool:
@@ -157,3 +157,9 @@ class NodeStatus:
             self.sdo_error = str(transfer)
         elif transfer.entry == DEVICE_NAME and isinstance(transfer.value, str):
             self.name = transfer.value
+
+
+def _median(gaps: Collection[int]) -> int:
+    """Return the median; statistics would take 5 ms to import."""
+    ordered = sorted(gaps)
+    return (ordered[(len(gaps) - 1) // 2] + ordered[len(gaps) // 2]) // 2
