@@ -58,10 +58,11 @@ class Follower(RtComponent):
         wanted = (0.0, 0.0, 0.0) if leader is None or own is None else self._wanted(own, leader)
         step_s = ec.period_us / 1e6
         steps = (self.max_acc_v.value, self.max_acc_v.value, self.max_acc_w.value)
-        vx, vy, va = self._commanded = tuple(
+        vx, vy, va = (
             before + clip(target - before, step * step_s)
             for before, target, step in zip(self._commanded, wanted, steps, strict=True)
         )
+        self._commanded = vx, vy, va
         data = Velocity2D(vx, vy, va)
         self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
         return ReturnCode.RTC_OK

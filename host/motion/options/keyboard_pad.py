@@ -1,0 +1,59 @@
+"""A keyboard as a pad: a key pushes while it repeats."""
+
+from __future__ import annotations
+
+import os
+import sys
+import termios
+from collections.abc import Mapping
+from typing import Final
+
+from tickrig.host.errors import LinkClosed
+from tickrig.host.motion.options.pad import Hand
+
+KEYS: Final[Mapping[str, Hand]] = {
+    "w": Hand(forward=1.0),
+    "s": Hand(forward=-1.0),
+    "a": Hand(turn=1.0),
+    "d": Hand(turn=-1.0),
+    "q": Hand(left=1.0),
+    "e": Hand(left=-1.0),
+    " ": Hand(),
+}
+
+HOLD_US: Final = 300_000
+"""A key pushes so long after it came; terminals repeat it sooner than that."""
+
+
+class KeyboardPad:
+    """Reads keys of a terminal: w s forward and back, a d turn, q e sideways, space stop.
+
+    Args:
+        fd: of the terminal, standard input unless given.
+
+    Raises:
+        LinkClosed: it is no terminal.
+    """
+
+    def __init__(self, fd: int | None = None) -> None:
+        self._fd = sys.stdin.fileno() if fd is None else fd
+        try:
+            self._before = termios.tcgetattr(self._fd)
+        except termios.error as error:
+            raise LinkClosed(f"the keyboard is no terminal: {error.args[-1]}") from error
+        raw = termios.tcgetattr(self._fd)
+        raw[3] &= ~(termios.ICANON | termios.ECHO)
+        raw[6][termios.VMIN] = raw[6][termios.VTIME] = 0
+        termios.tcsetattr(self._fd, termios.TCSANOW, raw)
+        self._hand, self._until_us = Hand(), 0
+
+    def poll(self, now_us: int, /) -> Hand:
+        """Return where the latest key pushes."""
+        for key in os.read(self._fd, 256).decode("latin-1"):
+            if key in KEYS:
+                self._hand, self._until_us = KEYS[key], now_us + HOLD_US
+        return self._hand if now_us < self._until_us else Hand()
+
+    def close(self) -> None:
+        """Let the terminal be as it was."""
+        termios.tcsetattr(self._fd, termios.TCSANOW, self._before)

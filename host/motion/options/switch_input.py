@@ -1,0 +1,80 @@
+"""SwitchInput: who drives, a hand or the planner."""
+
+from __future__ import annotations
+
+import logging
+from typing import ClassVar, Final
+
+from tickrig.host.motion.ports import newest, sound
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.extended_2d import Velocity2D
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class SwitchInput(RtComponent):
+    """The joystick wins; the planner resumes `hold` after the hand has let go.
+
+    In between the cart stands. A joystick that says nothing for `stale` while it is pushed
+    counts as let go, and a velocity with a number that is none as 0.
+
+    The specification only names it (SwitchInputRTC); ports and parameters are ours.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.hold = self.configuration.bind("hold", 0.5, "x>=0", unit="s")
+        self.stale = self.configuration.bind("stale", 0.1, "x>0", unit="s")
+        self.joystick = self.add_port(InPort("joystick", iis.TimedVelocity2D))
+        self.automatic = self.add_port(InPort("automatic", iis.TimedVelocity2D))
+        self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
+        self._forget()
+
+    def _forget(self) -> None:
+        self.by_hand = False
+        self._pushed = Velocity2D()
+        self._heard_us = self._let_go_us = 0
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin with the planner."""
+        self._forget()
+        self.joystick.clear()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Pass the velocity of whoever drives on."""
+        planned = newest(self.automatic)
+        self._listen(ec)
+        self._switch(ec)
+        if self.by_hand:
+            self._write(ec, self._pushed)
+        elif planned is not None:
+            self._write(ec, _made_sound(planned.data))
+        return ReturnCode.RTC_OK
+
+    def _listen(self, ec: ExecutionContext) -> None:
+        if (latest := newest(self.joystick)) is not None:
+            self._pushed, self._heard_us = _made_sound(latest.data), ec.now_us
+        elif ec.now_us - self._heard_us > self.stale.value * 1e6:
+            self._pushed = Velocity2D()
+
+    def _switch(self, ec: ExecutionContext) -> None:
+        pushed, before = self._pushed != Velocity2D(), self.by_hand
+        if pushed:
+            self.by_hand, self._let_go_us = True, ec.now_us
+        elif ec.now_us - self._let_go_us > self.hold.value * 1e6:
+            self.by_hand = False
+        if self.by_hand != before:
+            driver = "the joystick" if self.by_hand else "the planner"
+            _LOG.info("%s: %s drives", self.instance_name, driver)
+
+    def _write(self, ec: ExecutionContext, data: Velocity2D) -> None:
+        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+
+
+def _made_sound(data: Velocity2D) -> Velocity2D:
+    return data if sound(data.vx, data.vy, data.va) else Velocity2D()
