@@ -50,6 +50,13 @@ class Connections:
         )
         self.wanted += (_entry(profile) for profile in profiles)
 
+    def forget(self, first: str, second: str) -> bool:
+        """Want a connection no more; False if it is none that waits."""
+        ends = {first, second}
+        waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]
+        self.wanted = [entry for entry in self.wanted if entry not in waiting]
+        return bool(waiting)
+
     def _connect(self, entry: RtConnection) -> None:
         ends = f"{entry.source} to {entry.target}"
         try:

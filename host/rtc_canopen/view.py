@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from tickrig.host.canopen.dialogue import Failure, Job
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.data_port import DataPort, OutPort
-from tickrig.host.rtc.port import AnyPort
-from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, SystemDefinition
+from tickrig.host.rtc_canopen.definition import (
+    PdoLink,
+    PdoName,
+    Role,
+    RtConnection,
+    SystemDefinition,
+)
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import Event
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, proxy_index
+from tickrig.host.rtc_canopen.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
 from tickrig.host.rtc_canopen.server import Server
 
@@ -64,6 +71,7 @@ class NodeView:
     Attributes:
         nmt_state: as `OPERATIONAL`, empty before it was heard.
         heartbeat_age_us: since it was heard, `NOT_HEARD` before.
+        late: its heartbeat is missing.
         proxy_state: as `ACTIVE`, empty without a proxy.
         problem: why it is refused, empty while all is well.
     """
@@ -74,10 +82,25 @@ class NodeView:
     phase: Phase
     nmt_state: str
     heartbeat_age_us: int
+    late: bool
     proxy_state: str
     problem: str
     ports: tuple[PortView, ...]
     pdos: tuple[PdoView, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentView:
+    """A component beside the proxies.
+
+    Attributes:
+        state: as `ACTIVE`.
+    """
+
+    name: str
+    type_name: str
+    state: str
+    ports: tuple[PortView, ...]
 
 
 class Transfer:
@@ -123,6 +146,12 @@ class ServerView:
         return tuple(self._view(node) for node in self._server.nodes.values())
 
     @property
+    def components(self) -> tuple[ComponentView, ...]:
+        """All components that are no proxies."""
+        components = self._server.manager.components
+        return tuple(_component(one) for one in components if not isinstance(one, ProxyRtc))
+
+    @property
     def events(self) -> tuple[Event, ...]:
         """What happened, the latest last."""
         return self._server.log.events
@@ -131,6 +160,16 @@ class ServerView:
     def links(self) -> tuple[PdoLink, ...]:
         """PDO links that are wanted."""
         return tuple(self._server.links.links)
+
+    @property
+    def connections(self) -> tuple[RtConnection, ...]:
+        """Connections through the PC, those that are made first."""
+        return self._server.connections.all
+
+    @property
+    def waiting(self) -> tuple[RtConnection, ...]:
+        """Connections whose ports are not there yet."""
+        return tuple(self._server.connections.wanted)
 
     def node(self, node_id: int) -> NodeView:
         """Return one node; ServerRefused if there is none."""
@@ -161,8 +200,9 @@ class ServerView:
         self._server.manager.connect(first, second, properties)
 
     def disconnect(self, first: str, second: str) -> None:
-        """End such a connector; RtcRefused if there is none."""
-        self._server.manager.disconnect(first, second)
+        """End such a connection, one that waits for its ports, too; RtcRefused if there is none."""
+        if not self._server.connections.forget(first, second):
+            self._server.manager.disconnect(first, second)
 
     def link(self, source: PdoName, target: PdoName) -> None:
         """Let an RPDO receive a TPDO without the PC; ServerRefused if they do not fit."""
@@ -185,7 +225,7 @@ class ServerView:
         return replace(
             self._server.definition,
             pdo_links=self.links,
-            rt_connections=self._server.connections.all,
+            rt_connections=self.connections,
         )
 
     def _node(self, node_id: int) -> ServedNode:
@@ -209,15 +249,27 @@ class ServerView:
             node.phase,
             "" if state is None else state.name,
             NOT_HEARD if state is None else self._server.now_us - node.heard_us,
+            node.lost,
             "" if proxy is None else proxy.state.name,
             node.problem,
-            tuple(_port(port) for port in proxy.ports.values()) if proxy else (),
+            _ports(proxy) if proxy else (),
             tuple(_pdo(node.entry.id, pdo) for pdo in node.layouts),
         )
 
 
-def _port(port: AnyPort) -> PortView:
-    assert isinstance(port, DataPort)
+def _component(component: RtComponent) -> ComponentView:
+    state = component.contexts[0].state_of(component).name if component.contexts else ""
+    name, type_name = component.instance_name, component.spec.type_name
+    return ComponentView(name, type_name, state, _ports(component))
+
+
+def _ports(component: RtComponent) -> tuple[PortView, ...]:
+    """Return the data ports; service ports cannot be joined with those of a device."""
+    ports = component.ports.values()
+    return tuple(_port(port) for port in ports if isinstance(port, DataPort))
+
+
+def _port(port: DataPort[Any]) -> PortView:
     ends = (end for connector in port.connectors for end in connector.profile.ports)
     peers = tuple(end for end in ends if end != port.full_name)
     return PortView(port.full_name, port.data_type.__name__, isinstance(port, OutPort), peers)

@@ -1,0 +1,103 @@
+"""What the command lines of a server have in common: its files, and its bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TextIO
+
+import click
+
+from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.link import Link
+from tickrig.wire.can import Frames
+
+if TYPE_CHECKING:
+    from tickrig.host.can_link import CanLink
+    from tickrig.host.rtc_canopen.definition import BusEntry
+    from tickrig.host.rtc_canopen.events import Event, Listener
+    from tickrig.host.rtc_canopen.server import Server
+    from tickrig.wire.can_error import ErrorState
+
+ECHOING: Final = ("udp_multicast",)
+"""Interfaces that give back what they sent, whatever is asked of them."""
+
+STANDARD_OUTPUT: Final = Path("-")
+
+
+class BusFailed(click.ClickException):
+    """One line on standard error, and exit status 3."""
+
+    exit_code = 3
+
+
+def read_server(file: Path) -> Server:
+    """Make the server of a System Definition; Refused if that or an EDS cannot be used."""
+    try:
+        from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - canopen is slow
+    except ModuleNotFoundError as error:
+        raise Refused(f"{error}: pip install 'tickrig[rtc]'") from None
+    try:
+        return open_server(file)
+    except OSError as error:
+        refuse_path("file", error)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+
+
+def open_link(
+    options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
+) -> tuple[Link[Frames], str]:
+    """Open the bus of a server; return it, and how people call it.
+
+    Args:
+        options: which bus.
+        bus_state: told what its CAN controller reports.
+        stack: closes it.
+    """
+    from tickrig.host.can_link import CanLink  # noqa: PLC0415
+    from tickrig.host.echo_free_link import EchoFreeLink  # noqa: PLC0415
+
+    bus, interface, channel = open_raw(options)
+    link = CanLink(bus, f"{interface}:{channel}", drops=True)
+    stack.callback(_close, link)
+    link.on_error_state = bus_state
+    name = f"{interface} {channel}"
+    return (EchoFreeLink(link) if interface in ECHOING else link), name
+
+
+def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
+    """Return the bus of the command line, that of the file where it names none."""
+    if options or entry.channel is None:
+        return options
+    return replace(
+        options,
+        interface=entry.interface or "socketcan",
+        channel=entry.channel,
+        bitrate=options.bitrate or entry.bitrate,
+    )
+
+
+def log_listener(log: Path | None, stack: ExitStack) -> Iterator[Listener]:
+    """Yield what writes events to a file, if there is one."""
+    if log == STANDARD_OUTPUT:
+        yield lambda event: click.echo(event.to_json())
+    elif log is not None:
+        try:
+            file = stack.enter_context(log.open("w", encoding="utf-8", buffering=1))
+        except OSError as error:
+            refuse_path("--log", error)
+        yield lambda event: _write(file, event)
+
+
+def _write(file: TextIO, event: Event) -> None:
+    file.write(f"{event.to_json()}\n")
+
+
+def _close(link: CanLink) -> None:
+    if link.lost:
+        click.echo(f"{link.lost} frames were lost: the bus took none", err=True)
+    link.close()

@@ -1,0 +1,1 @@
+"""The System Editor: a running server on a terminal."""

@@ -1,0 +1,272 @@
+"""The System Editor: the nodes of a running server, their objects, and what joins them."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar, Final
+
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container
+from textual.widgets import Footer
+
+from tickrig.host.canmon.tui.line_view import LineView
+from tickrig.host.monitor.decode.transfer import write_entry
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc_canopen.editor import joining
+from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
+from tickrig.host.rtc_canopen.editor.objects_pane import ObjectsPane
+from tickrig.host.rtc_canopen.editor.question import Question
+from tickrig.host.rtc_canopen.editor.session import Session
+from tickrig.host.rtc_canopen.editor.status import event_line, status_line
+from tickrig.host.rtc_canopen.editor.system_pane import SystemPane
+from tickrig.host.rtc_canopen.editor.system_rows import Item
+from tickrig.host.rtc_canopen.errors import ServerRefused
+from tickrig.host.rtc_canopen.view import ServerView
+
+PAINT_S: Final = 0.1
+SWITCH_S: Final = 0.000_5
+"""How long the screen may keep the server from running."""
+
+EVENTS_SHOWN: Final = 500
+ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+Command = Callable[[ServerView], object]
+Join = Callable[[ServerView, Item, Item], None]
+
+ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
+    "activate": ServerView.activate,
+    "deactivate": ServerView.deactivate,
+    "reset": ServerView.reset,
+}
+
+
+class SystemEditor(App[None]):
+    """Shows a server and commands it by keys and mouse.
+
+    Args:
+        session: the server; it is started by whoever runs the app.
+        bus: how the bus is called.
+    """
+
+    TITLE = "RTC-CANopen System Editor"
+    CSS = """
+    SystemPane, ObjectsPane, #events { border: round $secondary; }
+    SystemPane:focus, ObjectsPane:focus, #events:focus { border: round $accent; }
+    #panes, SystemPane { height: 1fr; }
+    ObjectsPane { height: 1fr; }
+    .-wide #panes { layout: horizontal; }
+    .-wide SystemPane, .-wide ObjectsPane { width: 1fr; }
+    #events { height: 7; }
+    #status { height: 1; background: $boost; }
+    """
+    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [  # type: ignore[misc]
+        (0, "-narrow"),
+        (130, "-wide"),
+    ]
+    HELP = """
+    # System Editor
+
+    **System**: nodes with the state of the proxy, that of NMT, and how long ago the heartbeat
+    was; their PDOs and ports; components; what joins them. **Objects**: those of the node in
+    whose rows the cursor is. **Events**: the latest at the bottom.
+
+    To join two: mark a port or PDO, go to another, connect them through the PC (ports) or link
+    them without it (PDOs). To end it: go to it at the end of the system, remove it.
+
+    A click moves the cursor; a double click writes an object, or opens and folds a node.
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f1,question_mark", "help", "help", key_display="F1"),
+        Binding("a", "ask('activate')", "activate"),
+        Binding("d", "ask('deactivate')", "deactivate"),
+        Binding("r", "ask('reset')", "reset"),
+        Binding("b", "boot", "set up again", show=False),
+        Binding("S", "start", "activate all in the start order", show=False),
+        Binding("m", "mark", "mark"),
+        Binding("c", "join('connect')", "connect"),
+        Binding("k", "join('link')", "link"),
+        Binding("x", "remove", "remove"),
+        Binding("g", "read", "read the object again", show=False),
+        Binding("w", "write", "write"),
+        Binding("l", "live", "live"),
+        Binding("ctrl+s", "save", "save", key_display="^s"),
+        Binding("ctrl+o", "load", "load", key_display="^o"),
+        Binding("q,ctrl+q", "quit", "quit", key_display="q"),
+        Binding("ctrl+c", "quit", "quit", show=False, priority=True),
+    ]
+
+    def __init__(self, session: Session, bus: str = "") -> None:
+        super().__init__()
+        self.session, self._bus = session, bus
+        self.system, self.objects = SystemPane(), ObjectsPane()
+        self.events, self.status = LineView("events"), LineView("status")
+
+    def compose(self) -> ComposeResult:
+        """Lay out the panes."""
+        with Container(id="panes"):
+            yield self.system
+            yield self.objects
+        yield self.events
+        yield self.status
+        yield Footer(compact=True)
+
+    def on_mount(self) -> None:
+        """Begin to paint."""
+        loop = asyncio.get_running_loop()
+        for number in ENDING:
+            loop.add_signal_handler(number, self.exit)
+        self.status.can_focus, self.events.border_title = False, "events"
+        self.system.focus()
+        self.set_interval(PAINT_S, self.look)
+
+    def run_session(self) -> None:
+        """Run the server in a thread, and show it until the editor is left.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        before_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
+        self.session.start()
+        try:
+            self.run()
+        finally:
+            sys.setswitchinterval(before_s)
+            self.session.close()
+
+    def look(self) -> None:
+        """Show how things are now; called ten times a second, and after each command."""
+        if self.session.ended:
+            self.exit()
+            return
+        with self.session.lock:
+            view = self.session.view
+            self.system.look(view)
+            self.objects.look(view, self.system.node_id, self.session.eds_paths)
+            marked = self.system.marked.key if self.system.marked else ""
+            status = status_line(view.nodes, self.session.path.name, self._bus, marked)
+            events = view.events[-EVENTS_SHOWN:]
+        self.status.show([status])
+        follows = self.events.at_end
+        self.events.show([event_line(event) for event in events])
+        if follows:
+            self.events.scroll_end(animate=False, immediate=True)
+
+    def on_cursor_view_moved(self) -> None:
+        """Show what belongs to the row under the cursor."""
+        self.look()
+
+    def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
+        """Write the object that was chosen; show what was folded or opened."""
+        self.look()
+        if event.view is self.objects:
+            self.action_write()
+
+    def action_help(self) -> None:
+        """Show or hide what the keys do."""
+        if self.screen.query("HelpPanel"):
+            self.action_hide_help_panel()
+        else:
+            self.action_show_help_panel()
+
+    def action_ask(self, what: str) -> None:
+        """Ask the proxy or component under the cursor for a state."""
+        if (owner := self.system.owner) is not None:
+            self._try(lambda view: ASK[what](view, owner.name))
+
+    def action_boot(self) -> None:
+        """Set the node up again, also one that was refused."""
+        if node_id := self.system.node_id:
+            self._try(lambda view: view.boot(node_id))
+
+    def action_start(self) -> None:
+        """Activate all nodes in the start order."""
+        self._try(ServerView.start)
+
+    def action_mark(self) -> None:
+        """Mark a port or PDO, or let it go."""
+        if not self.system.mark():
+            self._refuse("ports and PDOs can be marked")
+        self.look()
+
+    def action_join(self, how: str) -> None:
+        """Join what is marked with what is under the cursor."""
+        marked, row = self.system.marked, self.system.row
+        if marked is None or row is None:
+            self._refuse("mark a port or PDO first (m)")
+        elif self._try(lambda view: getattr(joining, how)(view, marked.item, row.item)):
+            self.system.marked = None
+            self.look()
+
+    def action_remove(self) -> None:
+        """End the link or connection under the cursor."""
+        if (row := self.system.row) is not None:
+            self._try(lambda view: joining.remove(view, row.item))
+
+    def action_read(self) -> None:
+        """Read the object under the cursor again."""
+        objects, row = self.objects.objects, self.objects.row
+        if objects is not None and row is not None:
+            objects.read(row.item)
+            self.look()
+
+    def action_live(self) -> None:
+        """Read the objects in view again and again, or no more."""
+        if (objects := self.objects.objects) is not None:
+            objects.live = not objects.live
+            self.look()
+
+    def action_write(self) -> None:
+        """Ask for a value, and write it."""
+        objects, row = self.objects.objects, self.objects.row
+        if objects is None or row is None:
+            return
+        name = objects.text_of(row.item).name
+
+        def write(words: str | None) -> None:
+            if words is not None:
+                self._try(lambda view: objects.write(view, row.item, words))
+
+        question = Question(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
+        self.push_screen(question, write)
+
+    def action_save(self) -> None:
+        """Ask for a file, and save the definition with connections and links as they are."""
+        self._ask_path("save the System Definition as", self.session.save)
+
+    def action_load(self) -> None:
+        """Ask for a file, and serve the definition in it."""
+        self._ask_path("load the System Definition", self._load)
+
+    def _load(self, path: Path) -> None:
+        self.session.load(path)
+        self.system.forget()
+        self.objects.forget()
+
+    def _ask_path(self, text: str, do: Callable[[Path], None]) -> None:
+        def answered(path: str | None) -> None:
+            if path and self._try(lambda view: do(Path(path))):
+                self.notify(f"{text}: {path}", markup=False)
+
+        self.push_screen(Question(text, str(self.session.path)), answered)
+
+    def _try(self, command: Command) -> bool:
+        """Give a command; if it is refused, say why."""
+        try:
+            with self.session.lock:
+                command(self.session.view)
+        except (RtcRefused, ServerRefused, ValueError) as error:
+            return self._refuse(str(error))
+        except OSError as error:
+            return self._refuse(f"{error.filename}: {error.strerror}")
+        self.look()
+        return True
+
+    def _refuse(self, why: str) -> bool:
+        self.notify(why, severity="error", markup=False)
+        return False

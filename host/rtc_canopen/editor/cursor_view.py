@@ -1,0 +1,130 @@
+"""Lines of which one is under the cursor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Final, Generic, TypeVar
+
+from textual.binding import Binding, BindingType
+from textual.events import Blur, Click, Focus
+from textual.message import Message
+
+from tickrig.host.canmon.tui.line_view import Line, LineView
+from tickrig.host.rtc_canopen.editor.row import Row
+
+T = TypeVar("T")
+
+FOCUSED: Final = "reverse"
+ELSEWHERE: Final = "underline"
+MARGIN: Final = 2
+"""Columns at the left in which a click opens or folds."""
+
+
+class CursorView(LineView, Generic[T]):
+    """Shows rows; the cursor stays on what it was on while others come and go.
+
+    Attributes:
+        rows_shown: the rows.
+        cursor: the number of the row under the cursor.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "move(-1)", show=False),
+        Binding("down", "move(1)", show=False),
+        Binding("pageup", "page(-1)", show=False),
+        Binding("pagedown", "page(1)", show=False),
+        Binding("home", "move(-1_000_000)", show=False),
+        Binding("end", "move(1_000_000)", show=False),
+        Binding("enter", "enter", "open / write"),
+    ]
+
+    class Moved(Message):
+        """Another row is under the cursor, or others are in view."""
+
+    class Entered(Message):
+        """The row under the cursor was chosen.
+
+        Attributes:
+            view: whose row.
+        """
+
+        def __init__(self, view: CursorView[T]) -> None:
+            super().__init__()
+            self.view = view
+
+    def __init__(self, id: str) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id)
+        self.rows_shown: list[Row[T]] = []
+        self.cursor = 0
+
+    @property
+    def row(self) -> Row[T] | None:
+        """The row under the cursor, None if there is none."""
+        return self.rows_shown[self.cursor] if self.rows_shown else None
+
+    @property
+    def in_view(self) -> Sequence[Row[T]]:
+        """The rows that are on the screen."""
+        return self.rows_shown[self.top : self.top + max(1, self.rows)]
+
+    def offer(self, rows: Sequence[Row[T]]) -> None:
+        """Show rows."""
+        before = self.row
+        self.rows_shown = list(rows)
+        keys = [row.key for row in rows]
+        if before is not None and before.key in keys:
+            self.cursor = keys.index(before.key)
+        self.cursor = max(0, min(self.cursor, len(rows) - 1))
+        self.paint()
+
+    def paint(self) -> None:
+        """Show the rows and the cursor."""
+        lines = [row.line for row in self.rows_shown]
+        if lines:
+            lines[self.cursor] = self._under_cursor(lines[self.cursor])
+        self.show(lines)
+
+    def put_cursor(self, number: int) -> None:
+        """Put the cursor on a row, and bring that into view."""
+        self.cursor = max(0, min(number, len(self.rows_shown) - 1))
+        if self.cursor < self.top:
+            self.scroll_to(y=self.cursor, animate=False, immediate=True)
+        elif self.cursor >= self.top + self.rows:
+            self.scroll_to(y=self.cursor - self.rows + 1, animate=False, immediate=True)
+        self.paint()
+        self.post_message(self.Moved())
+
+    def action_move(self, rows: int) -> None:
+        """Move the cursor."""
+        self.put_cursor(self.cursor + rows)
+
+    def action_page(self, pages: int) -> None:
+        """Move the cursor by as many rows as are in view."""
+        self.put_cursor(self.cursor + pages * max(1, self.rows - 1))
+
+    def action_enter(self) -> None:
+        """Choose the row under the cursor."""
+        if self.rows_shown:
+            self.post_message(self.Entered(self))
+
+    def on_click(self, event: Click) -> None:
+        """Put the cursor where the mouse is; a double click, or one at the margin, chooses."""
+        at = event.get_content_offset(self)
+        if at is not None and self.top + at.y < len(self.rows_shown):
+            self.put_cursor(self.top + at.y)
+            if at.x < MARGIN or event.chain == 2:
+                self.action_enter()
+
+    def on_focus(self, event: Focus) -> None:
+        """Show that the keys go here."""
+        self.paint()
+
+    def on_blur(self, event: Blur) -> None:
+        """Show that the keys go elsewhere."""
+        self.paint()
+
+    def _under_cursor(self, line: Line) -> Line:
+        style = FOCUSED if self.has_focus else ELSEWHERE
+        width = sum(len(text) for text, _ in line)
+        rest = (" " * max(0, self.size.width - width), "")
+        return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)

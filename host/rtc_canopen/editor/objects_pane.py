@@ -1,0 +1,47 @@
+"""The objects of the node that was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from tickrig.host.monitor.decode.eds_objects import Entry, read_eds
+from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
+from tickrig.host.rtc_canopen.editor.node_objects import NodeObjects
+from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.view import ServerView
+
+
+class ObjectsPane(CursorView[Entry]):
+    """Shows the objects of one node at a time.
+
+    Attributes:
+        objects: those of the node, None without one.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("objects")
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, with another system."""
+        self.objects: NodeObjects | None = None
+        self._of: dict[int, NodeObjects] = {}
+
+    def look(self, view: ServerView, node_id: int, eds: Mapping[int, Path]) -> None:
+        """Show the objects of a node, and read those in view; node 0 is none."""
+        if not node_id:
+            self.objects, self.border_title = None, "objects"
+            self.offer([])
+            return
+        if node_id not in self._of:
+            self._of[node_id] = NodeObjects(node_id, read_eds(eds[node_id], node_id))
+        self.objects = objects = self._of[node_id]
+        node = view.node(node_id)
+        if node.phase is not Phase.READY:
+            objects.forget()
+        answers = node.phase is Phase.READY and node.nmt_state != "STOPPED"
+        objects.look(view, [row.item for row in self.in_view], answers=answers)
+        live = ", live" if objects.live else ""
+        self.border_title = f"objects of {node_id} {node.name}{live}"
+        self.offer(objects.rows)

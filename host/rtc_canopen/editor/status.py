@@ -1,0 +1,42 @@
+"""The line at the bottom, and lines of events."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.canmon.tui.line_view import Line
+from tickrig.host.rtc_canopen.events import Event, EventKind
+from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.view import NodeView
+
+DIM: Final = "bright_black"
+MARK: Final = "bold yellow"
+ALARM: Final = "bold red"
+
+GOOD: Final = (
+    EventKind.BOOT_UP,
+    EventKind.PROXY_MADE,
+    EventKind.STATE_CHANGED,
+    EventKind.CONNECTED,
+    EventKind.PDO_LINKED,
+    EventKind.PDO_UNLINKED,
+    EventKind.BUS_ON,
+)
+"""Events that are nothing to see to."""
+
+
+def event_line(event: Event) -> Line:
+    """Return an event as a line."""
+    at, _, rest = str(event).partition(" ")
+    return (f"{at:>12} ", DIM), (rest, "" if event.kind in GOOD else ALARM)
+
+
+def status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:
+    """Return what is served, where, and what is to be connected."""
+    ready = sum(node.phase is Phase.READY for node in nodes)
+    active = sum(node.proxy_state == "ACTIVE" for node in nodes)
+    return (
+        (f" {file} ", "bold"),
+        (f" {bus}  {ready} of {len(nodes)} nodes ready, {active} active", ""),
+        (f"  marked: {marked.partition(' ')[2]}" if marked else "", MARK),
+    )
