@@ -19,6 +19,7 @@ from tickrig.host.monitor.logs.log_format import LogFormat, log_format
 from tickrig.host.monitor.logs.log_line import parse_log_line
 from tickrig.host.monitor.logs.log_reader import LogError, LogReader, open_log, read_log
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.whole_lines import WholeLines
 
 BLOCK_BYTES: Final = 1 << 20
 BATCH: Final = 1 << 16
@@ -57,15 +58,14 @@ def _blocks(file: BinaryIO, path: Path, channels: ChannelNames, tally: Tally) ->
 
 def _whole_lines(file: BinaryIO, path: Path) -> Iterator[bytes]:
     """Cut a file into blocks that end with LF."""
-    rest = b""
+    whole = WholeLines()
     try:
         while data := file.read(BLOCK_BYTES):
-            lines, end, rest = (rest + data).rpartition(b"\n")
-            if end:
-                yield lines + end
+            if lines := whole.push(data):
+                yield lines
     except (EOFError, zlib.error) as error:
         raise LogError(f"{path}: {error}") from error
-    if rest:
+    if rest := whole.finish():
         yield rest + b"\n"
 
 

@@ -8,6 +8,7 @@ from typing import Final
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_line import parse_log_line
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.whole_lines import WholeLines
 from tickrig.wire.can import CanFrame
 
 _USUAL: Final = re.compile(
@@ -29,17 +30,17 @@ class LogLines:
 
     def __init__(self) -> None:
         self.tally = Tally()
-        self._rest, self._number = "", 0
+        self._whole, self._number = WholeLines(), 0
 
     def push(self, data: bytes, /) -> list[Heard]:
         """Return the frames of the lines that end in these bytes."""
-        lines, end, self._rest = (self._rest + data.decode("latin-1")).rpartition("\n")
-        return self._frames(lines) if end else []
+        lines = self._whole.push(data)
+        return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def finish(self) -> list[Heard]:
         """Return the frame of a last line without LF."""
-        rest, self._rest = self._rest, ""
-        return self._frames(rest) if rest else []
+        rest = self._whole.finish()
+        return self._frames(rest.decode("latin-1")) if rest else []
 
     def _frames(self, text: str) -> list[Heard]:
         count, begin = text.count("\n") + 1, self._number

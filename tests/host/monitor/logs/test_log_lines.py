@@ -10,6 +10,7 @@ from tickrig.host.monitor.logs.log_line import parse_log_line
 from tickrig.host.monitor.logs.log_lines import LogLines
 from tickrig.host.monitor.logs.log_writer import log_line
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.whole_lines import LONGEST, WholeLines
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -122,3 +123,10 @@ def test_the_first_bad_lines_are_kept_and_all_are_counted() -> None:
 
 def test_an_unknown_event_in_json_is_no_fault() -> None:
     assert read('{"v":1,"ev":"hello"}') == (None, Tally())
+
+
+def test_a_text_without_a_line_end_is_held_only_up_to_a_limit() -> None:
+    whole = WholeLines()
+    assert not any(whole.push(bytes(1 << 16)) for _ in range(100))
+    assert len(whole.push(b"\nnext")) == LONGEST + 1
+    assert whole.finish() == b"next"
