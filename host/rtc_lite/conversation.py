@@ -31,7 +31,7 @@ PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
 
 RETRIES: Final = 3
-"""For requests that may be repeated, at start-up (DECISION L13)."""
+"""For requests that may be repeated (DECISION L13)."""
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -122,7 +122,8 @@ class Conversation:
         watch = self.watch
         while watch.pending and self.now_us < watch.due_us:
             if not self._hear(watch.due_us - self.now_us):
-                break
+                return False
+        watch.let_go()
         return not (watch.asked or watch.doubted or watch.lost)
 
     def _exchange(self, command: Command, data: bytes = b"") -> Reply | None:

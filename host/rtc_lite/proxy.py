@@ -12,7 +12,7 @@ from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.states import ReturnCode
-from tickrig.host.rtc_lite.conversation import Conversation
+from tickrig.host.rtc_lite.conversation import RETRIES, Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.relays import Relays
 from tickrig.host.rtc_lite.settings import Settings
@@ -88,6 +88,7 @@ class RtcLiteProxy(RtComponent):
         self._failed = False  # a callback failed, so that Error comes next
         self._untold = False  # an error of which nobody knows whether it is a fatal one
         self._mirrored = -1  # in which ten ticks its state was asked
+        self._unanswered = 0  # how often in vain
 
     @property
     def due_us(self) -> int:
@@ -150,17 +151,19 @@ class RtcLiteProxy(RtComponent):
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Activate the device."""
-        code = self._command(Command.ACTIVATE)
+        code, self._unanswered = self._command(Command.ACTIVATE), 0
         self._failed = code is not _OK
         return code
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Deactivate the device, unless Error comes next: it is aborted then."""
-        return _OK if self._failed else self._command(Command.DEACTIVATE)
+        code = _OK if self._failed else self._command(Command.DEACTIVATE)
+        self._hand_out()
+        return code
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Hand data in, let the device execute, and hand data out."""
-        code = self._hand_in()
+        code = _OK if self._mute else self._hand_in()
         if code is _OK:
             code = self._mirror(ec.now_us) if self._by_timer else self._command(Command.EXECUTE)
         self._hand_out()
@@ -195,6 +198,11 @@ class RtcLiteProxy(RtComponent):
     def _by_timer(self) -> bool:
         return self.device is not None and self.device.context is ContextType.TIMER
 
+    @property
+    def _mute(self) -> bool:
+        """Whether a device that executes by itself is left alone until it answers a PING."""
+        return self._by_timer and self._talk.watch.doubted
+
     def _command(self, command: Command, data: bytes = b"") -> ReturnCode:
         return _code_of(self._talk.ask(command, data))
 
@@ -215,12 +223,16 @@ class RtcLiteProxy(RtComponent):
         return _OK
 
     def _mirror(self, now_us: int) -> ReturnCode:
-        """Ask once in 10 ticks whether the device is still Active."""
-        if now_us // MIRROR_US == self._mirrored:
+        """Ask once in 10 ticks whether the device is still Active; up to 3 times in vain."""
+        if self._mute or now_us // MIRROR_US == self._mirrored:
             self._talk.poll()
             return _OK
         self._mirrored = now_us // MIRROR_US
-        code = self._command(Command.STATE)
+        reply = self._talk.ask(Command.STATE)
+        self._unanswered = 0 if reply else self._unanswered + 1
+        if reply is None and self._unanswered <= RETRIES:
+            return _OK
+        code = _code_of(reply)
         if code is _OK and self._talk.state is not State.ACTIVE:
             return ReturnCode.RTC_ERROR
         return code

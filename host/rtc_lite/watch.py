@@ -70,6 +70,11 @@ class Watch:
         self.asked, self._asked_us = True, now_us
         return self._number
 
+    def let_go(self) -> None:
+        """Wait no more for a routine PING: a request follows, whose reply tells as much."""
+        if self.pending:
+            self.asked, self._unanswered = False, 0
+
     def answered(self, number: int) -> None:
         """Take an answer; that to an older PING is ignored."""
         if self.asked and number == self._number:

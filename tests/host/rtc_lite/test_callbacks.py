@@ -147,6 +147,18 @@ def test_a_callback_waits_for_a_ping_that_is_under_way() -> None:
     assert link.taken() == ["CY", "AA"]
 
 
+def test_a_callback_goes_on_when_a_single_ping_was_lost() -> None:
+    proxy, link = made("Inactive")
+    link.now_us = proxy.due_us
+    link.answers[Command.PING] = []
+    proxy.tick()
+    asked_us = link.now_us
+    assert proxy.on_activated(EC) is OK
+    assert link.taken() == ["CY", "AA"]
+    assert 100_000 <= link.now_us - asked_us <= 102_000
+    assert proxy.due_us == link.now_us + 1_000_000
+
+
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request() -> None:
     proxy, link = made("Active")
     link.answers[Command.EXECUTE] = []

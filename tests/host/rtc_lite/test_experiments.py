@@ -148,6 +148,17 @@ def test_t4_four_lost_pings_are_fatal_40_ticks_after_the_first() -> None:
     assert system.at_us("FatalError") - sent_us[0] == 40 * TICK_US
 
 
+def test_answers_to_older_pings_are_ignored() -> None:
+    system = Experiment()
+    system.run_to(3_000_000)
+    system.nodes[0].inputs.set("slow_answer", 1)  # each 200 ms late, two PINGs behind
+    system.links[0].heard = b""
+    system.run_for(1_500_000)
+    assert b"CY@" in system.links[0].heard
+    pings_us = [at_us for at_us, data in system.links[0].sent if data[1:3] == b"CY"]
+    assert system.at_us("FatalError") - pings_us[-4] == 40 * TICK_US
+
+
 def test_t5_an_error_of_the_device_is_mirrored_and_a_reset_leads_back() -> None:
     bench, proxy = recorder_bench()
     recorder = bench.nodes[0].component

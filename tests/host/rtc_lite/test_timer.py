@@ -96,3 +96,45 @@ def test_a_power_cut_is_fatal() -> None:
     bench.run_for(2_000_000)
     assert bench.at_us("FatalError") - cut_us <= 600_000
     assert bench.states() == {}
+
+
+def test_up_to_three_lost_questions_for_the_state_are_no_error() -> None:
+    bench, proxy, recorder = active()
+    for lost in (1, 2, 3):
+        bench.links[0].spoil = Losing(b"CX", lost)
+        bench.run_for(10 * PERIOD_US)
+        assert bench.states() == {"Echo0": "ACTIVE"}
+    bench.links[0].spoil = Losing(b"CX", 4)
+    bench.run_for(10 * PERIOD_US)
+    assert bench.states() == {"Echo0": "ERROR"}
+    assert bench.told() == [("PassiveError", "Echo0")]
+    assert "on_aborting" in recorder.called
+    assert proxy.fatal_us is None
+
+
+class Losing:
+    """Loses so many requests of one kind."""
+
+    def __init__(self, command: bytes, count: int) -> None:
+        self._command, self._count = command, count
+
+    def __call__(self, frame: bytes) -> bytes:
+        if frame[1:3] != self._command or not self._count:
+            return frame
+        self._count -= 1
+        return b""
+
+
+def test_what_is_pushed_until_the_device_is_inactive_arrives_before_the_next_activation() -> None:
+    bench, proxy, _ = active()
+    out, in_ = OutPort("out", TimedLong), InPort("in", TimedLong)
+    connect(out, proxy.ports["in"])
+    connect(proxy.ports["out"], in_)
+    out.write(TimedLong(Time(), 7))
+    bench.run_to(bench.context.due_us + 6_000)  # the value is in, and no period has ended
+    bench.manager.deactivate("Echo0")
+    bench.run_for(PERIOD_US)
+    assert bench.states() == {"Echo0": "INACTIVE"}
+    value = in_.read() if in_.is_new else None
+    assert value is not None
+    assert value.data == 7
