@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import Static
 
 from tickrig.host.canmon.tui.ask_line import AskLine
 from tickrig.host.canmon.tui.choice_view import ChoiceView
@@ -18,6 +17,7 @@ from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.sending_bus import next_bus
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.settings import text_of
+from tickrig.host.canmon.tui.title_line import TitleLine
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
@@ -41,8 +41,8 @@ class DictionaryPanel(Panel):
     A value is written as it is shown, in the same unit; bytes in hex where the type is not known.
     """
     DEFAULT_CSS = """
-    DictionaryPanel #node { height: 1; background: $boost; }
-    DictionaryPanel #head { height: 1; text-style: bold; }
+    DictionaryPanel #node { background: $boost; }
+    DictionaryPanel #head { text-style: bold; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "next_node(1)", "node", key_display="n N"),
@@ -69,8 +69,8 @@ class DictionaryPanel(Panel):
 
     def compose(self) -> ComposeResult:
         """Lay out node, titles and objects."""
-        yield Static(id="node", markup=False)
-        yield Static(id="head", markup=False)
+        yield TitleLine("node")
+        yield TitleLine("head")
         yield ChoiceView()
         yield AskLine()
 
@@ -90,8 +90,8 @@ class DictionaryPanel(Panel):
     def paint(self) -> None:
         """Show them."""
         head, *_ = self._lines
-        self.query_one("#node", Static).update(self._state)
-        self.query_one("#head", Static).update("  " + head)
+        self.query_one("#node", TitleLine).show(self._state)
+        self.query_one("#head", TitleLine).show("  " + head)
         lines = [
             self._line(row, text) for row, text in zip(self._rows, self._lines[1:], strict=True)
         ]

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Final
 import click
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import Static
 
 from tickrig.host.canmon.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.ansi_colour import colour_line
@@ -23,6 +22,7 @@ from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.picture_view import PictureView
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.settings import text_of
+from tickrig.host.canmon.tui.title_line import TitleLine
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH
@@ -49,7 +49,7 @@ class GraphPanel(Panel):
     Live shows the latest time; moving, the cursor and space stop the picture, not the recording.
     Up, down, i and o change the vertical axis that y chooses; r lets it fit again.
     """
-    DEFAULT_CSS = "GraphPanel #state { height: 1; background: $boost; }"
+    DEFAULT_CSS = "GraphPanel #state { background: $boost; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("a", "add", "add"),
         Binding("x", "remove", "remove"),
@@ -83,7 +83,7 @@ class GraphPanel(Panel):
 
     def compose(self) -> ComposeResult:
         """Lay out state and picture."""
-        yield Static(id="state", markup=False)
+        yield TitleLine("state")
         yield PictureView()
         yield AskLine()
 
@@ -98,7 +98,7 @@ class GraphPanel(Panel):
 
     def paint(self) -> None:
         """Show it."""
-        self.query_one("#state", Static).update(self._state())
+        self.query_one("#state", TitleLine).show(self._state())
         self.query_one(PictureView).show(self._lines)
 
     def load(self, settings: Mapping[str, Any]) -> None:

@@ -21,6 +21,7 @@ from tickrig.host.canmon.tui.sending_bus import checked_bus, next_bus
 from tickrig.host.canmon.tui.sequence_task import SequenceTask
 from tickrig.host.canmon.tui.sequence_texts import NEW, read_texts, sequence_name, texts_settings
 from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.title_line import TitleLine
 from tickrig.host.monitor.sequence.line_sequence import SequenceError
 from tickrig.host.monitor.sequence.note_text import note_line
 from tickrig.host.monitor.sequence.sequence_run import Mark, Note
@@ -57,7 +58,7 @@ class SequencePanel(Panel):
         steps = [{send = "080#"}, {wait = "10ms"}]
     """
     DEFAULT_CSS = """
-    SequencePanel #state { height: 1; background: $boost; }
+    SequencePanel #state { background: $boost; }
     SequencePanel #mistake { display: none; height: auto; color: $error; }
     SequencePanel LineView { width: 1fr; height: 1fr; }
     SequencePanel TextArea { width: 1fr; height: 1fr; border: none; }
@@ -88,7 +89,7 @@ class SequencePanel(Panel):
 
     def compose(self) -> ComposeResult:
         """Lay out what happens and the editor."""
-        yield Static(id="state", markup=False)
+        yield TitleLine("state")
         with Horizontal():
             yield LineView()
             yield TextArea(self.texts[self.number], tab_behavior="focus", show_line_numbers=True)
@@ -101,7 +102,7 @@ class SequencePanel(Panel):
 
     def paint(self) -> None:
         """Show it, the latest in view; or the steps."""
-        self.query_one("#state", Static).update(self._state())
+        self.query_one("#state", TitleLine).show(self._state())
         view = self.query_one(LineView)
         follows = view.at_end
         lines = [plain(line) for line in self._steps] or list(map(_line, self._notes))

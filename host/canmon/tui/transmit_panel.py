@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import Static
 
 from tickrig.host.canmon.tui.ask_line import AskLine
 from tickrig.host.canmon.tui.choice_view import ChoiceView
@@ -17,6 +16,7 @@ from tickrig.host.canmon.tui.nested_settings import below, tables
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.sending_bus import checked_bus, next_bus
 from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.title_line import TitleLine
 from tickrig.host.canmon.tui.transmit_settings import read_row, row_settings
 from tickrig.host.canmon.tui.transmit_task import TransmitTask
 from tickrig.host.monitor.transmit.transmit_text import ON, render_transmit
@@ -40,7 +40,7 @@ class TransmitPanel(Panel):
     `100#0000 --every 20ms --counter 0:0..14 --checksum 1:crc8 --name alive`. Checksums: xor, sum8,
     neg8, crc8, crc8-2f, crc8-07. A `*` behind a frame: fields of it change each time.
     """
-    DEFAULT_CSS = "TransmitPanel #head { height: 1; text-style: bold; }"
+    DEFAULT_CSS = "TransmitPanel #head { text-style: bold; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "enable", "on/off"),
         Binding("enter", "once", "send once"),
@@ -59,7 +59,7 @@ class TransmitPanel(Panel):
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
-        yield Static(id="head", markup=False)
+        yield TitleLine("head")
         yield ChoiceView()
         yield AskLine()
 
@@ -76,7 +76,7 @@ class TransmitPanel(Panel):
         """Show it."""
         head, *rows = self._lines
         bus = f"   bus {self.transmit.channel}" if self.transmit.channel else ""
-        self.query_one("#head", Static).update(head + bus)
+        self.query_one("#head", TitleLine).show(head + bus)
         rows = rows or ["no rows: a adds one"]
         self.query_one(ChoiceView).show(
             [plain(row, "bold green" if row.startswith(ON) else "") for row in rows]
