@@ -14,13 +14,14 @@ from tickrig.emulators.rh3.base_options import NAMES, base_options, read_paramet
 from tickrig.emulators.rh3.journey_table import limits_of, table
 from tickrig.emulators.rh3.outing import Outing, demand_arrival, stopped_at_the_end, watched
 from tickrig.emulators.rh3.path_file import read_path
-from tickrig.emulators.rh3.squares import play_squares
+from tickrig.emulators.rh3.squares import Size, play_squares
 from tickrig.emulators.rh3.track_plot import write_track
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.drive import drive
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.ports import sound
+from tickrig.host.motion.umbmark import SIDE_M
 
 COORDINATES: Final = {"ignore_unknown_options": True}
 """So that `-1` is a number and no option."""
@@ -113,10 +114,18 @@ def along_path(file: Path, **options: Any) -> None:
 
 @main.command()
 @click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
+@click.option(
+    "--side",
+    type=click.FloatRange(0.2, 100),
+    metavar="M",
+    default=SIDE_M,
+    show_default=True,
+    help="Of the squares.",
+)
 @click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
 @_SHARED
-def square(runs: int | None, save: Path | None, **options: Any) -> None:
-    """Drive squares of 4 m both ways (UMBmark), and calibrate the odometry by them.
+def square(runs: int | None, side: float, save: Path | None, **options: Any) -> None:
+    """Drive squares both ways (UMBmark), and calibrate the odometry by them.
 
     After each square the true place of the cart is measured: of an emulated base
     it is known, with --device it is asked for.
@@ -127,7 +136,7 @@ def square(runs: int | None, save: Path | None, **options: Any) -> None:
     """  # noqa: D301
     outing = _outing(options)
     by_chance = outing.device is not None or outing.base.noise
-    play_squares(outing, runs or (5 if by_chance else 1), save)
+    play_squares(outing, Size(runs or (5 if by_chance else 1), side), save)
 
 
 def _outing(options: dict[str, Any]) -> Outing:

@@ -131,4 +131,4 @@ def demand_arrival(ride: Ride, journey: Journey) -> None:
     if ride.chain.in_error:
         raise click.ClickException(ride.chain.ref_hard.trouble)
     if journey.reached_s is None:
-        raise click.ClickException(f"not there after {journey.duration_s:g} s")
+        raise click.ClickException(f"not there after {journey.duration_s:.1f} s")

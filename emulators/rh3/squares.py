@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 
@@ -13,7 +14,18 @@ from tickrig.host.motion.drive import Ride, stop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
 
-CORNERS = (*square(clockwise=True), *square(clockwise=False))
+
+class Size(NamedTuple):
+    """How many squares each way, and how large."""
+
+    runs: int
+    side_m: float
+
+    @property
+    def corners(self) -> list[Pose]:
+        """All corners of both ways."""
+        there, back = (square(clockwise=way, side_m=self.side_m) for way in (True, False))
+        return [*there, *back]
 
 
 class Squares:
@@ -21,21 +33,26 @@ class Squares:
 
     Args:
         outing: the options.
+        size: how many, and how large.
         watcher: told each sample.
 
     Attributes:
         latest: the ride of the latest square.
     """
 
-    def __init__(self, outing: Outing, watcher: Watcher) -> None:
-        self._outing, self._watcher = outing, watcher
+    def __init__(self, outing: Outing, size: Size, watcher: Watcher) -> None:
+        self._outing, self._size, self._watcher = outing, size, watcher
         self.latest: Ride | None = None
 
-    def run(self, runs: int, wheels: Wheels | None = None) -> Umbmark:
+    def run(self, wheels: Wheels | None = None) -> Umbmark:
         """Drive squares; with other radii and axle if they are given."""
         try:
             return run_umbmark(
-                lambda number: self._begin(wheels), self._true_pose, runs, self._watcher.watch
+                lambda number: self._begin(wheels),
+                self._true_pose,
+                self._size.runs,
+                self._size.side_m,
+                self._watcher.watch,
             )
         except TimeoutError as error:
             trouble = self.latest.chain.ref_hard.trouble if self.latest else ""
@@ -63,15 +80,15 @@ class Squares:
         return Pose(x_mm / 1e3, y_mm / 1e3)
 
 
-def play_squares(outing: Outing, runs: int, save: Path | None) -> None:
+def play_squares(outing: Outing, size: Size, save: Path | None) -> None:
     """Drive, calibrate, drive again, and tell."""
-    with watched(outing, [Pose(), *CORNERS]) as watcher:
-        squares = Squares(outing, watcher)
+    with watched(outing, size.corners) as watcher:
+        squares = Squares(outing, size, watcher)
         try:
-            before = squares.run(runs)
+            before = squares.run()
             assert squares.latest is not None
-            corrected = before.corrected(squares.latest.chain.odometry.wheels)
-            after = squares.run(runs, corrected)
+            corrected = before.corrected(squares.latest.chain.odometry.wheels, size.side_m)
+            after = squares.run(corrected)
         finally:
             squares.stop()
     click.echo("              before   after")

@@ -88,8 +88,7 @@ class MotionChain:
     @property
     def in_error(self) -> tuple[str, ...]:
         """Names of the components in Error."""
-        state_of, error = self.context.state_of, LifeCycleState.ERROR
-        return tuple(c.instance_name for c in self.components if state_of(c) is error)
+        return self._in(LifeCycleState.ERROR)
 
     def use(self, set_id: str) -> None:
         """Let the configuration set of a name hold in all components that have it."""
@@ -102,8 +101,12 @@ class MotionChain:
         self._manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
-        """Ask all for Inactive."""
-        self._manager.deactivate(*(component.instance_name for component in self.components))
+        """Ask those that are Active for Inactive."""
+        self._manager.deactivate(*self._in(LifeCycleState.ACTIVE))
+
+    def _in(self, state: LifeCycleState) -> tuple[str, ...]:
+        state_of = self.context.state_of
+        return tuple(c.instance_name for c in self.components if state_of(c) is state)
 
     def _named(self, port: str) -> str:
         component, _, name = port.partition(".")

@@ -6,15 +6,19 @@ from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from tickrig.host.motion.chain import MotionChain
+from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.journey import Journey, Sample
+from tickrig.host.motion.least_time import least_time_s
 from tickrig.wire.rtc_types.rh2 import RunMode
 
 PERIOD_US: Final = 20_000
 SETTLE_US: Final = 500_000
 """Time for the components to come up, and for a cart to roll on after its goal is reached."""
 
-TIMEOUT_US: Final = 600_000_000
+PATIENCE: Final = 3
+"""Times the least time that a way may take, and half a minute."""
+PATIENCE_S: Final = 30
 
 Watch = Callable[[Sample], None]
 
@@ -58,7 +62,7 @@ def drive(
     ride: Ride,
     points: Sequence[Pose],
     watch: Watch = lambda sample: None,
-    timeout_us: int = TIMEOUT_US,
+    timeout_us: int | None = None,
 ) -> Journey:
     """Let a cart go to a goal, or along a path of several points.
 
@@ -69,23 +73,31 @@ def drive(
         ride: its components are active.
         points: one is a goal.
         watch: told each sample.
-        timeout_us: when to give up.
+        timeout_us: when to give up; three times the least time and half a minute if left out.
 
     Raises:
         ValueError: no point, or a number that is none.
     """
-    entered, start_us, journey = ride.chain.position_input, ride.now_us, Journey(points[-1])
+    entered, start_us = ride.chain.position_input, ride.now_us
     finished = entered.finished
     entered.replace(*points)
-    until_us = start_us + timeout_us
-    while ride.now_us < until_us and not ride.chain.in_error:
+    journey = Journey(points[-1])
+    until_us = start_us + (timeout_us or _patience_us(ride, points))
+    while ride.now_us < until_us:
         ride.run_to(min(ride.now_us + PERIOD_US, until_us))
         journey.samples.append(sample(ride, (ride.now_us - start_us) / 1e6))
         watch(journey.samples[-1])
+        if ride.chain.in_error:
+            break
         if entered.finished > finished and journey.reached_s is None:
             journey.reached_s = journey.duration_s
             until_us = ride.now_us + SETTLE_US
     return journey
+
+
+def _patience_us(ride: Ride, points: Sequence[Pose]) -> int:
+    least_s = least_time_s(plan(ride.chain.odometry.pose, points))
+    return round((PATIENCE * least_s + PATIENCE_S) * 1e6)
 
 
 def sample(ride: Ride, time_s: float) -> Sample:

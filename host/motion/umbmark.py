@@ -74,6 +74,7 @@ def run_umbmark(
     begin: Callable[[int], Ride],
     true_pose: Callable[[Ride], Pose] = lambda ride: ride.pose,
     runs: int = 5,
+    side_m: float = SIDE_M,
     watch: Watch = lambda sample: None,
 ) -> Umbmark:
     """Drive squares both ways, each from the origin.
@@ -82,6 +83,7 @@ def run_umbmark(
         begin: starts run number n, from 0 on: a cart at the origin, components active.
         true_pose: measures where the cart is at the end of a run.
         runs: how many each way.
+        side_m: of the squares; UMBmark has 4 m.
         watch: told each sample.
 
     Raises:
@@ -92,7 +94,7 @@ def run_umbmark(
     for number in range(2 * runs):
         clockwise = number % 2 == 0
         ride = begin(number)
-        if drive(ride, square(clockwise=clockwise), watch).reached_s is None:
+        if drive(ride, square(clockwise=clockwise, side_m=side_m), watch).reached_s is None:
             raise TimeoutError(f"square {number + 1} did not end")
         truth, thought = true_pose(ride), ride.chain.odometry.pose
         errors[clockwise].append((truth.x - thought.x, truth.y - thought.y))

@@ -1,17 +1,26 @@
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pexpect
 import pytest
 from click.testing import CliRunner, Result
 
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.motion_cli import main as rh3
+from tickrig.emulators.rh3.outing import Outing, demand_arrival
+from tickrig.emulators.rh3.squares import Size, play_squares
+from tickrig.host.motion.drive import Ride, drive, start
+from tickrig.host.motion.geometry import Pose
 
 CORNERS = "0.5, 0  # first\n\n0.5 0.5 9\n0 0 0\n"
 
@@ -76,15 +85,60 @@ def test_the_map_grows_in_place() -> None:
 
 def test_squares_calibrate_the_odometry(tmp_path: Path) -> None:
     conf = tmp_path / "Odometry.conf"
-    result = run("square", "--tread-m", "0.46", "--set", "tuned", "--save", conf)
+    words = ("--tread-m", "0.46", "--side", "1", "--set", "tuned")
+    result = run("square", *words, "--save", conf)
     assert result.exit_code == 0
     head, systematic, back, *lines = result.stdout.splitlines()
     assert head.split() == ["before", "after"]
     before, after = map(float, systematic.split()[1:3])
-    assert after < before / 10
+    assert after < before / 5
     assert back.startswith("return, most")
     assert conf.read_text().splitlines() == lines
     assert lines[2].startswith("conf.default.lengthOfAxle: 0.45")
+
+
+class OnPort(Outing):
+    """An outing whose cart is said to be on a serial port."""
+
+    def _ride(self) -> Ride:
+        return ClosedLoop()
+
+
+class Jammed(Outing):
+    """An outing whose cart has something in a wheel."""
+
+    def _ride(self) -> Ride:
+        loop = ClosedLoop()
+        loop.cart.base.inputs.set("jam_left", 1)
+        loop.chain.ref_hard.configuration.set("gain_VP", "100")  # full torque, a stall
+        return loop
+
+
+def test_a_person_measures_where_a_real_cart_stands(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("10\n0\n" * 4))
+    outing = OnPort("tuned", "/dev/ttyUSB0", 115_200, None, None, False, BaseParameters())
+    play_squares(outing, Size(1, 0.3), None)
+    told = capsys.readouterr().out
+    assert told.count("Measured x of the cart from its start, mm") == 4
+    assert "return, most    10.0    10.0 mm" in told
+
+
+def test_a_square_that_does_not_end_is_told() -> None:
+    outing = Jammed("tuned", None, 115_200, None, None, False, BaseParameters())
+    with pytest.raises(click.ClickException, match=r"fault of the base: .*STALL"):
+        play_squares(outing, Size(1, 0.3), None)
+
+
+def test_a_goal_that_is_not_reached_is_told() -> None:
+    ride = Jammed("tuned", None, 115_200, None, None, False, BaseParameters()).begin()
+    with pytest.raises(click.ClickException, match=r"fault of the base: .*STALL"):
+        demand_arrival(ride, drive(ride, [Pose(1.0)]))
+    ride = ClosedLoop()
+    start(ride)
+    with pytest.raises(click.ClickException, match=r"not there after 1\.0 s"):
+        demand_arrival(ride, drive(ride, [Pose(1.0)], timeout_us=1_000_000))
 
 
 def test_odometry_conf_is_used(tmp_path: Path) -> None:
@@ -174,6 +228,13 @@ def test_a_base_on_a_pty_is_driven_in_real_time(emulated: str) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "limits       kept" in done.stdout
+
+
+@pytest.mark.realtime
+def test_virtual_time_can_be_held_back() -> None:
+    began_s = time.monotonic()
+    assert run("goto", "0.1", "0", "0", "--pace", "10").exit_code == 0
+    assert time.monotonic() - began_s > 0.2
 
 
 @pytest.mark.realtime
