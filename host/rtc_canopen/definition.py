@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -182,3 +182,12 @@ class SystemDefinition:
         """Node-IDs of all nodes in the order in which they are activated."""
         ids = (node.id for node in self.nodes)
         return tuple(dict.fromkeys((*self.start.order, *ids)))
+
+    @property
+    def named_pdos(self) -> Iterator[PdoName]:
+        """PDOs that are given a port name, parameters or a link."""
+        for node in self.nodes:
+            for name in (*node.ports, *node.pdos):
+                yield PdoName(node.id, name)
+        for link in self.pdo_links:
+            yield from (link.source, link.target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection
 from typing import Any, Final
 
@@ -30,6 +31,7 @@ from tickrig.host.rtc_canopen.marked_yaml import (
     many,
     mapping,
     matching,
+    once,
     one_of,
     rate,
     read_table,
@@ -74,7 +76,10 @@ def _fields(ids: Collection[int]) -> dict[str, Reader]:
         "master": lambda node, place: _master(node, place, ids),
         "nodes": lambda node, place: None,
         "sdo": many(lambda node, place: _sdo(node, place, ids)),
-        "pdo_links": many(lambda node, place: _link(node, place, ids)),
+        "pdo_links": once(
+            lambda node, place: _link(node, place, ids),
+            lambda link: f"{link.target} is linked",
+        ),
         "rt_connections": many(_rt_connection),
         "start": lambda node, place: _start(node, place, ids),
     }
@@ -123,16 +128,23 @@ def _node(node: yaml.Node, place: str) -> NodeEntry:
         "eds": text,
         "role": one_of(*Role),
         "heartbeat_ms": whole(1, 0xFFFF),
-        "ports": mapping(pdo, matching(_NAME, "ai")),
+        "ports": _ports,
         "pdos": mapping(pdo, _pdo),
     }
     values = read_table(node, place, fields, ("id", "name", "eds"))
     if "role" in values:
         values["role"] = Role(values["role"])
     for name in (*values.get("ports", ()), *values.get("pdos", ())):
-        if int(name[4:]) > PDO_COUNT:
-            refuse(node, f"{place}: {name}, there are {PDO_COUNT} at most")
+        _check_number(node, place, name)
     return NodeEntry(**values)
+
+
+def _ports(node: yaml.Node, place: str) -> dict[str, str]:
+    names: dict[str, str] = mapping(matching(_PDO, "tpdo2"), matching(_NAME, "ai"))(node, place)
+    for name, count in Counter(names.values()).items():
+        if count > 1:
+            refuse(node, f"{place}: {count} ports are called {name}")
+    return names
 
 
 def _pdo(node: yaml.Node, place: str) -> PdoEntry:
@@ -176,6 +188,7 @@ def _link(node: yaml.Node, place: str, ids: Collection[int]) -> PdoLink:
         match = _NODE_PDO.fullmatch(text(node, place))
         if match is None or match[2][:4] != kind:
             refuse(node, f"{place}: {node.value!r} is not like 16.{kind}2")
+        _check_number(node, place, match[2])
         name = PdoName(int(match[1]), match[2])
         _check_known(node, place, name.node, ids)
         return name
@@ -202,7 +215,13 @@ def _start(node: yaml.Node, place: str, ids: Collection[int]) -> StartEntry:
         _check_known(node, place, node_id, ids)
         return node_id
 
-    return StartEntry(**table({"order": many(known), "autoactivate": flag})(node, place))
+    order = once(known, lambda node_id: f"node {node_id} is there")
+    return StartEntry(**table({"order": order, "autoactivate": flag})(node, place))
+
+
+def _check_number(node: yaml.Node, place: str, pdo: str) -> None:
+    if int(pdo[4:]) > PDO_COUNT:
+        refuse(node, f"{place}: {pdo}, there are {PDO_COUNT} at most")
 
 
 def _check_known(node: yaml.Node, place: str, node_id: int, ids: Collection[int]) -> None:

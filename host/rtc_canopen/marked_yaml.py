@@ -30,6 +30,8 @@ def compose(text: str) -> yaml.Node:
         raise DefinitionError(f"not YAML: {error.problem}", mark.line + 1 if mark else 0) from error
     except yaml.YAMLError as error:
         raise DefinitionError(f"not YAML: {' '.join(str(error).split())}") from error
+    except RecursionError:
+        raise DefinitionError("not YAML that can be read: lists or tables nest too deep") from None
     if root is None:
         raise DefinitionError("the file is empty", 1)
     return root
@@ -91,6 +93,24 @@ def many(item: Reader) -> Reader:
         if not isinstance(node, yaml.SequenceNode):
             refuse(node, f"{place} is a list, this is not")
         return tuple(item(child, place) for child in node.value)
+
+    return read
+
+
+def once(item: Reader, twice: Callable[[Any], str]) -> Reader:
+    """Read a list whose items differ in the text that `twice` makes of each: `node 5 is there`."""
+
+    def read(node: yaml.Node, place: str) -> tuple[Any, ...]:
+        seen: set[str] = set()
+
+        def unlike(child: yaml.Node, place: str) -> Any:
+            value = item(child, place)
+            if (words := twice(value)) in seen:
+                refuse(child, f"{place}: {words} twice")
+            seen.add(words)
+            return value
+
+        return many(unlike)(node, place)
 
     return read
 

@@ -9,6 +9,7 @@ from tickrig.host.link import NEVER, Link
 from tickrig.host.rtc_canopen.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition_file import read_definition
 from tickrig.host.rtc_canopen.device_file import DeviceFile, read_device_file
+from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.wire.can import Frames
 
@@ -42,6 +43,15 @@ def open_server(path: Path) -> Server:
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
-    """Read the EDS files of a definition, each once; DefinitionError if one cannot be used."""
+    """Read the EDS files of a definition, each once.
+
+    Raises:
+        DefinitionError: one cannot be used, or has not a PDO that the definition names.
+    """
     names = dict.fromkeys(node.eds for node in definition.nodes)
-    return {name: read_device_file(folder / name) for name in names}
+    files = {name: read_device_file(folder / name) for name in names}
+    by_id = {node.id: files[node.eds] for node in definition.nodes}
+    for pdo in definition.named_pdos:
+        if pdo.index not in by_id[pdo.node].pdos:
+            raise DefinitionError(f"{pdo}: the EDS of node {pdo.node} has no {pdo.index:04X}h")
+    return files

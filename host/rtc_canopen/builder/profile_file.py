@@ -84,6 +84,8 @@ def parse_project(text: str) -> Project:
         if not 1 <= node_id <= 127:
             raise ProfileError(f"node_id {node_id} is not in 1..127")
         return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
+    except RecursionError:
+        raise ProfileError("lists or tables nest too deep") from None
     except ValueError as error:
         raise ProfileError(str(error)) from None
 

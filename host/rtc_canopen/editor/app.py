@@ -155,7 +155,7 @@ class SystemEditor(App[None]):
         follows = self.events.at_end
         self.events.show([event_line(event) for event in events])
         if follows:
-            self.events.scroll_end(animate=False, immediate=True)
+            self.events.show_end()
 
     def on_cursor_view_moved(self) -> None:
         """Show what belongs to the row under the cursor."""

@@ -93,7 +93,7 @@ def at_desk(
     act: Act,
     path: Path = FIG_120,
     cast: dict[int, str] | None = None,
-    size: tuple[int, int] = (140, 30),
+    size: tuple[int, int] = (80, 24),
     **options: Any,
 ) -> None:
     """Let somebody work at a desk where all nodes have booted."""

@@ -119,7 +119,7 @@ def test_pdos_are_linked_in_either_order_and_unlinked(two: Path) -> None:
         await desk.press("m")
         await desk.go_to("16.tpdo2")
         await desk.press("k", then_ms=50)
-        assert desk.session.view.links == (PdoLink(PdoName(16, "tpdo2"), PdoName(32, "rpdo2")),)
+        assert set(desk.session.view.links) == {PdoLink(PdoName(16, "tpdo2"), PdoName(32, "rpdo2"))}
         assert desk.line("32.rpdo2").endswith("← 16.tpdo2")
         assert desk.nodes[32].slave.dictionary[0x1401, 1].number == 0x290
         await desk.go_to("PDO link")
@@ -184,13 +184,13 @@ def test_a_mark_is_taken_back_by_its_key(two: Path) -> None:
 def test_objects_of_the_node_under_the_cursor_are_read_as_they_come_into_view() -> None:
     async def act(desk: Desk) -> None:
         await desk.go_to("1008h:00", "objects")
-        for _ in range(6):
+        for _ in range(3):
             await desk.pass_ms(20)
         assert desk.line("1008h:00", "objects").endswith("'f-palette'")
         assert not desk.line("6428h:08", "objects").endswith("0")
         await desk.go_to("32 Motor0")
         await desk.go_to("1008h:00", "objects")
-        for _ in range(6):
+        for _ in range(3):
             await desk.pass_ms(20)
         assert desk.line("1008h:00", "objects").endswith("'motor core unit'")
 
@@ -200,7 +200,7 @@ def test_objects_of_the_node_under_the_cursor_are_read_as_they_come_into_view() 
 def test_an_object_is_written_and_read_again() -> None:
     async def act(desk: Desk) -> None:
         await desk.go_to("6426h:01", "objects")
-        for _ in range(6):
+        for _ in range(3):
             await desk.pass_ms(20)
         await desk.press("w")
         assert isinstance(desk.app.screen, Question)
@@ -243,18 +243,18 @@ def test_a_question_is_left_by_escape() -> None:
 def test_objects_in_view_are_read_again_while_they_are_live() -> None:
     async def act(desk: Desk) -> None:
         await desk.go_to("6401h:01", "objects")
-        for _ in range(8):
+        for _ in range(3):
             await desk.pass_ms(20)
         desk.nodes[16].physical["ai1_v"].write(2.5)
         await desk.pass_ms(100)
         assert desk.line("6401h:01", "objects").endswith(" 0")
         await desk.press("l")
-        for _ in range(8):
+        for _ in range(3):
             await desk.pass_ms(20)
         assert desk.line("6401h:01", "objects").endswith(" 16384")
-        await desk.press("l")
+        await desk.press("l", then_ms=20)  # what was asked for is still answered
         desk.nodes[16].physical["ai1_v"].write(0)
-        for _ in range(8):
+        for _ in range(3):
             await desk.pass_ms(20)
         assert desk.line("6401h:01", "objects").endswith(" 16384")
 
