@@ -17,7 +17,7 @@ from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.workspace import Workspace
 
 P = TypeVar("P", bound=Panel)
-SIZE = (120, 30)
+SIZE = (90, 20)
 
 
 class Desk(Generic[P]):
