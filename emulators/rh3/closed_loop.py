@@ -8,8 +8,10 @@ from typing import Final
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.urg.world import World
 from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.faults import FaultyPort
+from tickrig.emulators.rh3.mounted_urg import MountedUrg
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rs485_line import Rs485Line
 from tickrig.emulators.sim_link import SimLink
@@ -48,18 +50,28 @@ class ClosedLoop:
         parameters: one for each base.
         seed: of the wire faults' chance.
         dense: run every tick of every base.
+        world: what is around them; with one, each carries a range finder that sees it.
 
     Attributes:
         rig: the bases on their lines.
         manager: the components.
         carts: in the order of the parameters.
+        eyes: the range finders, in the same order.
     """
 
-    def __init__(self, *parameters: BaseParameters, seed: int = 0, dense: bool = False) -> None:
+    def __init__(
+        self,
+        *parameters: BaseParameters,
+        seed: int = 0,
+        dense: bool = False,
+        world: World | None = None,
+    ) -> None:
         bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
         lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
         ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
-        self.rig = Rig(*map(Station, bases, ports), dense=dense)
+        self.eyes = tuple(MountedUrg(base, world) for base in bases) if world else ()
+        stations = [Station(eye.urg, eye.line.a) for eye in self.eyes]
+        self.rig = Rig(*map(Station, bases, ports), *stations, couplings=self.eyes, dense=dense)
         self.manager = Manager()
         self.carts = tuple(
             Cart(base, MotionChain(self.manager, self._opener(line), str(n) if n else ""), port)

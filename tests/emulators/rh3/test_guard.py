@@ -1,0 +1,120 @@
+"""A cart with a range finder in a world, closed loop in virtual time."""
+
+from __future__ import annotations
+
+from tickrig.device.urg.world import Post, World, room
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.sim_link import SimLink
+from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.options.game_pad import GamePad
+from tickrig.host.motion.options.guard import Guard
+from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.switch_input import SwitchInput
+
+SECOND_US = 1_000_000
+EMPTY = room(10, 10)
+BLOCKED = EMPTY.with_posts(Post(2.0, 0.1, 0.2))
+
+
+class Seeing:
+    """A cart that looks where it goes."""
+
+    def __init__(self, world: World, *, dense: bool = False) -> None:
+        self.loop = ClosedLoop(world=world, dense=dense)
+        (self.eye,) = self.loop.eyes
+        line = self.eye.line.b
+        self.guard = Guard(
+            self.loop.manager, self.loop.chain, lambda name: SimLink(self.loop.rig, line)
+        )
+        self.loop.activate("tuned")
+        self.guard.activate()
+        self.loop.run_to(SECOND_US // 2)
+
+    def run(self, seconds: float) -> Pose:
+        self.loop.run_to(self.loop.now_us + round(seconds * SECOND_US))
+        return self.loop.pose
+
+    def goal(self, x: float, y: float = 0.0) -> None:
+        self.loop.chain.position_input.goal(Pose(x, y, 0.0))
+
+    @property
+    def finished(self) -> int:
+        return self.loop.chain.position_input.finished
+
+
+def test_it_stops_before_a_post_and_goes_on_when_that_has_gone() -> None:
+    cart = Seeing(BLOCKED)
+    cart.goal(3.0)
+    waiting = cart.run(10)
+    assert waiting == cart.run(3)
+    assert 0.25 < BLOCKED.clearance_m(waiting.x, waiting.y) < 0.75
+    cart.eye.urg.world = EMPTY
+    end = cart.run(14)
+    assert cart.finished == 1
+    assert end.distance(Pose(3.0)) < 0.005
+
+
+def test_somebody_who_steps_in_its_way_stops_it() -> None:
+    cart = Seeing(EMPTY)
+    cart.goal(3.0)
+    cart.run(3)
+    for name, value in (("post_x_m", 2.5), ("post_radius_m", 0.2)):
+        cart.eye.urg.inputs.set(name, value)
+    assert cart.run(8).x < 2.1
+    cart.eye.urg.inputs.set("post_radius_m", 0.0)
+    cart.run(14)
+    assert cart.finished == 1
+
+
+def test_without_its_eyes_it_does_not_move() -> None:
+    cart = Seeing(EMPTY)
+    cart.goal(2.0)
+    cart.run(3)
+    cart.eye.urg.inputs.set("power_cut", 1)
+    stopped = cart.run(3)
+    assert cart.run(1) == stopped
+    cart.eye.urg.inputs.set("power_cut", 0)
+    cart.run(10)
+    assert cart.finished == 1
+
+
+def test_idle_ticks_of_the_sensor_are_not_visible() -> None:
+    ways = []
+    for dense in (True, False):
+        cart = Seeing(BLOCKED, dense=dense)
+        cart.goal(3.0)
+        ways.append([cart.run(0.25) for _ in range(12)])
+    assert ways[0] == ways[1]
+
+
+class Push:
+    """A hand that pushes back between two times."""
+
+    def poll(self, now_us: int, /) -> Hand:
+        return Hand(forward=-1.0) if 3 * SECOND_US < now_us < 4 * SECOND_US else Hand()
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def test_a_hand_takes_the_cart_over_and_the_planner_finishes() -> None:
+    loop = ClosedLoop()
+    manager, context = loop.manager, loop.chain.context
+    manager.add(GamePad("GamePad0", lambda name: Push()), context=context)
+    manager.add(SwitchInput("SwitchInputRTC0"), context=context)
+    base = "RefHardRh3.InTargetVelocity"
+    manager.disconnect("PathFollower.velocity", base)
+    manager.connect("GamePad0.velocity", "SwitchInputRTC0.joystick")
+    manager.connect("PathFollower.velocity", "SwitchInputRTC0.automatic")
+    manager.connect("SwitchInputRTC0.velocity", base)
+    loop.activate("tuned")
+    manager.activate("GamePad0", "SwitchInputRTC0")
+    loop.run_to(SECOND_US // 2)
+    loop.chain.position_input.goal(Pose(1.0))
+    loop.run_to(3 * SECOND_US)
+    before = loop.pose.x
+    loop.run_to(4 * SECOND_US)
+    assert loop.pose.x < before - 0.1
+    loop.run_to(14 * SECOND_US)
+    assert loop.chain.position_input.finished == 1
+    assert loop.pose.distance(Pose(1.0)) < 0.005
