@@ -36,17 +36,23 @@ _SHARED: Final[Decorator] = add_options(
         help="Configuration set: the specification's, or the more precise one.",
     ),
     click.option("--device", metavar="URL", help="Serial port of a base; else one is emulated."),
-    click.option("--baud", type=click.IntRange(1_200, 4_000_000), default=115_200, help="Of it."),
+    click.option(
+        "--baud",
+        type=click.IntRange(1_200, 4_000_000),
+        default=115_200,
+        show_default=True,
+        help="Bit rate of the device, 8N1.",
+    ),
     click.option(
         "--pace",
         type=click.FloatRange(0.01, 1_000),
         metavar="X",
-        help="So many times real time, 1 is real time; else as fast as it goes.",
+        help="Speed of virtual time, 1 is real time; else as fast as it goes.",
     ),
     click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
     click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
     base_options,
-    click.option("--seed", type=int, default=0, help="Of the noise."),
+    click.option("--seed", type=int, default=0, help="Of the noise.  [0]"),
 )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import Final
 
 import click
@@ -16,7 +17,7 @@ from tickrig.emulators.picture import check_plot
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.live_map import LiveMap
 from tickrig.emulators.rh3.rides import PacedRide, SerialRide
-from tickrig.emulators.rh3.track_map import TrackMap
+from tickrig.emulators.rh3.track_map import WIDTH, TrackMap
 from tickrig.emulators.signals import stopped_by_signals
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.dead_reckoning import Wheels
@@ -91,7 +92,8 @@ class Watcher:
 
     def __init__(self, outing: Outing, points: Sequence[Pose]) -> None:
         self._ended = False
-        self._map = LiveMap(TrackMap(points), sys.stdout) if outing.show_map else None
+        width = min(WIDTH, get_terminal_size().columns - 1)
+        self._map = LiveMap(TrackMap(points, width), sys.stdout) if outing.show_map else None
 
     def end(self) -> None:
         """Let the next sample be the last."""

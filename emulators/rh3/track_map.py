@@ -8,7 +8,8 @@ from typing import Final
 from tickrig.host.monitor.graph.canvas import DOTS_X, DOTS_Y, Canvas
 from tickrig.host.motion.geometry import Pose
 
-WIDTH, HEIGHT = 60, 16
+WIDTH: Final = 60
+HEIGHT: Final = 16
 """Cells."""
 MARGIN: Final = 0.08
 """Share of the larger side that is left free all round."""

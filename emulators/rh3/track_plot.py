@@ -32,12 +32,14 @@ def _draw(journey: Journey, points: Sequence[Pose], title: str) -> Figure:
     samples, times = journey.samples, [sample.time_s for sample in journey.samples]
     _draw_ground(ground, journey, points)
     beside.plot(times, [_beside_mm(s.line, s.pose) for s in samples], color="tab:red")
-    beside.set_ylabel("beside the line, mm")
+    beside.set_ylabel("off line, mm")
     speed.plot(times, [sample.twist.v for sample in samples], color="tab:blue")
     speed.set_ylabel("forward, m/s")
     turn.plot(times, [sample.twist.w for sample in samples], color="tab:orange")
     turn.set_ylabel("turning, rad/s")
     turn.set_xlabel("time, s")
+    beside.sharex(turn)
+    speed.sharex(turn)
     for axes in (ground, beside, speed, turn):
         axes.grid(visible=True, alpha=0.3)
     return figure
