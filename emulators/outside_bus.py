@@ -33,7 +33,8 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     Raises:
         Refused: none is named, or it cannot be opened.
     """
-    bus, interface, channel = open_raw(options)
+    instead = "give --scenario FILE, which runs in virtual time"
+    bus, interface, channel = open_raw(options, instead)
     stack.callback(bus.shutdown)
     name = interface if channel is None else f"{interface} {channel}"
     port = CanBusPort(bus)

@@ -155,8 +155,9 @@ class SerialRun(EmulatorRun):
         control = self._options.control
         kind, talk = self._kind, self._kind.talk(bench.link)
         say(f"{kind.title} at {bench.link}, {kind.line.baud} 8N1. Ctrl-C ends.{talk}")
+        way = "--control PATH or --panel" if kind.panel else "--control PATH"
         say(
             f"  tickrig ctl {control} describe"
             if control
-            else "and add --control PATH or --panel to press buttons and make faults."
+            else f"Add {way} to press buttons and make faults."
         )

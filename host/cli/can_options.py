@@ -123,8 +123,12 @@ bus_options: Final[Decorator] = add_options(
 """Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
 
 
-def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
+def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
     """Open such a bus for somebody who takes it as python-can gives it.
+
+    Args:
+        options: the bus.
+        instead: what a person may do who has none, for the message.
 
     Returns:
         The bus, its interface and its channel.
@@ -141,7 +145,9 @@ def open_raw(options: BusOptions) -> tuple[can.BusABC, str, str | None]:
         config = load_config(config=dict(given))
     except can.CanInterfaceNotImplementedError as error:
         unnamed = UNNAMED in str(error)
-        raise Refused(_nothing_named() if unnamed else f"CAN bus: {_one_line(error)}") from None
+        raise Refused(
+            _nothing_named(instead) if unnamed else f"CAN bus: {_one_line(error)}"
+        ) from None
     except (ValueError, TypeError) as error:
         raise Refused(f"CAN bus: {_one_line(error)}") from None
     interface, channel = str(config["interface"]), config["channel"]
@@ -190,11 +196,11 @@ def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
         raise Refused(f"--timing: {_one_line(error)}") from None
 
 
-def _nothing_named() -> str:
+def _nothing_named(instead: str) -> str:
     names = ", ".join(_interfaces())
     return (
         "no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE and CAN_CHANNEL, or"
-        " write them into ~/.canrc; or give --scenario FILE, which runs in virtual time."
+        f" write them into ~/.canrc{instead and f'; or {instead}'}."
         f" python-can has {names}"
     )
 

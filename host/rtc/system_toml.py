@@ -51,6 +51,8 @@ def parse_toml(text: str) -> System:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise RtcRefused(f"not TOML: {error}") from error
+    except RecursionError:
+        raise RtcRefused("not TOML that can be read: lists or tables nest too deep") from None
     if unknown := set(tables) - {"component", "connection"}:
         raise RtcRefused(f"{min(unknown)!r} is none of: component, connection")
     components = _read(tables, "component", _COMPONENT, ("name", "type"))

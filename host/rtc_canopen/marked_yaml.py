@@ -110,7 +110,8 @@ def once(item: Reader, twice: Callable[[Any], str]) -> Reader:
             seen.add(words)
             return value
 
-        return many(unlike)(node, place)
+        values: tuple[Any, ...] = many(unlike)(node, place)
+        return values
 
     return read
 

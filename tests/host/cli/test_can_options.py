@@ -8,7 +8,7 @@ import can
 import pytest
 
 from tickrig.emulators.outside_bus import open_bus
-from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused
 
 
@@ -74,7 +74,14 @@ def test_without_a_name_it_says_what_to_do() -> None:
     said = refused()
     assert said.startswith("no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE")
     assert "slcan, socketcan," in said
+    assert "; or give --scenario FILE, which runs in virtual time. python-can has" in said
     assert "\n" not in said
+
+
+def test_a_tool_that_plays_no_scenario_names_none() -> None:
+    with pytest.raises(Refused) as caught:
+        open_raw(BusOptions())
+    assert "write them into ~/.canrc. python-can has" in caught.value.message
 
 
 @pytest.mark.parametrize(

@@ -143,7 +143,7 @@ def test_nodes_are_activated_in_their_order_each_when_those_before_are_active() 
 @pytest.mark.parametrize(
     ("ports", "reason"),
     [
-        ("{tpdo1: x, tpdo2: x}", "Palette0 has a port 'x' already"),
+        ("{tpdo1: tpdo2}", "Palette0 has a port 'tpdo2' already"),
         ("{}", "a component 'Palette0' is there already"),
     ],
 )

@@ -100,6 +100,10 @@ def test_json_is_read_as_well() -> None:
             "line 2: a node: tpdo513, there are 512 at most",
         ),
         (
+            "nodes:\n- id: 1\n  name: A\n  eds: a\n  ports: {tpdo1: x, rpdo1: x}",
+            "line 5: ports: 2 ports are called x",
+        ),
+        (
             "nodes:\n- id: 1\n  name: A\n  eds: a\n  pdos:\n    tpdo1: {mapping: [0x140, 0x108]}",
             "line 6: mapping: 72 bits, a PDO has 64",
         ),
@@ -131,6 +135,16 @@ def test_json_is_read_as_well() -> None:
             ONE + "rt_connections: [{from: A, to: B.in}]",
             "line 2: from: 'A' is not like Palette0.ai",
         ),
+        (
+            ONE + "pdo_links:\n- {from: 1.tpdo1, to: 1.rpdo1}\n- {from: 1.tpdo2, to: 1.rpdo1}",
+            "line 4: pdo_links: 1.rpdo1 is linked twice",
+        ),
+        (
+            ONE + "pdo_links: [{from: 1.tpdo513, to: 1.rpdo1}]",
+            "line 2: from: tpdo513, there are 512 at most",
+        ),
+        ("[" * 20_000, "not YAML that can be read: lists or tables nest too deep"),
+        (ONE + "start: {order: [1, 1]}", "line 2: order: node 1 is there twice"),
         (ONE + "start: {order: [1, 2]}", "line 2: order: node 2 is none of: 1"),
         (ONE + "start: 1", "line 2: start is written 'key: value', this is not"),
     ],

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
@@ -62,6 +64,19 @@ def test_a_device_that_ignores_the_start_is_told_of_as_not_confirmed() -> None:
     bench.run_ms(200)
     assert bench.state(16) is ERROR
     assert bench.devices[16].read("state") == "Stopped"
+
+
+@pytest.mark.parametrize(("heartbeat_ms", "wait_ms"), [(50, 300), (100, 300), (200, 600)])
+def test_a_state_is_waited_for_three_heartbeat_times_at_least_300_ms(
+    heartbeat_ms: int, wait_ms: int
+) -> None:
+    bench = booted(PALETTE.replace("device}", f"device, heartbeat_ms: {heartbeat_ms}}}"))
+    node = bench.devices[16].slave
+    node.on_state.append(lambda old, new: node.enter(old) if new == 5 else None)
+    bench.server.manager.activate("Palette0")
+    event = bench.run_until(EventKind.NOT_CONFIRMED, 16)
+    (asked_us,) = [at for at, heard in bench.log.heard if str(heard) == "000#0110"]
+    assert wait_ms * 1_000 - 100 <= event.at_us - asked_us <= wait_ms * 1_000
 
 
 def test_deactivation_right_after_activation_reaches_the_device() -> None:

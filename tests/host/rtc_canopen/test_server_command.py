@@ -37,6 +37,10 @@ def test_a_file_is_checked_without_a_bus(file: Path) -> None:
         (b"nodes: [{id: 200, name: A, eds: a.eds}]", "line 1: id: 200 is not a whole number"),
         (b"nodes: [{id: 1, name: A, eds: a.eds}]", "a.eds: No such file or directory"),
         (b"\xff", "byte 0 is not UTF-8"),
+        (
+            PALETTE.replace("device}", "device, ports: {tpdo9: ai}}").encode(),
+            "16.tpdo9: the EDS of node 16 has no 1808h",
+        ),
         (None, "No such file or directory"),
     ],
 )

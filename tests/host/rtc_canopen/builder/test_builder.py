@@ -165,6 +165,7 @@ REFUSED = [
     ("name = 5", "name 5 is no text"),
     ('name = "G"\nnode_id = 128', "node_id 128 is not in 1..127"),
     ('name = "class"', "name 'class' is a keyword of Python"),
+    ('name = "G"\na = ' + "[" * 20_000, "lists or tables nest too deep"),
     ('name = "G"\nport = 5', "port: ports are tables [[port]]"),
     ('name = "G"\nport = [5]', "port: ports are tables [[port]]"),
     ("{size}", "port 1: no key size; known: name, direction, type, length"),
