@@ -114,15 +114,29 @@ class TraceLines:
         if isinstance(frame, CanFrame) and frame.remote:
             yield f"[{frame.dlc}] remote request", ""
             return
-        yield f"[{len(frame.data)}]", ""
-        for place, byte in enumerate(frame.data):
-            changed = row.changed >> 8 * place & 0xFF
-            yield " ", ""
-            if not self.bits:
-                yield f"{byte:02X}", CHANGED if changed else ""
-                continue
-            for bit in reversed(range(8)):
-                yield f"{byte >> bit & 1}", CHANGED if changed >> bit & 1 else ""
+        text, style = f"[{len(frame.data)}]", ""
+        for cell, changed in _bit_cells(row) if self.bits else _byte_cells(row):
+            wanted = CHANGED if changed else ""
+            if wanted != style and cell[0] == " ":
+                yield text + " ", style
+                text, style, cell = "", wanted, cell[1:]  # noqa: PLW2901 - a blank has no style
+            elif wanted != style:
+                yield text, style
+                text, style = "", wanted
+            text += cell
+        yield text, style
+
+
+def _byte_cells(row: TraceRow) -> Iterator[tuple[str, int]]:
+    for place, byte in enumerate(row.heard.frame.data):
+        yield f" {byte:02X}", row.changed >> 8 * place & 0xFF
+
+
+def _bit_cells(row: TraceRow) -> Iterator[tuple[str, int]]:
+    for place, byte in enumerate(row.heard.frame.data):
+        for bit in reversed(range(8)):
+            blank = " " * (bit == 7)
+            yield f"{blank}{byte >> bit & 1}", row.changed >> 8 * place + bit & 1
 
 
 def _ident(row: TraceRow) -> tuple[str, str]:

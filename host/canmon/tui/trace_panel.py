@@ -68,6 +68,7 @@ class TracePanel(Panel):
         self._follower = _Follower(self)
         session.tasks.append(self._follower)
         self._begin = self._total = 0
+        self._head = ""
         self._lines: list[Line] = []
 
     def compose(self) -> ComposeResult:
@@ -103,7 +104,9 @@ class TracePanel(Panel):
         """Show them; the latest one if it was in view."""
         view = self.query_one(LineView)
         follows = self._follows(view)
-        self.query_one("#head", Static).update(self._title())
+        if self._head != (head := self._title()):
+            self._head = head
+            self.query_one("#head", Static).update(head)
         view.show(self._lines, self._begin, self._total)
         if follows and not self.overwrite:
             view.show_end()
