@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tests.host.canmon.tui.rig_session import EPOS, NODE
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can_channels import CHANNELS
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig, Station
+from tickrig.host.canmon.tui.dictionary_task import DictionaryTask
+from tickrig.host.canmon.tui.model import Model
+from tickrig.host.canmon.tui.opening import open_session
+from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.transmit_task import TransmitTask
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.transmit.transmit_words import parse_words
+
+STEPS = 1_000
+
+
+def until(session: Session, done: Callable[[], bool]) -> None:
+    """Let time pass until something is done."""
+    for _ in range(STEPS):
+        session.step(1_000)
+        if done():
+            return
+    raise AssertionError("it was not done")
+
+
+def test_tasks_reach_our_drive_over_an_interface_of_python_can() -> None:
+    wire = CanWire()
+    rig = Rig(Station(make_slave(epos.dictionary(), NODE, application=epos.make), wire.end()))
+    with CHANNELS.offer("desk", rig, wire):
+        session = open_session(["sim:desk"], BusOptions(), Model({NODE: read_eds(EPOS, NODE)}))
+        client = DictionaryTask(session.model.decoder)
+        sender = TransmitTask(session.model.eds)
+        session.tasks += [client, sender]
+        until(session, lambda: session.model.frames > 0)  # it has booted
+        session.arm()
+        (bus,) = session.buses
+        client.choose((bus, NODE))
+        client.read(session.now_us, (0x1008, 0))
+        sender.add(parse_words("000#0105"))
+        sender.once(0, armed=session.armed)
+        until(session, lambda: client.said == "read 1008h:00: done" and session.sent == 2)
+        (row,) = client.objects((bus, NODE)).rows("1008")
+        session.close()
+        session.source.close()
+    assert row.value == "'EPOS'"
