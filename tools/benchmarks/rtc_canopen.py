@@ -1,4 +1,4 @@
-"""The RTC-CANopen server: proxies at 100 Hz, PDO to port, time a frame."""
+"""DeviceRTCs on a rig; the RTC-CANopen server: proxies at 100 Hz, PDO to port, time a frame."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import RUNS, percentiles, rates, row
+from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.ports import OutPort as DeviceOutPort
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.rig import Rig, Station
 from tickrig.host.rtc import InPort, ModuleSpec, RtComponent
 from tickrig.host.rtc_canopen.definition import NodeEntry, Role, SystemDefinition
 from tickrig.host.rtc_canopen.device_file import read_device_file
@@ -17,14 +22,29 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_types.basic import TimedShortSeq
 
 EDS = Path(__file__).parents[2] / "examples" / "eds" / "f-palette.eds"
 NODES = 126
+DEVICES = 32
 SECONDS = 5
 PERIOD_US = 10_000
 FRAMES = 20_000
 CALLS = 5_000
+
+
+class Counter(Component):
+    """Writes its port in each period."""
+
+    type_name = "Counter"
+    count = DeviceOutPort("count", LONG)
+    periods = 0
+
+    def on_execute(self) -> None:
+        """Count."""
+        self.periods += 1
+        self.count.write(self.periods)
 
 
 class Sink(RtComponent):
@@ -40,9 +60,35 @@ class Sink(RtComponent):
 def run(seconds: float) -> None:
     """Print the rows of this suite."""
     del seconds
+    devices()
     periods()
     frames()
     latency()
+
+
+def devices() -> None:
+    """Run DeviceRTCs that each execute and send a PDO in each period of 10 ms."""
+    wire, sent = CanWire(), [0]
+
+    def hear(at_us: int, heard: object) -> None:
+        sent[0] += 1
+
+    wire.observers.append(hear)
+    slaves = [make_device_rtc(Counter, node_id) for node_id in range(1, DEVICES + 1)]
+    rig = Rig(*(Station(slave, wire.end()) for slave in slaves))
+    master = wire.end(accepts=frozenset())
+    rig.run_for(100_000)
+    master.send(rig.now_us, (CanFrame(0, b"\x01\x00"),))
+    rig.run_for(1_000_000)
+    sent[0] = 0
+
+    def work() -> None:
+        rig.run_for(1_000_000)
+
+    work()
+    load = wire.load_permille() / 10
+    what = f"{DEVICES} DeviceRTCs at 100 Hz, a port each, {sent[0]} frames/s, {load} % load"
+    rates(what, 1, "x real time", work)
 
 
 def ready(count: int) -> Server:
