@@ -24,12 +24,18 @@ class Terminal:
         columns: of the terminal.
         lines: of the terminal.
         feed: a file that a pipe brings to its standard input.
+        program: what is run, `canmon` unless given.
     """
 
     def __init__(
-        self, *words: str, columns: int = 100, lines: int = 30, feed: Path | None = None
+        self,
+        *words: str,
+        columns: int = 100,
+        lines: int = 30,
+        feed: Path | None = None,
+        program: str = PROGRAM,
     ) -> None:
-        command = [sys.executable, "-c", PROGRAM, *words]
+        command = [sys.executable, "-c", program, *words]
         if feed is not None:
             command = ["/bin/sh", "-c", f"cat {feed} | {shlex.join(command)}"]
         env = {**os.environ, "TERM": "xterm-256color", "LANG": "C.UTF-8"}

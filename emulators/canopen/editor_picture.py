@@ -1,0 +1,66 @@
+"""Draw the System Editor into an SVG file, on Fig. 120 in virtual time.
+
+`python -m tickrig.emulators.canopen.editor_picture docs/rtc-canopen-editor.svg`
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import Final
+
+from tickrig.emulators.can_host import CanHost
+from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.canopen.bench import make_bench
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes
+from tickrig.emulators.canopen.rig_file import read_rig
+from tickrig.host.rtc_canopen.editor.app import SystemEditor
+from tickrig.host.rtc_canopen.editor.session import Session
+from tickrig.host.rtc_canopen.serve import open_server
+
+LOOKS: Final = 5
+LOOK_US: Final = 100_000
+STEPS: Final = ("end", "up", "up", "m")
+"""The cursor goes to a port, and marks it."""
+
+OBJECTS: Final = 0x6401
+"""From here on, objects are in view."""
+
+
+def picture(examples: Path) -> str:
+    """Return the editor as SVG.
+
+    Args:
+        examples: the folder with rigs and System Definitions.
+    """
+    wire, nodes = CanWire(), describe_nodes(read_rig(examples / "rigs" / "fig120.toml").nodes)
+    bench = make_bench(wire, make_nodes(nodes, wire))
+    bench.operator.set("16/ai1_v", 2.5)
+    path = examples / "rtc_canopen" / "fig120.yaml"
+    link = CanHost(bench.rig, wire.end())
+    return asyncio.run(_draw(Session(open_server(path), path, link), link))
+
+
+async def _draw(session: Session, link: CanHost) -> str:
+    editor = SystemEditor(session, "can0")
+    async with editor.run_test(size=(140, 32)) as pilot:
+        _pass_time(editor, link)
+        await pilot.press(*STEPS)
+        rows = [row.item for row in editor.objects.rows_shown]
+        editor.objects.put_cursor(next(n for n, row in enumerate(rows) if row[0] >= OBJECTS) + 12)
+        _pass_time(editor, link)
+        await pilot.pause()
+        return editor.export_screenshot(title="rtc-canopen-editor fig120.yaml")
+
+
+def _pass_time(editor: SystemEditor, link: CanHost) -> None:
+    for _ in range(LOOKS):
+        until_us = link.now_us + LOOK_US
+        while link.now_us < until_us:
+            editor.session.turn(until_us)
+        editor.look()
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(picture(Path("examples")), "utf-8")
