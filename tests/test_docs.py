@@ -34,6 +34,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/rtc-canopen.md",
         "docs/canopen-io-module.md",
         "docs/servo.md",
+        "docs/urg.md",
     ],
 )
 def test_the_program_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
