@@ -106,6 +106,17 @@ def test_lost_frames_cost_at_most_5_mm(set_id: str, loss: float) -> None:
     assert journey.violations(LIMITS) == 0
 
 
+@pytest.mark.parametrize("rate_hz", [1_000, 200, 25])
+@pytest.mark.parametrize("set_id", TARGETS)
+def test_the_rate_of_the_components_does_not_matter(set_id: str, rate_hz: int) -> None:
+    """OpenRTM's own default is 1000 Hz; the line takes 8 ms for an exchange."""
+    loop = ClosedLoop()
+    loop.chain.context.set_rate(rate_hz)
+    journey = driven(GOAL, set_id, loop)
+    assert journey.error_m <= TARGETS[set_id].error
+    assert journey.heading_error_rad <= TARGETS[set_id].heading
+
+
 @pytest.mark.parametrize(
     ("points", "set_id", "response_s", "delay_ms", "most_m"),
     [
