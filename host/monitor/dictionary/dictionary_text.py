@@ -10,13 +10,12 @@ from tickrig.host.monitor.dictionary.object_row import ObjectRow
 from tickrig.host.monitor.quantity import s_text
 
 LEAST_NAME: Final = 12
-MOST_NAME: Final = 48
-KIND: Final = 14
+MOST_NAME: Final = 40
 VALUE: Final = 24
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int) -> list[str]:
-    """Return a head, and a line for each object.
+    """Return a head, and a line for each object; what went wrong stands in the place of its type.
 
     Args:
         rows: the objects.
@@ -24,9 +23,7 @@ def render_dictionary(rows: Sequence[ObjectRow], now_us: int) -> list[str]:
     """
     longest = max((len(row.text.name) for row in rows), default=0)
     name = min(MOST_NAME, max(LEAST_NAME, longest))
-    head = (
-        f"{'OBJECT':<9} {'NAME':<{name}} {'TYPE':<{KIND}} {'VALUE':<{VALUE}} {'FROM':<4} {'AGE':>7}"
-    )
+    head = f"{'OBJECT':<9} {'NAME':<{name}} {'VALUE':<{VALUE}} {'FROM':<4} {'AGE':>7}  TYPE"
     return [head, *(_line(row, name, now_us) for row in rows)]
 
 
@@ -35,10 +32,9 @@ def _line(row: ObjectRow, name: int, now_us: int) -> str:
     cells = [
         f"{write_entry(row.entry):<9}",
         f"{row.text.name[:name]:<{name}}",
-        f"{row.kind:<{KIND}}",
         f"{row.value:<{VALUE}}",
         f"{row.origin:<4}",
         f"{age:>7}",
-        f" {row.trouble}",
+        f" {row.trouble or row.kind}",
     ]
     return " ".join(cells).rstrip()

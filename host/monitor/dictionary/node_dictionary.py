@@ -11,6 +11,9 @@ from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
 from tickrig.wire.canopen.abort import describe_abort
 from tickrig.wire.canopen.pdo import MappedObject
 
+FIRST_OBJECT: Final = 0x1000
+"""Below it are data types (CiA 301, structure of the object dictionary)."""
+
 MAPPINGS: Final = {"tpdo": 0x1A00, "rpdo": 0x1600}
 
 
@@ -46,7 +49,8 @@ class NodeDictionary:
         """Return the objects that are meant, by index; all for an empty text."""
         seen = self._latest()
         entries = sorted({*self.memory.eds.texts, *seen, *self._troubles})
-        rows = (self._row(entry, seen.get(entry)) for entry in entries)
+        objects = (entry for entry in entries if entry[0] >= FIRST_OBJECT)
+        rows = (self._row(entry, seen.get(entry)) for entry in objects)
         return [row for row in rows if row.is_meant(wanted)]
 
     def _transfer(self, at_us: int, transfer: Transfer) -> None:

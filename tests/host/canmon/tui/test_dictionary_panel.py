@@ -32,14 +32,14 @@ def test_an_object_is_found_read_and_written() -> None:
         await desk.answer("1017")
         await desk.press("enter")
         desk.session.run(100_000)
-        assert row(desk, "1017h:00").split()[-4:-2] == ["0", "sdo"]
+        assert row(desk, "1017h:00").split()[-5:-3] == ["0", "sdo"]
         await desk.press("e")
         assert desk.static("#question") == "1017h:00 producer_heartbeat_time (UNSIGNED16)"
         await desk.answer("often")
         assert desk.static("#wrong").startswith("'often' is no number")
         await desk.answer("100")
         desk.session.run(100_000)
-        assert row(desk, "1017h:00").split()[-4] == "100"
+        assert row(desk, "1017h:00").split()[-5] == "100"
         assert desk.static("#node").endswith("write 1017h:00: done")
 
     at_desk(DictionaryPanel, act, session=heard())
@@ -50,11 +50,11 @@ def test_all_that_is_shown_is_read_and_a_watched_object_is_marked() -> None:
         await desk.press("A", "R")
         assert desk.static("#node").endswith("5 transfers left")
         desk.session.run(200_000)
-        assert [line.split()[-3] for line in desk.lines()] == ["sdo"] * 5
+        assert [line.split()[-4] for line in desk.lines()] == ["sdo"] * 5
         await desk.press("space")
         desk.session.run(2_000_000)
         assert desk.lines()[0].startswith("* 1018h:00")
-        assert float(desk.lines()[0].split()[-2]) < 1.1 < float(desk.lines()[1].split()[-2])
+        assert float(desk.lines()[0].split()[-3]) < 1.1 < float(desk.lines()[1].split()[-3])
 
     panel = at_desk(DictionaryPanel, act, session=heard(), settings={"filter": "1018"})
     assert panel.save() == {"node": 0, "filter": "1018"}

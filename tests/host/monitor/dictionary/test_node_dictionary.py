@@ -62,6 +62,10 @@ def test_an_abort_that_names_no_object_is_passed_over() -> None:
     assert dictionary("0.1 585#0011223344556677").rows() == []
 
 
+def test_data_types_are_no_objects_of_the_node() -> None:
+    assert {row.entry[0] for row in dictionary("", eds=True).rows()} & set(range(0x1000)) == set()
+
+
 def test_rows_are_chosen_by_name_or_index() -> None:
     made = dictionary("", eds=True)
     assert {row.entry[0] for row in made.rows("heartbeat")} >= {0x1017}
@@ -70,9 +74,9 @@ def test_rows_are_chosen_by_name_or_index() -> None:
 
 
 TABLE = """\
-OBJECT    NAME           TYPE           VALUE                    FROM     AGE
-1017h:00  heartbeat_time UNSIGNED16     100                      sdo    1.0 s
-6041h:00  statusword     UNSIGNED16     0x0240                   sdo    0.9 s  object is read only (06010002h)"""  # noqa: E501 - as it is shown
+OBJECT    NAME           VALUE                    FROM     AGE  TYPE
+1017h:00  heartbeat_time 100                      sdo    1.0 s  UNSIGNED16
+6041h:00  statusword     0x0240                   sdo    0.9 s  object is read only (06010002h)"""
 
 
 def test_objects_are_shown_like_this() -> None:
