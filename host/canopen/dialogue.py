@@ -50,6 +50,7 @@ class Job:
         done: told its result.
         failed: told what it raised.
         dropped: told if it is forgotten before its end.
+        moves: it may change the NMT state of the node.
     """
 
     what: str
@@ -57,6 +58,7 @@ class Job:
     done: Callable[[Any], None]
     failed: Callable[[Failure], None]
     dropped: Callable[[], None] = _nothing
+    moves: bool = True
 
 
 class Dialogue:
@@ -77,6 +79,11 @@ class Dialogue:
         self.job: Job | None = None
         self._step: Step | None = None
         self._jobs: deque[Job] = deque()
+
+    @property
+    def moves(self) -> bool:
+        """Whether something is under way that may change the NMT state of the node."""
+        return self.job is not None and any(job.moves for job in (self.job, *self._jobs))
 
     def start(self, now_us: int, job: Job) -> None:
         """Run a job when those before it have ended."""

@@ -105,4 +105,4 @@ class Links:
             self._note(EventKind.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
-        node.run(now_us, Job("link", script, done, failed))
+        node.run(now_us, Job("link", script, done, failed, moves=False))

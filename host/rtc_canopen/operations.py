@@ -50,7 +50,7 @@ class Operations:
         """Say on the bus what was asked for, unless the device is there already."""
         if self.proxy is None or (asked := self.proxy.take_asked()) is Asked.NOTHING:
             return
-        state = self.nmt_state if self._dialogue.job is None else None
+        state = None if self._dialogue.moves else self.nmt_state
         match asked:
             case Asked.ACTIVATE if state is NmtState.OPERATIONAL:
                 self._activated(None)
@@ -69,7 +69,7 @@ class Operations:
     def follow(self, state: NmtState, *, changed: bool) -> None:
         """Move the proxy to where the device says it is, unless that is about to change."""
         proxy = self.proxy
-        if proxy is None or self._dialogue.job is not None or proxy.asked is not Asked.NOTHING:
+        if proxy is None or self._dialogue.moves or proxy.asked is not Asked.NOTHING:
             return
         if self._stopping:
             self._stopping = state is not NmtState.STOPPED

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.rtc_canopen.events import EventKind, Note
-from tickrig.host.rtc_canopen.served_node import ServedNode
+from tickrig.host.rtc_canopen.definition import SystemDefinition
+from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.own_objects import OwnObjects
+from tickrig.host.rtc_canopen.served_node import House, ServedNode
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
 from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
+from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
 from tickrig.wire.errors import WireError
 
 EMERGENCY: Final = range(0x081, 0x100)
@@ -24,12 +27,16 @@ class Receiver:
 
     Args:
         nodes: by node-ID.
-        master_id: node-ID of the server.
-        note: takes events.
+        definition: what the server was told.
+        house: the server.
     """
 
-    def __init__(self, nodes: Mapping[int, ServedNode], master_id: int, note: Note) -> None:
-        self._nodes, self._master_id, self._note = nodes, master_id, note
+    def __init__(
+        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, house: House
+    ) -> None:
+        self._nodes, self._master_id = nodes, definition.master.node
+        self._note, self._send = house.note, house.send
+        self._objects = OwnObjects(definition)
         self._foreign_us: int | None = None
 
     def receive(self, now_us: int, frame: CanFrame) -> None:
@@ -39,6 +46,8 @@ class Receiver:
             self._hear_command(now_us, frame.data)
         elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
             self._hear_master(now_us)
+        elif can_id == REQUEST_COB_ID + self._master_id:
+            self._hear_question(frame.data)
         elif node is None:
             return
         elif can_id in ERROR_CONTROL:
@@ -64,6 +73,10 @@ class Receiver:
             text = "another node has the node-ID of the server"
             self._note(EventKind.FOREIGN_MASTER, self._master_id, text)
         self._foreign_us = now_us
+
+    def _hear_question(self, data: bytes) -> None:
+        if (answer := self._objects.answer(data)) is not None:
+            self._send(RESPONSE_COB_ID + self._master_id, answer)
 
     def _hear_emergency(self, node: ServedNode, data: bytes) -> None:
         try:

@@ -69,7 +69,7 @@ class Server:
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
         self.links = Links(self.nodes, definition.pdo_links, self.note)
         self.connections = Connections(self.manager, definition.rt_connections, self.note)
-        self._receiver = Receiver(self.nodes, definition.master.node, self.note)
+        self._receiver = Receiver(self.nodes, definition, self)
         self._data = DataFlow(self.nodes, self.send, self.note)
         self._start_order = StartOrder(self.nodes, definition.start_order)
         self._states: dict[int, LifeCycleState] = {}

@@ -236,7 +236,8 @@ class ServerView:
 
     def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> Transfer:
         transfer = Transfer()
-        job = Job("transfer", script, transfer.succeed, transfer.fail, transfer.drop)
+        tell = transfer.succeed, transfer.fail, transfer.drop
+        job = Job("transfer", script, *tell, moves=False)
         self._node(node_id).run(self._server.now_us, job)
         return transfer
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
-from tickrig.host.rtc import RtcRefused
+from tests.host.rtc_canopen.components import add_knob
+from tickrig.host.rtc import LifeCycleState, RtcRefused
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, RtConnection
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.definition_writer import write_definition
@@ -13,6 +14,8 @@ from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import EventKind
 from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.view import NOT_HEARD, PdoView, PortView, ServerView
+from tickrig.wire.can import CanFrame
+from tickrig.wire.rtc_types.basic import TimedShortSeq
 
 SAME_LENGTH = PdoName(16, "tpdo2"), PdoName(32, "rpdo2")
 
@@ -55,6 +58,21 @@ def test_a_node_is_shown_with_its_states_ports_and_pdos() -> None:
     assert view.nodes[1].ports[1].peers == ()
 
 
+def test_components_and_connections_are_shown_and_one_that_waits_can_be_forgotten() -> None:
+    bench, view = booted()
+    knob = add_knob(bench.server.manager, TimedShortSeq)
+    (shown,) = view.components
+    assert shown.ports == (PortView("Knob0.out", "TimedShortSeq", out=True, peers=()),)
+    assert (shown.name, shown.type_name, shown.state) == ("Knob0", "Knob", "INACTIVE")
+    view.connect("Knob0.out", "Motor0.rpdo2")
+    bench.devices[32].physical["unplugged"].write(1)
+    bench.run_ms(1_500)
+    assert not knob.out.connectors
+    assert view.connections == view.waiting
+    view.disconnect("Motor0.rpdo2", "Knob0.out")
+    assert not view.connections
+
+
 def test_nodes_are_started_in_their_order() -> None:
     bench, view = booted()
     view.start()
@@ -91,6 +109,18 @@ def test_a_transfer_that_a_lost_node_cannot_end_is_given_up() -> None:
     bench.run_ms(400)
     for one in (transfer, second):
         assert one.problem == "given up: the node was reset, stopped or lost"
+
+
+def test_a_transfer_that_is_not_answered_hides_no_foreign_command() -> None:
+    bench, view = booted()
+    bench.activate()
+    bench.other.send((CanFrame.parse("000#0210"),))
+    bench.run_ms(1)
+    transfer = view.read(16, 0x1008, 0)
+    bench.run_ms(150)
+    assert not transfer.done
+    assert bench.state(16) is LifeCycleState.ERROR
+    assert bench.events(EventKind.FOREIGN_TRANSITION)
 
 
 def test_pdos_of_the_same_length_are_linked_while_the_server_runs() -> None:
