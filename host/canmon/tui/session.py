@@ -161,6 +161,9 @@ class Session:
         return []
 
     def _send(self, channel: str, frame: CanFrame) -> None:
+        if not self.armed:  # somebody has stopped all meanwhile
+            self.withheld += 1
+            return
         name = channel or next(iter(self.buses))
         try:
             self.buses[name](frame)
