@@ -135,7 +135,7 @@ def rounded_up(total: int) -> int:
     """Return a height that seldom changes while lines come: to lay out a screen takes long.
 
     >>> rounded_up(50), rounded_up(1_001), rounded_up(100_000)
-    (50, 1024, 100352)
+    (50, 1008, 100352)
     """
     step = 1 << max(0, total.bit_length() - HEIGHT_BITS)
     return -(-total // step) * step

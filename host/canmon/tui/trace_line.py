@@ -6,7 +6,7 @@
 >>> line = TraceLines(origin_us=1_000_000).line(row)
 >>> line_text(line)
 '     0.250000  100.000 185       [2] 37 02'
->>> [text for text, style in line if style == CHANGED]
+>>> [text.strip() for text, style in line if style == CHANGED]
 ['37']
 """
 
@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Final
 
 from tickrig.host.canmon.tui.line import Line, line_text
@@ -114,29 +116,22 @@ class TraceLines:
         if isinstance(frame, CanFrame) and frame.remote:
             yield f"[{frame.dlc}] remote request", ""
             return
-        text, style = f"[{len(frame.data)}]", ""
-        for cell, changed in _bit_cells(row) if self.bits else _byte_cells(row):
-            wanted = CHANGED if changed else ""
-            if wanted != style and cell[0] == " ":
-                yield text + " ", style
-                text, style, cell = "", wanted, cell[1:]  # noqa: PLW2901 - a blank has no style
-            elif wanted != style:
-                yield text, style
-                text, style = "", wanted
-            text += cell
-        yield text, style
+        yield f"[{len(frame.data)}]", ""
+        cells = _bit_cells(row) if self.bits else _byte_cells(row)
+        for changed, run in groupby(cells, key=itemgetter(1)):  # few pieces are painted soon
+            yield "".join(cell for cell, _ in run), CHANGED if changed else ""
 
 
-def _byte_cells(row: TraceRow) -> Iterator[tuple[str, int]]:
+def _byte_cells(row: TraceRow) -> Iterator[tuple[str, bool]]:
     for place, byte in enumerate(row.heard.frame.data):
-        yield f" {byte:02X}", row.changed >> 8 * place & 0xFF
+        yield f" {byte:02X}", bool(row.changed >> 8 * place & 0xFF)
 
 
-def _bit_cells(row: TraceRow) -> Iterator[tuple[str, int]]:
+def _bit_cells(row: TraceRow) -> Iterator[tuple[str, bool]]:
     for place, byte in enumerate(row.heard.frame.data):
         for bit in reversed(range(8)):
             blank = " " * (bit == 7)
-            yield f"{blank}{byte >> bit & 1}", row.changed >> 8 * place + bit & 1
+            yield f"{blank}{byte >> bit & 1}", bool(row.changed >> 8 * place + bit & 1)
 
 
 def _ident(row: TraceRow) -> tuple[str, str]:

@@ -27,6 +27,7 @@ DRIVE = Path(__file__).parents[3] / "golden/canmon/drive.log"
 OURS = (TracePanel, NodesPanel, StatisticsPanel)
 SIZE = (120, 30)
 PATIENCE_US = 10_000_000
+TRIES = 1_000
 
 Act = Callable[[Monitor, Any], Awaitable[None]]
 
@@ -84,6 +85,15 @@ def shown(monitor: Monitor) -> list[str]:
     """Return the lines of the panel on the screen, as they are now."""
     monitor.look()
     return [line_text(line).rstrip() for line in monitor.shown.query_one(LineView).lines]
+
+
+async def until(pilot: Any, holds: Callable[[], bool]) -> None:
+    """Let the monitor work until something holds."""
+    for _ in range(TRIES):
+        if holds():
+            return
+        await pilot.pause(0.01)
+    raise AssertionError(screen_text(pilot.app))
 
 
 def screen_text(monitor: Monitor) -> str:

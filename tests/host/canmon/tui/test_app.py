@@ -15,6 +15,7 @@ from tests.host.canmon.tui.pilot import (
     on_monitor,
     screen_text,
     shown,
+    until,
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
@@ -65,10 +66,7 @@ def test_f1_tells_what_each_panel_shows_and_what_its_keys_do(panel: Any) -> None
 
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("f1")
-        await pilot.pause()
-        await pilot.pause()
-        text = screen_text(monitor)
-        assert panel.HELP.split()[1] in text
+        await until(pilot, lambda: panel.HELP.split()[1] in screen_text(monitor))
         await pilot.press("f1")
         assert not monitor.screen.query("HelpPanel")
 
@@ -78,10 +76,9 @@ def test_f1_tells_what_each_panel_shows_and_what_its_keys_do(panel: Any) -> None
 def test_all_keys_of_the_panel_are_commands_by_name() -> None:
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("ctrl+p", *"overw")
-        await pilot.pause(0.2)
+        await until(pilot, lambda: "key o" in screen_text(monitor))
         await pilot.press("enter")
-        await pilot.pause()
-        assert monitor.query_one(TracePanel).overwrite
+        await until(pilot, lambda: monitor.query_one(TracePanel).overwrite)
         names = [command.title for command in monitor.get_system_commands(monitor.screen)]
         assert {"trace", "nodes", "pause", "arm", "stop all"} <= set(names)
 

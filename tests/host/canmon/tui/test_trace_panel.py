@@ -11,6 +11,7 @@ from tests.host.canmon.tui.pilot import (
     on_monitor,
     screen_text,
     shown,
+    until,
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
@@ -51,10 +52,10 @@ def test_bytes_that_changed_have_a_colour(wire: Wire) -> None:
         hear(session, wire, "185#0102", "185#0182")
         shown(monitor)
         line = panel_of(monitor).query_one(LineView).lines[1]
-        assert [text for text, style in line if style == CHANGED] == ["82"]
+        assert [text.strip() for text, style in line if style == CHANGED] == ["82"]
         await pilot.press("b")
         line = panel_of(monitor).query_one(LineView).lines[1]
-        assert [text for text, style in line if style == CHANGED] == ["1"]
+        assert [text.strip() for text, style in line if style == CHANGED] == ["1"]
         await pilot.press("b")
         assert "01 82" in shown(monitor)[1]
 
@@ -67,15 +68,12 @@ def test_the_latest_frame_is_in_view_until_somebody_scrolls_up(wire: Wire) -> No
     async def act(monitor: Monitor, pilot: Any) -> None:
         hear(session, wire, *(f"181#{n:02X}" for n in range(100)))
         assert "[1] 63" in shown(monitor)[-1]
-        await pilot.pause()
         await pilot.press("home")
-        await pilot.pause()
-        assert "[1] 00" in shown(monitor)[0]
+        await until(pilot, lambda: "[1] 00" in shown(monitor)[0])
         hear(session, wire, "181#FF")
         assert "[1] 00" in shown(monitor)[0]
         await pilot.press("end")
-        await pilot.pause()
-        assert "[1] FF" in shown(monitor)[-1]
+        await until(pilot, lambda: "[1] FF" in shown(monitor)[-1])
 
     on_monitor(session, act)
 
