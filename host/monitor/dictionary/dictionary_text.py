@@ -10,8 +10,8 @@ from tickrig.host.monitor.dictionary.object_row import ObjectRow
 from tickrig.host.monitor.quantity import s_text
 
 LEAST_NAME: Final = 12
-MOST_NAME: Final = 40
-VALUE: Final = 24
+MOST_NAME: Final = 36
+VALUE: Final = 20
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int) -> list[str]:

@@ -74,9 +74,9 @@ def test_rows_are_chosen_by_name_or_index() -> None:
 
 
 TABLE = """\
-OBJECT    NAME           VALUE                    FROM     AGE  TYPE
-1017h:00  heartbeat_time 100                      sdo    1.0 s  UNSIGNED16
-6041h:00  statusword     0x0240                   sdo    0.9 s  object is read only (06010002h)"""
+OBJECT    NAME           VALUE                FROM     AGE  TYPE
+1017h:00  heartbeat_time 100                  sdo    1.0 s  UNSIGNED16
+6041h:00  statusword     0x0240               sdo    0.9 s  object is read only (06010002h)"""
 
 
 def test_objects_are_shown_like_this() -> None:
