@@ -9,6 +9,10 @@ from hypothesis import strategies as st
 
 from tests.host.motion.base_bench import COUNTS_PER_RAD, COUNTS_PER_TURN, BaseBench
 from tests.host.motion.port_bench import PortBench
+from tickrig.device.modbus.registers import Registers
+from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.rh3.base import Rh3Base
+from tickrig.emulators.rig import Rig, Station
 from tickrig.host.errors import LinkClosed
 from tickrig.host.link import Link
 from tickrig.host.motion.components.ref_hard import RefHard, RefHardRh3
@@ -151,7 +155,7 @@ def test_a_cut_line_is_an_error_and_the_base_stops_by_its_watchdog(
     bench.port.arm("cut")
     bench.period(15)
     assert bench.state == "ERROR"
-    assert "no answer to 3 requests in a row" in caplog.text
+    assert "no answer to 5 requests in a row" in caplog.text
     bench.rig.run_for(600_000)
     assert not moving(bench)
     assert bench.base.status & Status.WATCHDOG
@@ -230,6 +234,51 @@ def test_a_line_that_goes_away_is_an_error(caplog: pytest.LogCaptureFixture) -> 
     bench.period(2)
     assert bench.state == "ERROR"
     assert "the link was closed" in caplog.text
+
+
+class Refusing(ModbusSlave):
+    """A slave that has no registers for so many requests."""
+
+    tick_us = 1_000
+
+    def __init__(self, base: Rh3Base, times: int) -> None:
+        super().__init__(Registers((), {}), lambda values: None)
+        self._base, self._times = base, times
+
+    @property
+    def due_us(self) -> int:
+        return min(super().due_us, self._base.due_us)
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        if self.served >= self._times:
+            return self._base.tick(now_us, rx)
+        return super().tick(now_us, rx)
+
+
+class RefusingBench(BaseBench):
+    """A bench whose base refuses some requests before it takes any."""
+
+    def __init__(self, times: int) -> None:
+        self.times = times
+        super().__init__()
+
+    def _open(self, url: str) -> Link[bytes]:
+        self.rig = Rig(Station(Refusing(self.base, self.times), self.port))
+        return super()._open(url)
+
+
+def test_a_request_that_was_refused_is_made_again() -> None:
+    bench = RefusingBench(4)
+    bench.drive(0.3, periods=60)
+    assert bench.state == "ACTIVE"
+    assert moving(bench)
+
+
+def test_a_base_that_goes_on_to_refuse_is_an_error(caplog: pytest.LogCaptureFixture) -> None:
+    bench = RefusingBench(5)
+    bench.period(12)
+    assert bench.state == "ERROR"
+    assert "the base refuses Request(function=3, read=(<Address.MODE: 16>, 1)" in caplog.text
 
 
 def test_a_limit_beyond_32_bits_is_the_highest_there_is() -> None:
