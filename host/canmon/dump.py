@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -21,12 +21,16 @@ from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.log_file import LogFile
 from tickrig.host.canmon.meaning import Meaning, Meant
 from tickrig.host.canmon.printer import Output, printer_of
-from tickrig.host.canmon.source import Source, explain_sources, open_source
+from tickrig.host.canmon.source import AnySource, explain_sources, open_any
+from tickrig.host.canmon.source_word import LineWord, parse_source
 from tickrig.host.canmon.stdout import Printed, until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.dump_line import Stamp
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.heard_line import Listened
 
 POLL_US: Final = 100_000
 
@@ -100,20 +104,28 @@ def command(  # noqa: PLR0913 - options
     """  # noqa: D301 - click wants the backspace
     if file is not None and output:
         raise Refused("-l shows nothing: it goes without -L, --jsonl and --csv")
+    if (file is not None or output == Output.LOG) and any(map(_is_line, source)):
+        raise Refused(
+            "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
+        )
     chosen, form = read_filter(wanted), Output(output or "")
     plain = raw or form is Output.LOG or file is not None
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
     shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
     with ExitStack() as held:
-        frames = held.enter_context(closing(open_source(source, BusOptions(**options))))
+        frames = held.enter_context(closing(open_any(source, BusOptions(**options))))
         log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         with until_interrupted(), until_unread():
             pass_on(frames, Meaning(decoder, chosen), (log or shown).take, count, quiet_ms)
     report(frames, strict)
 
 
+def _is_line(word: str) -> bool:
+    return isinstance(parse_source(word), LineWord)
+
+
 def pass_on(
-    source: Source,
+    source: AnySource[Listened],
     meaning: Meaning,
     take: Take,
     count: int | None = None,

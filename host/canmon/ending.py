@@ -11,7 +11,7 @@ from typing import Final, NoReturn
 import click
 
 from tickrig.host.canmon.failure import SourceFailed
-from tickrig.host.canmon.source import Source
+from tickrig.host.canmon.source import AnySource
 
 ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
 
@@ -22,7 +22,7 @@ class FramesLost(click.ClickException):
     exit_code = 4
 
 
-def report(source: Source, strict: bool) -> None:
+def report(source: AnySource[object], strict: bool) -> None:
     """Say what was lost or no frame, then close the source.
 
     Raises:

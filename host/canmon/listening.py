@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, TypeVar
 
 import click
 
-from tickrig.host.canmon.source import Source
+from tickrig.host.canmon.source import AnySource
 from tickrig.host.canmon.source_word import BusWord, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.heard import Heard
+
+Item = TypeVar("Item")
 
 POLL_US: Final = 20_000
 PATIENCE_US: Final = 5_000_000
@@ -41,14 +42,16 @@ def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
     return next(named, None) if options.bitrate is None else options.bitrate
 
 
-def listen(source: Source, take: Callable[[list[Heard]], None], span_us: int | None) -> None:
+def listen(
+    source: AnySource[Item], take: Callable[[Sequence[Item]], None], span_us: int | None
+) -> None:
     """Take what comes until the source ends or the time is over."""
     begin_s = time.monotonic()
     while not (source.ended or is_over(begin_s, span_us)):
         take(source.poll(POLL_US))
 
 
-def patience_us(source: Source, words: Sequence[str]) -> int | None:
+def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
     """Return how long to listen where nobody says it; a file and a pipe have an end."""
     return None if not source.live or list(words) == ["-"] else PATIENCE_US
 

@@ -11,6 +11,7 @@ from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.meaning import Meant
 from tickrig.host.canmon.source_word import FileWord, parse_source
 from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_format import LogFormatError
 from tickrig.host.monitor.logs.log_reader import LogError
 from tickrig.host.monitor.logs.log_writer import write_log
@@ -47,6 +48,7 @@ class LogFile:
         """Add frames; what came is with the operating system then."""
         try:
             for heard, _ in meant:
+                assert isinstance(heard, Heard), "who opens serial ports does not write a log"
                 self._writer.write(heard)
             if meant:
                 self._writer.flush()

@@ -11,9 +11,10 @@ if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.decode.decoder import Decoder
     from tickrig.host.monitor.decode.filter import Filter
+    from tickrig.host.monitor.decode.heard_line import Listened
 
-Meant = tuple[Heard, "Decoded | None"]
-"""A frame, and what it means where somebody asked."""
+Meant = tuple["Listened", "Decoded | None"]
+"""A frame or a line of a serial port, and what it means where somebody asked."""
 
 
 class Meaning:
@@ -27,10 +28,13 @@ class Meaning:
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
 
-    def take(self, heards: Sequence[Heard]) -> Iterator[Meant]:
+    def take(self, heards: Sequence[Listened]) -> Iterator[Meant]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
         decoder, wanted = self._decoder, self._wanted
         for heard in heards:
-            decoded = None if decoder is None else decoder.take(heard)
+            if decoder is None:
+                decoded = None
+            else:
+                decoded = decoder.take(heard) if isinstance(heard, Heard) else heard.decoded
             if wanted is None or (decoded is not None and wanted.matches(heard, decoded)):
                 yield heard, decoded

@@ -15,9 +15,10 @@ from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.heard_line import Listened
 
-Printer = Callable[[Heard, "Decoded | None"], str]
-"""Writes a frame and what it means, where that is known, as one line."""
+Printer = Callable[["Listened", "Decoded | None"], str]
+"""Writes a frame, or a line of a serial port, and what it means, where that is known."""
 
 
 class Output(StrEnum):
@@ -55,8 +56,7 @@ def printer_of(
 def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
     match output:
         case Output.TEXT:
-            lines = DumpLines(stamp, extra)
-            return lambda heard, decoded: lines.line(heard, decoded_text(decoded))
+            return text_printer(DumpLines(stamp, extra))
         case Output.LOG:
             return log_printer
         case Output.JSONL:
@@ -67,7 +67,7 @@ def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
             assert_never(output)
 
 
-def _error_meaning(heard: Heard) -> Decoded | None:
+def _error_meaning(heard: Listened) -> Decoded | None:
     if not isinstance(heard.frame, ErrorFrame):
         return None
     from tickrig.host.monitor.decode.error_frame_text import (  # noqa: PLC0415 - seldom wanted
@@ -77,15 +77,37 @@ def _error_meaning(heard: Heard) -> Decoded | None:
     return decode_error(heard.frame)
 
 
-def log_printer(heard: Heard, decoded: Decoded | None) -> str:
-    """Write a line of a log."""
+def text_printer(lines: DumpLines) -> Printer:
+    """Return what writes lines as candump shows them."""
+
+    def printed(heard: Listened, decoded: Decoded | None) -> str:
+        text = decoded_text(decoded)
+        if isinstance(heard, Heard):
+            return lines.line(heard, text)
+        from tickrig.host.monitor.serial_text import line_text  # noqa: PLC0415 - seldom wanted
+
+        return f"{lines.stamp(heard.at_us)}  {line_text(heard, text)}"
+
+    return printed
+
+
+def log_printer(heard: Listened, decoded: Decoded | None) -> str:
+    """Write a line of a log, which holds frames alone."""
+    assert isinstance(heard, Heard), "who opens serial ports does not ask for a log"
     return log_line(heard)
 
 
-def json_printer(heard: Heard, decoded: Decoded | None) -> str:
+def json_printer(heard: Listened, decoded: Decoded | None) -> str:
     """Write an object in JSON, with kind, node, text, signals and their source."""
-    if decoded is None:
-        return json_line(heard)
+    more = "" if decoded is None else _meaning_json(decoded)
+    if isinstance(heard, Heard):
+        return json_line(heard, more)
+    from tickrig.host.monitor.serial_text import line_json  # noqa: PLC0415 - seldom wanted
+
+    return line_json(heard, more)
+
+
+def _meaning_json(decoded: Decoded) -> str:
     import json  # noqa: PLC0415 - seldom wanted
 
     node = "" if decoded.node is None else f',"node":{decoded.node}'
@@ -93,14 +115,18 @@ def json_printer(heard: Heard, decoded: Decoded | None) -> str:
     values = {signal.name: _plain(signal.value) for signal in decoded.signals}
     signals = f',"sig":{json.dumps(values, separators=(",", ":"))}' if values else ""
     source = f',"src":"{decoded.source}"' if decoded.source else ""
-    return json_line(heard, f',"kind":"{decoded.kind}"{node}{text}{signals}{source}')
+    return f',"kind":"{decoded.kind}"{node}{text}{signals}{source}'
 
 
-def csv_printer(heard: Heard, decoded: Decoded | None) -> str:
-    """Write a row below `CSV_HEADER`."""
-    at_us, channel, frame, sent = heard
-    text, _, data = str(frame).partition("#")
-    length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+def csv_printer(heard: Listened, decoded: Decoded | None) -> str:
+    """Write a row below `CSV_HEADER`; a line of a serial port has no identifier."""
+    at_us, channel, sent = heard.at_us, heard.channel, heard.sent
+    if isinstance(heard, Heard):
+        frame = heard.frame
+        text, _, data = str(frame).partition("#")
+        length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+    else:
+        text, data, length = "", heard.data.hex().upper(), len(heard.data)
     meaning = ("", "", "")
     if decoded is not None:
         node = "" if decoded.node is None else str(decoded.node)

@@ -5,21 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from inspect import cleandoc
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import click
 
 from tickrig.host.canmon.file_source import FileSource
-from tickrig.host.canmon.source_word import BusWord, FileWord, parse_source
+from tickrig.host.canmon.source_word import BusWord, FileWord, LineWord, parse_source
 from tickrig.host.canmon.stdin_source import StdinSource
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.heard import Heard
 
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.heard_line import Listened
+
 SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
          can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
          slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
+         serial:/dev/ttyUSB0,rrc   a serial port (dump, top): PORT[@BAUD],rrc or ,rtc-lite
          run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
          -                         standard input: candump -L, or canmon dump --jsonl"""
 """For the help text of a verb that takes SOURCE words."""
@@ -30,8 +34,11 @@ def explain_sources(command: click.Command) -> None:
     command.help = cleandoc(command.help or "").replace("{source}", SOURCE_HELP)
 
 
-class Source(Protocol):
-    """Frames as they come in.
+Taken_co = TypeVar("Taken_co", covariant=True)
+
+
+class AnySource(Protocol[Taken_co]):
+    """Frames, or lines of a serial port, as they come in.
 
     Attributes:
         live: it goes on by itself; False where all of it is there already.
@@ -54,7 +61,7 @@ class Source(Protocol):
         """Why it ended before its time; empty if it did not."""
         ...
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> Sequence[Taken_co]:
         """Wait for a first frame, then return all that are there; none if none came."""
         ...
 
@@ -64,6 +71,14 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Give back what it holds; closing twice is no error."""
+        ...
+
+
+class Source(AnySource[Heard], Protocol):
+    """Frames as they come in."""
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Wait for a first frame, then return all that are there; none if none came."""
         ...
 
 
@@ -92,11 +107,27 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
         return StdinSource()
     if len(files) == len(parsed) > 0:
         return FileSource(files)
+    if any(isinstance(word, LineWord) for word in parsed):
+        raise Refused("serial lines are shown by dump and top: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
     from tickrig.host.canmon.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only
 
     return open_buses(buses or [BusWord()], options)
+
+
+def open_any(words: Sequence[str], options: BusOptions) -> AnySource[Listened]:
+    """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
+    parsed = [parse_source(word) for word in words]
+    lines = [word for word in parsed if isinstance(word, LineWord)]
+    if not lines:
+        return open_source(words, options)
+    buses = [word for word in parsed if isinstance(word, BusWord)]
+    if len(buses) + len(lines) < len(parsed):
+        raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
+    from tickrig.host.canmon.line_source import open_lines  # noqa: PLC0415 - pyserial
+
+    return open_lines(lines, buses, options)
 
 
 def log_path(word: str) -> Path:

@@ -4,6 +4,8 @@
 BusWord(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None)
 >>> parse_source("can0,123:7FF").chosen.passes(0x123)
 True
+>>> parse_source("serial:/dev/ttyUSB0@57600,rtc-lite").protocol
+'rtc-lite'
 >>> parse_source("-") is None
 True
 """
@@ -22,11 +24,18 @@ from tickrig.host.monitor.logs.log_format import COMPRESSED, SUFFIXES, LogFormat
 INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}
 """Short names of python-can's interfaces."""
 
+PROTOCOLS: Final = ("rrc", "rtc-lite", "rtc-lite-xor8")
+"""What is spoken on serial lines."""
+
 UDP_GROUP: Final = "239.74.163.2"
 """The IPv4 group of python-can's udp_multicast."""
 
 _BUS: Final = re.compile(
     r"(?:(?P<interface>[A-Za-z]\w*):)?(?P<channel>[^@]*)(?:@(?P<bitrate>[0-9]{1,9}[kM]?))?"
+)
+_LINE: Final = re.compile(
+    r"serial:(?P<port>.+?)(?:@(?P<baud>[0-9]{1,9}[kM]?))?"
+    rf",(?P<protocol>{'|'.join(PROTOCOLS)})(?P<host>,host)?"
 )
 _FACTORS: Final = {"k": 1_000, "M": 1_000_000}
 
@@ -49,7 +58,24 @@ class BusWord:
     chosen: CandumpFilter | None = None
 
 
-def parse_source(word: str) -> FileWord | BusWord | None:
+@dataclass(frozen=True, slots=True)
+class LineWord:
+    """A serial port, and the protocol of its line.
+
+    Attributes:
+        port: a device or pyserial URL.
+        baud: bit/s, None for what is usual with the protocol.
+        protocol: one of `PROTOCOLS`.
+        from_host: what comes in is what the host sends.
+    """
+
+    port: str
+    baud: int | None
+    protocol: str
+    from_host: bool = False
+
+
+def parse_source(word: str) -> FileWord | BusWord | LineWord | None:
     """Read a SOURCE word; None is standard input.
 
     Raises:
@@ -57,6 +83,9 @@ def parse_source(word: str) -> FileWord | BusWord | None:
     """
     if word == "-":
         return None
+    if line := _LINE.fullmatch(word):
+        baud = _bit_s(line["baud"]) if line["baud"] else None
+        return LineWord(line["port"], baud, line["protocol"], bool(line["host"]))
     if Path(word).is_file():
         return _file(word, "")
     name, _, filters = word.partition(",")

@@ -57,7 +57,7 @@ def command(
     frames = log or open_source(source, bus)
     traffic = Traffic()
 
-    def take(heards: list[Heard]) -> None:
+    def take(heards: Sequence[Heard]) -> None:
         for heard in heards:
             traffic.take(heard)
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.heard import Heard
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.heard_line import HeardLine
 
 
 class Stopwatch:
@@ -20,7 +24,7 @@ class Stopwatch:
     def __init__(self) -> None:
         self.latest_us, self._since_us = 0, _now_us()
 
-    def take(self, heards: Sequence[Heard]) -> None:
+    def take(self, heards: Sequence[Heard | HeardLine]) -> None:
         """Go on from the last of these frames."""
         if heards:
             self.latest_us, self._since_us = heards[-1].at_us, _now_us()

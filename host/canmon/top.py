@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -27,17 +27,19 @@ from tickrig.host.canmon.listening import (
 )
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.screen import Screen
-from tickrig.host.canmon.source import Source, explain_sources, open_source
+from tickrig.host.canmon.source import AnySource, explain_sources, open_any
 from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.top_model import TopModel
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.heard_line import Listened
 
 PAINT_US: Final = 100_000
 
-Take = Callable[[list[Heard]], None]
+Take = Callable[["Sequence[Listened]"], None]
 
 
 @click.command(cls=BusCommand)
@@ -83,7 +85,7 @@ def command(  # noqa: PLR0913 - options
     take = model.take if plain else _meant(model, Meaning(make_decoder(eds, dbc), chosen))
     log = whole_log(source) if plain else None
     model.press("d" if decode else "")
-    frames = log or open_source(source, bus)
+    frames = log or open_any(source, bus)
     on_screen = frames.live and sys.stdout.isatty()
     try:
         with until_interrupted():
@@ -102,7 +104,7 @@ def _meant(model: TopModel, meaning: Meaning) -> Take:
     return lambda heards: model.take_meant(meaning.take(heards))
 
 
-def _paint(source: Source, model: TopModel, take: Take, span_us: int | None) -> None:
+def _paint(source: AnySource[Listened], model: TopModel, take: Take, span_us: int | None) -> None:
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
         while not (source.ended or model.quit or is_over(begin_s, span_us)):

@@ -49,11 +49,12 @@ class DumpLines:
         ident = _ident(heard.frame)
         self._width = max(self._width, len(ident))
         direction = f"  {'TX' if heard.sent else 'RX'} - -" if self._extra else ""
-        stamp = self._stamped(heard.at_us)
+        stamp = self.stamp(heard.at_us)
         data = f"{_data(heard.frame):<{DATA_WIDTH}}   {text}" if text else _data(heard.frame)
         return f"{stamp}  {heard.channel}{direction}  {ident:>{self._width}}   {data}"
 
-    def _stamped(self, at_us: int) -> str:
+    def stamp(self, at_us: int) -> str:
+        """Return what stands before what was heard at this time."""
         if self._stamp is Stamp.NONE:
             return ""
         if self._first_us is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.ident import ident_of
+from tickrig.host.monitor.line_traffic import LineRow, LineTraffic, line_table
 from tickrig.host.monitor.payload_text import data_text
 from tickrig.host.monitor.tally import IdRow
 from tickrig.host.monitor.top_table import UNBOUNDED, Order, View, render
@@ -16,6 +17,7 @@ from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.heard_line import Listened
 
 PAGE: Final = 10
 """Rows that a key for a page goes."""
@@ -36,9 +38,9 @@ class TopModel:
     """
 
     def __init__(self, bit_rate: int | None = None) -> None:
-        self.traffic, self.quit = Traffic(), False
+        self.traffic, self._serial, self.quit = Traffic(), LineTraffic(), False
         self.view = View(styled=True, bit_rate=bit_rate, keys=True)
-        self._held: Snapshot | None = None
+        self._held: tuple[Snapshot, tuple[LineRow, ...]] | None = None
         self._now_us = 0
         self._meanings: dict[tuple[str, int], Decoded] = {}
         self._acts: dict[str, Callable[[], None]] = {
@@ -48,22 +50,25 @@ class TopModel:
             "d": lambda: self._show(meaning=None if self.view.meaning else self._meaning),
             "n": self.traffic.notch,
             "s": lambda: self._show(order=_next(self.view.order)),
-            "c": self.traffic.clear,
+            "c": self._clear,
             "j": lambda: self._scroll(1),
             "k": lambda: self._scroll(-1),
             "f": lambda: self._scroll(PAGE),
             "p": lambda: self._scroll(-PAGE),
         }
 
-    def take(self, heards: Iterable[Heard]) -> None:
-        """Count frames, whatever is shown."""
+    def take(self, heards: Iterable[Listened]) -> None:
+        """Count frames, and lines of serial ports, whatever is shown."""
         for heard in heards:
-            self.traffic.take(heard)
+            if isinstance(heard, Heard):
+                self.traffic.take(heard)
+            else:
+                self._serial.take(heard)
 
-    def take_meant(self, meant: Iterable[tuple[Heard, Decoded | None]]) -> None:
+    def take_meant(self, meant: Iterable[tuple[Listened, Decoded | None]]) -> None:
         """Count frames, and keep what the latest of each identifier means."""
         for heard, decoded in meant:
-            self.traffic.take(heard)
+            self.take((heard,))
             if decoded is not None and isinstance(heard.frame, CanFrame):
                 self._meanings[heard.channel, ident_of(heard.frame)] = decoded
 
@@ -75,13 +80,18 @@ class TopModel:
     def lines(self, now_us: int, lost: int, width: int, height: int) -> list[str]:
         """Return what a screen shows at a time."""
         self._now_us = now_us
-        snapshot = self._held or self.traffic.snapshot(now_us)
-        return render(snapshot, self.view, lost, width, height)
+        snapshot, rows = self._held or self._snapshot()
+        below = line_table(rows, snapshot.at_us, width)[: height // 2]
+        return render(snapshot, self.view, lost, width, height - len(below)) + below
 
     def final(self, lost: int, snapshot: Snapshot | None = None) -> list[str]:
         """Return the whole table of all that came, or of a snapshot, as plain text."""
         view = replace(self.view, held=False, top=0, styled=False, keys=False)
-        return render(snapshot or self.traffic.snapshot(), view, lost, UNBOUNDED, UNBOUNDED)
+        rows = self._serial.rows()
+        snapshot = snapshot or self.traffic.snapshot()
+        now_us = max([snapshot.at_us, *(row.last_us for row in rows)])
+        below = line_table(rows, now_us, UNBOUNDED)
+        return render(snapshot, view, lost, UNBOUNDED, UNBOUNDED) + below
 
     def _meaning(self, row: IdRow) -> str:
         decoded = self._meanings.get((row.channel, row.ident))
@@ -90,8 +100,15 @@ class TopModel:
     def _quit(self) -> None:
         self.quit = True
 
+    def _snapshot(self) -> tuple[Snapshot, tuple[LineRow, ...]]:
+        return self.traffic.snapshot(self._now_us), self._serial.rows()
+
+    def _clear(self) -> None:
+        self.traffic.clear()
+        self._serial.clear()
+
     def _hold(self) -> None:
-        self._held = None if self._held else self.traffic.snapshot(self._now_us)
+        self._held = None if self._held else self._snapshot()
         self._show(held=self._held is not None)
 
     def _scroll(self, rows: int) -> None:

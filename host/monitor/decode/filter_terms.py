@@ -10,13 +10,12 @@ from typing import Final
 from tickrig.host.monitor.candump_filter import CandumpFilter, flagged_id
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.drive_state import BITS
-from tickrig.host.monitor.decode.heard_line import HeardLine
+from tickrig.host.monitor.decode.heard_line import Listened
 from tickrig.host.monitor.decode.transfer import Outcome
 from tickrig.host.monitor.heard import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
-Listened = Heard | HeardLine
 Test = Callable[[Listened, Decoded], bool]
 Compare = Callable[[float, float], bool]
 

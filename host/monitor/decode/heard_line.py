@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.heard import Heard
 
 
 class HeardLine(NamedTuple):
@@ -28,3 +29,7 @@ class HeardLine(NamedTuple):
     def frame(self) -> None:
         """No frame of a CAN bus."""
         return None
+
+
+Listened = Heard | HeardLine
+"""What a trace of buses and serial lines is made of."""

@@ -2,7 +2,8 @@
 
 A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir`
 and `data` (hex); a remote frame has `rtr`, its length, and an error frame has
-`err`: 1 and its class as `id`. `{"v":1,"ev":"drop","n":12}` says what was lost.
+`err`: 1 and its class as `id`. `{"v":1,"ev":"drop","n":12}` says what was lost; a line
+of a serial port is an event, too.
 """
 
 from __future__ import annotations
@@ -16,6 +17,10 @@ from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import WireError
 
 VERSION: Final = 1
+LINE_EVENT: Final = "line"
+"""A line of a serial port, which no log of CAN holds."""
+
+SERIAL_LINES: Final = "lines of a serial port"
 
 
 def json_line(heard: Heard, more: str = "") -> str:
@@ -62,6 +67,8 @@ def _event(said: dict[str, Any], tally: Tally) -> str:
     """Take an event; one that is not known says nothing to us."""
     if said["ev"] == "drop":
         tally.lost += max(0, int(said["n"]))
+    elif said["ev"] == LINE_EVENT:
+        tally.passed_over[SERIAL_LINES] += 1
     return str(said["ev"])
 
 
