@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from copy import copy
 from typing import Any, ClassVar, Final
 
+from tickrig.device.declared import declared
 from tickrig.device.physical import Input, InputBank
 from tickrig.device.rtc_lite.ports import InPort, OutPort, Port
 from tickrig.wire.errors import FieldError
@@ -63,9 +64,9 @@ class Component:
             encode_name(self.type_name)
         except FieldError as error:
             raise ValueError(f"{kind}: type_name: {error}") from None
-        declared = {name: copy(port) for name, port in _declared(type(self))}
-        _check_ports(kind, declared.values())
-        for name, port in declared.items():
+        own = {name: copy(port) for name, port in declared(type(self), Port)}
+        _check_ports(kind, own.values())
+        for name, port in own.items():
             setattr(self, name, port)
             ports: dict[bytes, Any] = self.in_ports if _is_in(port) else self.out_ports
             ports[port.name] = port
@@ -99,14 +100,6 @@ class Component:
 
     def on_reset(self) -> Result:
         """Leave Error; after an error it stays there."""
-
-
-def _declared(kind: type[Component]) -> Iterator[tuple[str, Port[Any]]]:
-    """Give the ports of a class and its bases, the bases first."""
-    for base in reversed(kind.__mro__):
-        for name, value in vars(base).items():
-            if isinstance(value, Port):
-                yield name, value
 
 
 def _check_ports(kind: str, ports: Iterable[Port[Any]]) -> None:

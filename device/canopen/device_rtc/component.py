@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from copy import copy
 from enum import IntEnum
 from typing import Any, ClassVar, Final
 
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort, Port
+from tickrig.device.canopen.device_rtc.ports import Port
+from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
@@ -52,6 +52,7 @@ class Component:
     Raises:
         ValueError: a profile or ports that cannot be.
 
+    >>> from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
     >>> from tickrig.wire.rtc_canopen.port_types import LONG
     >>> class Doubler(Component):
     ...     type_name = "Doubler"
@@ -76,7 +77,7 @@ class Component:
     def __init__(self) -> None:
         self.inputs = QuantityBank(self.physical)
         self.ports: dict[str, Port[Any]] = {}
-        for name, port in _declared(type(self)):
+        for name, port in declared(type(self), Port):
             mine = self.ports[port.name] = copy(port)
             setattr(self, name, mine)
 
@@ -91,7 +92,7 @@ class Component:
                 category=cls.category,
                 rate_hz=cls.rate_hz,
                 product_code=cls.product_code,
-                ports=tuple(port.profile for _, port in _declared(cls)),
+                ports=tuple(port.profile for _, port in declared(cls, Port)),
             )
         except ValueError as error:
             raise ValueError(f"{cls.__name__}: {error}") from None
@@ -122,11 +123,3 @@ class Component:
 
     def on_reset(self) -> Result:
         """Leave Error; after an error it stays there."""
-
-
-def _declared(kind: type[Component]) -> Iterator[tuple[str, Port[Any]]]:
-    """Give the ports of a class and its bases, the bases first."""
-    for base in reversed(kind.__mro__):
-        for name, value in vars(base).items():
-            if isinstance(value, InPort | OutPort):
-                yield name, value
