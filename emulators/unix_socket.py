@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import socket
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
-
 
 MAX_PATH_BYTES: Final = 107
 """What the kernel takes, beside the zero at the end (unix(7), sun_path)."""
@@ -23,13 +25,11 @@ def listen_at(path: Path) -> socket.socket:
         FileExistsError: a live process listens there, or it is not a socket.
         OSError: no socket can be made there.
     """
-    if _is_socket(path):
-        if _is_live(path):
-            raise FileExistsError(errno.EEXIST, "another process listens there", str(path))
-        path.unlink()
     listener = socket.socket(socket.AF_UNIX)
     try:
-        _publish(listener, path)
+        with _alone_in(path.parent):
+            _check(path)
+            _publish(listener, path)
     except OSError as error:
         listener.close()
         raise OSError(
@@ -39,8 +39,30 @@ def listen_at(path: Path) -> socket.socket:
     return listener
 
 
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Let two that begin at once do so one after the other."""
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(held)
+
+
+def _check(path: Path) -> None:
+    """Raise FileExistsError unless nothing is there, or the socket of a killed process."""
+    if _is_socket(path) and _is_live(path):
+        raise FileExistsError(errno.EEXIST, "another process listens there")
+    if path.is_symlink() or (path.exists() and not _is_socket(path)):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+
+
 def _publish(listener: socket.socket, path: Path) -> None:
-    """Listen first, then be found: who sees the path can connect."""
+    """Listen first, then be found: who sees the path can connect.
+
+    By a new name, not by a link: on the file system of User-Mode Linux that is another socket.
+    """
     if len(os.fsencode(path)) > MAX_PATH_BYTES:
         raise OSError(errno.ENAMETOOLONG, "AF_UNIX path too long", str(path))
     hidden = path.with_name(f".{os.getpid()}")
@@ -48,7 +70,7 @@ def _publish(listener: socket.socket, path: Path) -> None:
     try:
         listener.bind(str(hidden))
         listener.listen()
-        os.link(hidden, path)
+        hidden.replace(path)
     finally:
         os.umask(mask)
         hidden.unlink(missing_ok=True)
