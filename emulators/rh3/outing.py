@@ -91,13 +91,28 @@ class Watcher:
     """Draws samples if they are to be drawn, and raises `Ended` when a signal has come."""
 
     def __init__(self, outing: Outing, points: Sequence[Pose]) -> None:
-        self._ended = False
+        self._ended = self._asking = False
         width = min(WIDTH, get_terminal_size().columns - 1)
         self._map = LiveMap(TrackMap(points, width), sys.stdout) if outing.show_map else None
 
     def end(self) -> None:
-        """Let the next sample be the last."""
+        """Let the next sample be the last; a question is left at once."""
         self._ended = True
+        if self._asking:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Ask somebody something: no samples come; `Ended` if that was the answer."""
+        self._asking = True
+        try:
+            yield
+        except click.Abort:
+            raise Ended from None
+        finally:
+            self._asking = False
+        if self._ended:  # click.pause passes Ctrl-C over
+            raise Ended
 
     def watch(self, sample: Sample) -> None:
         """Take a sample."""

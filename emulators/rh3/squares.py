@@ -66,17 +66,19 @@ class Squares:
     def _begin(self, wheels: Wheels | None) -> Ride:
         self.stop()
         if self._outing.device is not None:
-            click.pause("Put the cart at its start, and press a key.")
+            with self._watcher.asking():
+                click.pause("Put the cart at its start, and press a key.")
         self.latest = self._outing.begin(wheels)
         return self.latest
 
     def _true_pose(self, ride: Ride) -> Pose:
         if self._outing.device is None:
             return ride.pose
-        x_mm, y_mm = (
-            click.prompt(f"Measured {axis} of the cart from its start, mm", type=float)
-            for axis in ("x", "y")
-        )
+        with self._watcher.asking():
+            x_mm, y_mm = (
+                click.prompt(f"Measured {axis} of the cart from its start, mm", type=float)
+                for axis in ("x", "y")
+            )
         return Pose(x_mm / 1e3, y_mm / 1e3)
 
 

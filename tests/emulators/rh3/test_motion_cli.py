@@ -247,3 +247,15 @@ def test_ctrl_c_stops_the_base(emulated: str) -> None:
     rh3.expect(pexpect.EOF)
     rh3.close()
     assert rh3.exitstatus == 130
+
+
+@pytest.mark.realtime
+def test_ctrl_c_leaves_a_question() -> None:
+    words = ["-c", PROGRAM.format("motion_cli"), "square", "--device", "/dev/nothing"]
+    rh3 = pexpect.spawn(sys.executable, words, env=environment(), timeout=30, encoding="utf-8")
+    rh3.expect("press a key")
+    rh3.kill(signal.SIGINT)
+    rh3.expect("stopped")
+    rh3.expect(pexpect.EOF)
+    rh3.close()
+    assert rh3.exitstatus == 130
