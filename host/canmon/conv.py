@@ -52,10 +52,10 @@ def command(  # noqa: PLR0913 - options
     """  # noqa: D301 - click wants the backspace
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
-    frames = open_source(source)
+    meaning, frames = Meaning(decoder, chosen), open_source(source)
     with closing(frames), closing(LogFile(log, source)) as out, until_interrupted():
-        pass_on(frames, Meaning(decoder, chosen), out.take)
-    report(frames, strict)
+        pass_on(frames, meaning, out.take)
+    report(frames, strict, meaning.words())
 
 
 explain_sources(command)

@@ -111,13 +111,14 @@ def command(  # noqa: PLR0913 - options
     chosen, form = read_filter(wanted), Output(output or "")
     plain = raw or form is Output.LOG or file is not None
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
+    meaning = Meaning(decoder, chosen)
     shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
     with ExitStack() as held:
         frames = held.enter_context(closing(open_any(source, BusOptions(**options))))
         log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         with until_interrupted(), until_unread():
-            pass_on(frames, Meaning(decoder, chosen), (log or shown).take, count, quiet_ms)
-    report(frames, strict)
+            pass_on(frames, meaning, (log or shown).take, count, quiet_ms)
+    report(frames, strict, meaning.words())
 
 
 def _is_line(word: str) -> bool:

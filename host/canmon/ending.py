@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final, NoReturn
@@ -22,15 +22,15 @@ class FramesLost(click.ClickException):
     exit_code = 4
 
 
-def report(source: AnySource[object], strict: bool) -> None:
-    """Say what was lost or no frame, then close the source.
+def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) -> None:
+    """Say what was lost or no frame, and what else there is to say, then close the source.
 
     Raises:
         SourceFailed: it ended before its time.
         FramesLost: frames were lost, and the caller is strict.
     """
     source.close()
-    for word in source.words():
+    for word in (*source.words(), *more):
         click.echo(word, err=True)
     if source.failed:
         raise SourceFailed(source.failed)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoder import Decoder
     from tickrig.host.monitor.decode.filter import Filter
     from tickrig.host.monitor.decode.heard_line import Listened
+    from tickrig.host.monitor.decode.missing_signals import MissingSignals
 
 Meant = tuple["Listened", "Decoded | None"]
 """A frame or a line of a serial port, and what it means where somebody asked."""
@@ -27,14 +28,27 @@ class Meaning:
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
+        self._missing: MissingSignals | None = None
+        if wanted is not None and wanted.signals:
+            from tickrig.host.monitor.decode.missing_signals import (  # noqa: PLC0415 - slow
+                MissingSignals,
+            )
+
+            self._missing = MissingSignals(wanted.signals)
 
     def take(self, heards: Sequence[Listened]) -> Iterator[Meant]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
-        decoder, wanted = self._decoder, self._wanted
+        decoder, wanted, missing = self._decoder, self._wanted, self._missing
         for heard in heards:
             if decoder is None:
                 decoded = None
             else:
                 decoded = decoder.take(heard) if isinstance(heard, Heard) else heard.decoded
+            if missing and decoded is not None:
+                missing.take(decoded)
             if wanted is None or (decoded is not None and wanted.matches(heard, decoded)):
                 yield heard, decoded
+
+    def words(self) -> list[str]:
+        """Say which signals the filter asks for that never came, one line each."""
+        return [] if self._missing is None else self._missing.words()

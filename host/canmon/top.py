@@ -82,7 +82,8 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**options)
     chosen, model = read_filter(wanted), TopModel(bit_rate_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
-    take = model.take if plain else _meant(model, Meaning(make_decoder(eds, dbc), chosen))
+    meaning = Meaning(None if plain else make_decoder(eds, dbc), chosen)
+    take = model.take if plain else _meant(model, meaning)
     log = whole_log(source) if plain else None
     model.press("d" if decode else "")
     frames = log or open_any(source, bus)
@@ -97,7 +98,7 @@ def command(  # noqa: PLR0913 - options
             click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
-    report(frames, strict)
+    report(frames, strict, meaning.words())
 
 
 def _meant(model: TopModel, meaning: Meaning) -> Take:

@@ -132,11 +132,7 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
         sign: one of `COMPARISONS`.
         text: what it is compared with.
     """
-    match = _NODE.fullmatch(path)
-    node, name = (int(match[1]), match[2]) if match else (None, path)
-    base, _, bit = name.rpartition(".")
-    shift = BITS.get(base, {}).get(bit)
-    whole = name if shift is None else base
+    node, whole, shift = signal_place(path)
     compare = _comparison(sign, text)
 
     def test(heard: Listened, decoded: Decoded) -> bool:
@@ -148,6 +144,19 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
         return False
 
     return test
+
+
+def signal_place(path: str) -> tuple[int | None, str, int | None]:
+    """Return node, name, and bit of a signal that a filter asks for; None where it names none.
+
+    >>> signal_place("3.statusword.fault"), signal_place("position")
+    ((3, 'statusword', 3), (None, 'position', None))
+    """
+    match = _NODE.fullmatch(path)
+    node, name = (int(match[1]), match[2]) if match else (None, path)
+    base, _, bit = name.rpartition(".")
+    shift = BITS.get(base, {}).get(bit)
+    return node, name if shift is None else base, shift
 
 
 def number(text: str) -> float | None:

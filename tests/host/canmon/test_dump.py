@@ -9,6 +9,7 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 from tickrig.host.monitor.logs.log_reader import read_log
 
@@ -211,3 +212,17 @@ def test_a_full_disk_ends_it_with_status_3(log: str, tmp_path: Path, name: str) 
     result = canmon("dump", log, "-l", str(full))
     assert result.exit_code == 3
     assert result.stderr.endswith(f"Error: {full}: No space left on device\n")
+
+
+DRIVE = str(GOLDEN / "drive.log")
+
+
+@pytest.mark.parametrize("verb", [["dump"], ["top"], ["conv", "out.log"]])
+def test_a_filter_says_which_of_its_signals_never_came(tmp_path: Path, verb: list[str]) -> None:
+    out = [str(tmp_path / name) for name in verb[1:]]
+    wanted = "emyc or 5.statusword.fault or 9.statusword > 1"
+    assert canmon(verb[0], DRIVE, *out, "-F", wanted).stderr.splitlines() == [
+        "the filter asks for '9.statusword': no such signal came",
+        "the filter asks for 'emyc': no such signal came",
+    ]
+    assert canmon(verb[0], DRIVE, *out, "-F", "node=5 and pdo").stderr == ""
