@@ -1,0 +1,124 @@
+"""What the tabs of `canmon tui` cost, what their pictures cost, and how late rows are sent."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.table import RUNS, percentiles, row
+from tickrig.host.canmon.tui.model import Model
+from tickrig.host.canmon.tui.opening import open_session
+from tickrig.host.canmon.tui.panel import Panel
+from tickrig.host.canmon.tui.panels import PANELS
+from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.transmit_task import TransmitTask
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
+from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
+from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, Sight
+from tickrig.host.monitor.graph.signal_word import parse_signal
+from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.transmit.transmit_words import parse_words
+from tickrig.wire.can import CanFrame
+
+EPOS = read_eds(Path(__file__).parents[2] / "examples/eds/epos.eds", 5)
+FRAMES, BATCH = 40_000, 400
+PERIOD_US = 10_000
+SETTINGS = {
+    "graph": {"signals": ["5.position", "5.velocity@2", "185[0]"]},
+    "alarms": {
+        "rules": {"no_emcy": True, "nodes": [5], "max_load": 60, "heartbeat": {"5": "100ms±20%"}}
+    },
+}
+
+
+class Frames:
+    """PDOs of a drive, in batches."""
+
+    live, ended, lost, failed = True, False, 0, ""
+
+    def __init__(self) -> None:
+        self._batches = [_batch(at * BATCH) for at in range(FRAMES // BATCH)][::-1]
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Return the next batch."""
+        return self._batches.pop()
+
+    def words(self) -> list[str]:
+        """Say nothing."""
+        return []
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+
+def run(seconds: float) -> None:
+    """Print the rows of this suite."""
+    _sessions("no tab", (), {})
+    _sessions("all tabs", PANELS, {})
+    _sessions("all tabs, three curves, four rules", PANELS, SETTINGS)
+    _pictures()
+    _lateness(seconds)
+
+
+def _sessions(what: str, panels: tuple[type[Panel], ...], settings: dict[str, object]) -> None:
+    values = []
+    for _ in range(RUNS):
+        session = Session(Frames(), Model({5: EPOS}, bit_rate=1_000_000))
+        for panel in [panel(session) for panel in panels]:
+            panel.load(settings.get(panel.section, {}))
+        spent_s = _spent_s(lambda session=session: [session.step() for _ in range(FRAMES // BATCH)])
+        values.append(FRAMES / spent_s)
+    row(f"a session, {what}", values, "frames/s of processor")
+
+
+def _pictures() -> None:
+    objects = NodeDictionary(Decoder({5: EPOS}).memory("can0", 5))
+    count = len(objects.rows())
+    paint = [_spent_s(lambda: render_dictionary(objects.rows(), 0)) * 1e3 for _ in range(RUNS)]
+    row(f"objects: {count} rows", paint, "ms of processor")
+    graph = LiveGraph(Sight.ALL)
+    for word in ("185[0]", "185[2:6]s@2"):
+        graph.add(parse_signal(word), ((heard, None) for heard in _batch(0, MOST)))
+    paint = [_spent_s(lambda: graph.render(110, 24)) * 1e3 for _ in range(RUNS)]
+    row(f"graph: 2 curves of {MOST:,} samples", paint, "ms of processor")
+
+
+def _lateness(seconds: float) -> None:
+    session = open_session(["virtual:tabs"], BusOptions(), Model())
+    sent_us: list[int] = []
+    name, put = next(iter(session.buses.items()))
+
+    def recording(frame: CanFrame) -> None:
+        sent_us.append(session.now_us)
+        put(frame)
+
+    session.buses[name] = recording
+    task = TransmitTask({})
+    task.add(parse_words("080# --every 10ms"))
+    session.tasks.append(task)
+    session.arm()
+    start_us = session.now_us + 100_000
+    task.enable(0, start_us, armed=True)
+    session.start()
+    time.sleep(seconds)
+    session.close()
+    session.source.close()
+    late = [float((at_us - start_us) % PERIOD_US) for at_us in sent_us]
+    percentiles(f"a row each 10 ms for {seconds:g} s: late", late, "us")
+
+
+def _batch(first: int, count: int = BATCH) -> list[Heard]:
+    return [
+        Heard(at * 200, "can0", CanFrame(0x185 if at % 2 else 0x205, at.to_bytes(6, "little")))
+        for at in range(first, first + count)
+    ]
+
+
+def _spent_s(work: Callable[[], object]) -> float:
+    start = time.process_time()
+    work()
+    return time.process_time() - start
