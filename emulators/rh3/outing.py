@@ -107,7 +107,7 @@ class Watcher:
         self._asking = True
         try:
             yield
-        except click.Abort:
+        except (click.Abort, KeyboardInterrupt):
             raise Ended from None
         finally:
             self._asking = False
