@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tickrig.host.rtc_canopen.device_file import TPDOS
-from tickrig.host.rtc_canopen.port_types import PORT_TYPES, PortType, Value
+from tickrig.host.rtc_canopen.port_types import PORT_TYPES, PortType
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.pdo import MappedObject
 
 PAIR = 0x400

@@ -7,7 +7,7 @@ from typing import Any
 
 from tickrig.host.rtc.data_port import InPort, OutPort
 from tickrig.host.rtc_canopen.pdo_layout import PdoField, PdoLayout
-from tickrig.host.rtc_canopen.port_types import Value
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.idl import Struct
 

@@ -73,11 +73,10 @@ class DataType(IntEnum):
 
     def decode(self, data: bytes) -> Value:
         """Return the value of bytes; FieldError if their number is wrong."""
-        if self.size and len(data) != self.size:
-            raise FieldError(f"{len(data)} bytes for {self.name}, which has {self.size}")
-        if self.is_integer:
-            return int.from_bytes(data, "little", signed=self.signed)
-        return _DECODE.get(self, bytes)(data)
+        size, decode = _DECODERS[self]
+        if size and len(data) != size:
+            raise FieldError(f"{len(data)} bytes for {self.name}, which has {size}")
+        return decode(data)
 
 
 _SIGNED: Final = {
@@ -125,12 +124,20 @@ def _float_decoder(layout: str) -> Callable[[bytes], float]:
     return decode
 
 
+def _integer_decoder(signed: bool) -> Callable[[bytes], int]:
+    return lambda data: int.from_bytes(data, "little", signed=signed)
+
+
 _DECODE: Final[dict[DataType, Callable[[bytes], Value]]] = {
+    **{kind: _integer_decoder(kind.signed) for kind in (*_SIGNED, *_UNSIGNED)},
     **{kind: _float_decoder(layout) for kind, layout in _FLOATS.items()},
     DataType.VISIBLE_STRING: lambda data: data.decode("latin-1"),
     DataType.VISIBLE_CHAR: lambda data: data.decode("latin-1"),
     DataType.UNICODE_STRING: lambda data: data.decode("utf-16-le", "replace"),
 }
+
+_DECODERS: Final = {kind: (kind.size, _DECODE.get(kind, bytes)) for kind in DataType}
+"""Size in bytes and what reads them, by data type: one look-up each time."""
 
 
 def _encode(kind: DataType, value: Value) -> bytes:
