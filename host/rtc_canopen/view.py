@@ -103,6 +103,17 @@ class ComponentView:
     ports: tuple[PortView, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class SystemView:
+    """All that there is, at one time; see the properties of `ServerView`."""
+
+    nodes: tuple[NodeView, ...]
+    components: tuple[ComponentView, ...]
+    links: tuple[PdoLink, ...]
+    connections: tuple[RtConnection, ...]
+    waiting: tuple[RtConnection, ...]
+
+
 class Transfer:
     """An SDO transfer that somebody waits for.
 
@@ -144,6 +155,11 @@ class ServerView:
     def nodes(self) -> tuple[NodeView, ...]:
         """All nodes, in the order of the definition."""
         return tuple(self._view(node) for node in self._server.nodes.values())
+
+    @property
+    def system(self) -> SystemView:
+        """All that there is."""
+        return SystemView(self.nodes, self.components, self.links, self.connections, self.waiting)
 
     @property
     def components(self) -> tuple[ComponentView, ...]:

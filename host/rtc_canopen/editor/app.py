@@ -146,12 +146,14 @@ class SystemEditor(App[None]):
             return
         with self.session.lock:
             view = self.session.view
-            self.system.look(view)
+            system, events = view.system, view.events[-EVENTS_SHOWN:]
+        self.system.look(system)
+        with self.session.lock:
             self.objects.look(view, self.system.node_id, self.session.eds_paths)
-            marked = self.system.marked.key if self.system.marked else ""
-            status = status_line(view.nodes, self.session.path.name, self._bus, marked)
-            events = view.events[-EVENTS_SHOWN:]
-        self.status.show([status])
+        self.objects.paint_objects()
+        marked = self.system.marked.key if self.system.marked else ""
+        file = self.session.path.name
+        self.status.show([status_line(system.nodes, file, self._bus, marked)])
         follows = self.events.at_end
         self.events.show([event_line(event) for event in events])
         if follows:

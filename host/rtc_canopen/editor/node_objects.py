@@ -53,6 +53,7 @@ class NodeObjects:
         self._problems: dict[Entry, str] = {}
         self._reads, self._ages = 0, dict[Entry, int]()
         self._wanted: list[Entry] = []
+        self._rows: dict[Entry, tuple[object, ObjectRow]] = {}
         self._reading: dict[Entry, Transfer] = {}
         self._writing: list[tuple[Entry, Transfer]] = []
 
@@ -60,7 +61,7 @@ class NodeObjects:
     def rows(self) -> list[ObjectRow]:
         """Its objects, by index."""
         texts = sorted(self._eds.texts.items())
-        return [self._row(entry, text) for entry, text in texts if entry[0] >= FIRST_INDEX]
+        return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= FIRST_INDEX]
 
     def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
         """Take what has come, and ask for what is missing.
@@ -142,6 +143,14 @@ class NodeObjects:
                 self._problems[entry] = transfer.problem
             else:
                 self.read(entry)
+
+    def _kept_row(self, entry: Entry, text: ObjectText) -> ObjectRow:
+        """Return the row of an object, written anew if something changed."""
+        known = self._values.get(entry), self._problems.get(entry), entry in self._changed
+        kept = self._rows.get(entry)
+        if kept is None or kept[0] != known:
+            kept = self._rows[entry] = known, self._row(entry, text)
+        return kept[1]
 
     def _row(self, entry: Entry, text: ObjectText) -> ObjectRow:
         data, problem = self._values.get(entry), self._problems.get(entry)

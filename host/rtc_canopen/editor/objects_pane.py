@@ -29,10 +29,9 @@ class ObjectsPane(CursorView[Entry]):
         self._of: dict[int, NodeObjects] = {}
 
     def look(self, view: ServerView, node_id: int, eds: Mapping[int, Path]) -> None:
-        """Show the objects of a node, and read those in view; node 0 is none."""
+        """Turn to the objects of a node, and read those in view; node 0 is none."""
         if not node_id:
             self.objects, self.border_title = None, "objects"
-            self.offer([])
             return
         if node_id not in self._of:
             self._of[node_id] = NodeObjects(node_id, read_eds(eds[node_id], node_id))
@@ -44,4 +43,7 @@ class ObjectsPane(CursorView[Entry]):
         objects.look(view, [row.item for row in self.in_view], answers=answers)
         live = ", live" if objects.live else ""
         self.border_title = f"objects of {node_id} {node.name}{live}"
-        self.offer(objects.rows)
+
+    def paint_objects(self) -> None:
+        """Show what is known of them."""
+        self.offer([] if self.objects is None else self.objects.rows)

@@ -9,7 +9,7 @@ from textual.binding import Binding, BindingType
 from tickrig.host.rtc_canopen.definition import PdoLink, RtConnection
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.system_rows import Item, SystemRow, system_rows
-from tickrig.host.rtc_canopen.view import ComponentView, NodeView, PdoView, PortView, ServerView
+from tickrig.host.rtc_canopen.view import ComponentView, NodeView, PdoView, PortView, SystemView
 
 Owner = NodeView | ComponentView
 
@@ -47,9 +47,9 @@ class SystemPane(CursorView[Item]):
         above = (row.item for row in reversed(self.rows_shown[: self.cursor + 1]))
         return next(item for item in above if isinstance(item, Owner))
 
-    def look(self, view: ServerView) -> None:
+    def look(self, system: SystemView) -> None:
         """Show how things are now."""
-        self.offer(system_rows(view, self.folded, self.marked.key if self.marked else ""))
+        self.offer(system_rows(system, self.folded, self.marked.key if self.marked else ""))
         match self.owner:
             case NodeView() as node:
                 self.node_id = node.node_id

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from functools import lru_cache
 from typing import Final
 
 from tickrig.host.canmon.tui.line_view import Line
@@ -15,7 +16,7 @@ from tickrig.host.rtc_canopen.view import (
     NodeView,
     PdoView,
     PortView,
-    ServerView,
+    SystemView,
 )
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
@@ -30,30 +31,35 @@ DIM: Final = "bright_black"
 ALARM: Final = "bold red"
 MARK: Final = "bold yellow"
 
+KEPT_ROWS: Final = 4_096
+"""More than 127 nodes have; a row that is the same is not written again."""
+
 FOLDED: Final = "▸ "
 OPEN: Final = "▾ "
 
 
-def system_rows(view: ServerView, folded: Collection[str], marked: str = "") -> list[SystemRow]:
+def system_rows(
+    system: SystemView, folded: Collection[str] = (), marked: str = ""
+) -> list[SystemRow]:
     """Return the rows.
 
     Args:
-        view: what there is.
+        system: what there is.
         folded: keys of nodes and components that are shown without what they have.
         marked: key of the port or PDO that is to be connected.
     """
-    links = {link.target: link.source for link in view.links}
+    sources = {link.target: link.source for link in system.links}
     rows: list[SystemRow] = []
-    for node in view.nodes:
+    for node in system.nodes:
         rows.append(_node(node, folded))
         if rows[-1].key not in folded:
-            rows += (_pdo(pdo, links, marked) for pdo in node.pdos)
+            rows += (_pdo(pdo, sources.get(pdo.name), marked) for pdo in node.pdos)
             rows += (_port(port, marked) for port in node.ports)
-    for component in view.components:
+    for component in system.components:
         rows.append(_component(component, folded))
         if rows[-1].key not in folded:
             rows += (_port(port, marked) for port in component.ports)
-    return [*rows, *_joints(view)]
+    return [*rows, *_joints(system)]
 
 
 def _node(node: NodeView, folded: Collection[str]) -> SystemRow:
@@ -97,14 +103,16 @@ def _state(state: str) -> tuple[str, str]:
     return f"{state.capitalize():<8}", STATES.get(state, DIM)
 
 
-def _pdo(pdo: PdoView, links: dict[PdoName, PdoName], marked: str) -> SystemRow:
-    key, source = f"pdo {pdo.name}", links.get(pdo.name)
+@lru_cache(KEPT_ROWS)
+def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> SystemRow:
+    key = f"pdo {pdo.name}"
     linked = f" ← {source}" if source else ""
     text = f"{pdo.cob_id:03X}h {pdo.bits:>2} bits  {pdo.index:04X}h ↔ {pdo.proxy_index:04X}h"
     line: Line = ((f"      {pdo.name!s:<12} ", _style(key, marked)), (text, DIM), (linked, "green"))
     return Row(key, line, pdo)
 
 
+@lru_cache(KEPT_ROWS)
 def _port(port: PortView, marked: str) -> SystemRow:
     key = f"port {port.name}"
     way = "out" if port.out else "in "
@@ -121,11 +129,11 @@ def _style(key: str, marked: str) -> str:
     return MARK if key == marked else ""
 
 
-def _joints(view: ServerView) -> Iterator[SystemRow]:
-    for link in view.links:
+def _joints(system: SystemView) -> Iterator[SystemRow]:
+    for link in system.links:
         text = f"{link.source} → {link.target}"
         yield Row(f"link {text}", (("  PDO link   ", DIM), (text, "green")), link)
-    for entry in view.connections:
+    for entry in system.connections:
         text = f"{entry.source} → {entry.target}"
-        waits = (("  waits for its ports", DIM),) if entry in view.waiting else ()
+        waits = (("  waits for its ports", DIM),) if entry in system.waiting else ()
         yield Row(f"connection {text}", (("  through PC ", DIM), (text, "green"), *waits), entry)
