@@ -8,14 +8,15 @@ from typing import Final
 from tickrig.device.body.pose import Pose
 from tickrig.device.core import NEVER
 from tickrig.device.urg.parameters import URG_04LX, UrgParameters
+from tickrig.device.urg.refusal import flaw, refusal
 from tickrig.device.urg.rotation import Rotation
 from tickrig.device.urg.settings import Settings
-from tickrig.device.urg.stream import Stream, flaw
+from tickrig.device.urg.stream import Stream
 from tickrig.device.urg.texts import CONDITION, version
 from tickrig.device.urg.view import View
 from tickrig.device.urg.world import World
 from tickrig.wire.scip import status
-from tickrig.wire.scip.command import LETTERS, MOST_STRING, SIZES, Command
+from tickrig.wire.scip.command import Command
 from tickrig.wire.scip.description import encode_lines
 from tickrig.wire.scip.encoding import encode_number, with_sum
 from tickrig.wire.scip.reply import Reply
@@ -87,7 +88,7 @@ class ScipServer:
         """Return what is answered to a line at once."""
         command = Command.parse(line)
         self.served += 1
-        code = self._refusal(command)
+        code = refusal(command, adjusting=self._adjusting)
         if code:
             return Reply(command.echo, code).encode()
         if command.symbol in ("GD", "GS"):
@@ -117,21 +118,6 @@ class ScipServer:
             if not (running.left or running.endless):
                 self.stop()
         return sent
-
-    def _refusal(self, command: Command) -> str:
-        """Return the status for what is no command, or not now."""
-        if command.symbol not in SIZES:
-            return status.UNKNOWN
-        if len(command.string) > MOST_STRING + 1:
-            return status.STRING_TOO_LONG
-        if not LETTERS.issuperset(command.string[1:]):
-            return status.STRING_LETTERS
-        wanted = sum(SIZES[command.symbol])
-        if len(command.parameters) != wanted:
-            return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
-        if self._adjusting and command.symbol not in ("TM", "RS"):
-            return status.NO_REPLY
-        return ""
 
     def _light(self, now_us: int) -> None:
         if not self.laser:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.device.urg.parameters import LAST_STEP
 from tickrig.device.urg.view import View
 from tickrig.wire.scip import status
 from tickrig.wire.scip.command import Command
@@ -13,17 +12,6 @@ from tickrig.wire.scip.scan import WIDTHS, encode_scan
 
 WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
 """The most that so many characters carry; what is farther reads so."""
-
-
-def flaw(command: Command) -> str:
-    """Return the status that refuses MD, MS, GD or GS, empty if nothing is wrong."""
-    for place, text in enumerate(command.fields):
-        if not text.isdecimal():
-            return f"{1 + place + (place > 2) * 2:02}"
-    first, last = (int(text) for text in command.fields[:2])
-    if max(first, last) > LAST_STEP:
-        return "04"
-    return "05" if last < first else ""
 
 
 @dataclass(slots=True)
@@ -51,7 +39,7 @@ class Stream:
         """Return a scan as it was asked for."""
         first, last, cluster = (int(text) for text in self.command.fields[:3])
         width = WIDTHS[self.command.symbol[1]]
-        numbers = (min(n, WIDEST[width]) for n in view.distances(first, last, cluster))
+        numbers = [min(n, WIDEST[width]) for n in view.distances(first, last, cluster)]
         return Reply(echo, code, encode_scan(view.time_ms, numbers, width)).encode()
 
     def take(self, ended_us: int, view: View) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import inf, tau
+from math import tau
 from typing import Final
 
 from tickrig.device.body.pose import Pose
@@ -53,31 +53,37 @@ class View:
 
         Where none has a distance, it is the code of the first.
         """
-        steps = [self._distance(step) for step in range(first, last + 1)]
-        width = max(1, cluster)
-        return tuple(self._least(steps[at : at + width]) for at in range(0, len(steps), width))
+        numbers = self._numbers(range(first, last + 1))
+        if cluster <= 1:
+            return tuple(numbers)
+        places = range(0, len(numbers), cluster)
+        return tuple(self._least(numbers[at : at + cluster]) for at in places)
 
     def _least(self, numbers: Sequence[int]) -> int:
         good = [number for number in numbers if number >= self.kind.nearest_mm]
         return min(good, default=numbers[0])
 
-    def _distance(self, step: int) -> int:
+    def _numbers(self, steps: Sequence[int]) -> list[int]:
         kind, pose = self.kind, self.pose
-        if not kind.first <= step <= kind.last:
-            return NoDistance.NOT_MEASURABLE
-        angle_rad = pose.heading_rad + (step - kind.front) * tau / kind.resolution
-        distance_m = self.world.distance_m(pose.x_m, pose.y_m, angle_rad)
-        if distance_m == inf:
-            return NoDistance.WEAK
-        distance_mm = round(distance_m * 1_000 + self._error_mm(step, distance_m))
-        if distance_mm > kind.farthest_mm:
-            return NoDistance.WEAK
-        return distance_mm if distance_mm >= kind.nearest_mm else NoDistance.OTHER
+        angles = [pose.heading_rad + (s - kind.front) * tau / kind.resolution for s in steps]
+        ways_m = self.world.distances_m(pose.x_m, pose.y_m, angles)
+        if self.parameters.noise:
+            pairs = zip(steps, ways_m, strict=True)
+            ways_m = [way_m + self._error_mm(step, way_m) / 1_000 for step, way_m in pairs]
+        near_m, far_m = kind.nearest_mm / 1_000, kind.farthest_mm / 1_000
+        return [
+            NoDistance.NOT_MEASURABLE
+            if not kind.first <= step <= kind.last
+            else NoDistance.WEAK
+            if way_m > far_m
+            else NoDistance.OTHER
+            if way_m < near_m
+            else round(way_m * 1_000)
+            for step, way_m in zip(steps, ways_m, strict=True)
+        ]
 
     def _error_mm(self, step: int, distance_m: float) -> float:
         """Return the noise of a step: uniform, and the same whoever asks."""
-        if not self.parameters.noise:
-            return 0.0
         most_mm = self.parameters.noise * max(10.0, distance_m * 10)
         chance = Chance(self.parameters.seed, f"{self.number} {step}")
         return most_mm * (chance.draw() / HALF - 1)

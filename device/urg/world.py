@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, inf, isfinite, sin, sqrt
+
+Rays = Sequence[tuple[float, float]]
+"""Directions, each a vector of length 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,16 +25,19 @@ class Wall:
         if not all(map(isfinite, ends)) or ends[:2] == ends[2:]:
             raise ValueError(f"a wall has two places that are not the same, got {ends}")
 
-    def distance_m(self, x_m: float, y_m: float, dx: float, dy: float) -> float:
-        """Return how far a ray goes until it meets the wall, infinity if it does not."""
+    def distances_m(self, x_m: float, y_m: float, rays: Rays) -> list[float]:
+        """Return how far each ray goes until it meets the wall, infinity if it does not."""
         wall_x, wall_y = self.x2_m - self.x1_m, self.y2_m - self.y1_m
-        cross = dx * wall_y - dy * wall_x
-        if not cross:
-            return inf
         off_x, off_y = self.x1_m - x_m, self.y1_m - y_m
-        share = (off_x * dy - off_y * dx) / cross
-        way = (off_x * wall_y - off_y * wall_x) / cross
-        return way if 0 <= share <= 1 and way >= 0 else inf
+        area = off_x * wall_y - off_y * wall_x
+        return [
+            area / cross
+            if (cross := dx * wall_y - dy * wall_x)
+            and area / cross >= 0
+            and 0 <= (off_x * dy - off_y * dx) / cross <= 1
+            else inf
+            for dx, dy in rays
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,18 +54,15 @@ class Post:
         if not all(map(isfinite, numbers)) or self.radius_m < 0:
             raise ValueError(f"a post has a place and a radius of 0 or more, got {numbers}")
 
-    def distance_m(self, x_m: float, y_m: float, dx: float, dy: float) -> float:
-        """Return how far a ray goes until it meets the post, infinity if it does not."""
-        off_x, off_y = self.x_m - x_m, self.y_m - y_m
-        along = off_x * dx + off_y * dy
-        beside = off_x * dy - off_y * dx
-        room = self.radius_m**2 - beside**2
-        if room <= 0:
-            return inf
-        half = sqrt(room)
-        if along - half >= 0:
-            return along - half
-        return along + half if along + half >= 0 else inf
+    def distances_m(self, x_m: float, y_m: float, rays: Rays) -> list[float]:
+        """Return how far each ray goes until it meets the post, infinity if it does not."""
+        off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
+        return [
+            _first_m(off_x * dx + off_y * dy, sqrt(inside))
+            if (inside := most - (off_x * dy - off_y * dx) ** 2) > 0
+            else inf
+            for dx, dy in rays
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +72,21 @@ class World:
     walls: tuple[Wall, ...] = ()
     posts: tuple[Post, ...] = ()
 
-    def distance_m(self, x_m: float, y_m: float, angle_rad: float) -> float:
-        """Return how far it is from a place to the first thing in a direction.
+    def distances_m(self, x_m: float, y_m: float, angles_rad: Iterable[float]) -> list[float]:
+        """Return how far it is from a place to the first thing in each direction.
 
-        >>> World((Wall(2.0, -1.0, 2.0, 1.0),)).distance_m(0.5, 0.0, 0.0)
-        1.5
+        >>> World((Wall(2.0, -1.0, 2.0, 1.0),)).distances_m(0.5, 0.0, [0.0])
+        [1.5]
         """
-        dx, dy = cos(angle_rad), sin(angle_rad)
+        rays = [(cos(angle_rad), sin(angle_rad)) for angle_rad in angles_rad]
         things: tuple[Wall | Post, ...] = (*self.walls, *self.posts)
-        return min((thing.distance_m(x_m, y_m, dx, dy) for thing in things), default=inf)
+        nothing = [inf] * len(rays)
+        ways = [thing.distances_m(x_m, y_m, rays) for thing in things]
+        return [min(column) for column in zip(nothing, *ways, strict=True)]
+
+    def distance_m(self, x_m: float, y_m: float, angle_rad: float) -> float:
+        """Return how far it is from a place to the first thing in one direction."""
+        return self.distances_m(x_m, y_m, [angle_rad])[0]
 
     def with_posts(self, *posts: Post) -> World:
         """Return a world with more posts."""
@@ -96,6 +106,13 @@ def room(width_m: float, depth_m: float) -> World:
     x_m, y_m = width_m / 2, depth_m / 2
     corners = ((-x_m, -y_m), (x_m, -y_m), (x_m, y_m), (-x_m, y_m))
     return World(tuple(Wall(*corners[at - 1], *corners[at]) for at in range(4)))
+
+
+def _first_m(along_m: float, half_m: float) -> float:
+    """Return where a ray enters a post; where it leaves it, if it begins within."""
+    if along_m >= half_m:
+        return along_m - half_m
+    return along_m + half_m if along_m >= -half_m else inf
 
 
 def _off_wall_m(wall: Wall, x_m: float, y_m: float) -> float:

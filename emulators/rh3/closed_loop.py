@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -69,7 +69,7 @@ class ClosedLoop:
         bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
         lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
         ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
-        self.eyes = tuple(MountedUrg(base, world) for base in bases) if world else ()
+        self.eyes = _eyes(bases, world) if world else ()
         stations = [Station(eye.urg, eye.line.a) for eye in self.eyes]
         self.rig = Rig(*map(Station, bases, ports), *stations, couplings=self.eyes, dense=dense)
         self.manager = Manager()
@@ -121,3 +121,10 @@ class ClosedLoop:
 
     def _opener(self, line: Rs485Line) -> Callable[[str], SimLink]:
         return lambda name: SimLink(self.rig, line.b)
+
+
+def _eyes(bases: Sequence[Rh3Base], world: World) -> tuple[MountedUrg, ...]:
+    """Return a range finder for each base; it sees the others too."""
+    return tuple(
+        MountedUrg(base, world, [other for other in bases if other is not base]) for base in bases
+    )

@@ -8,39 +8,59 @@ b'DMIN:20;4'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
-from tickrig.wire.errors import ChecksumError, FieldError
+from tickrig.wire.errors import ChecksumError, FieldError, FramingError
 
 BITS: Final = 6
 MASK: Final = 0x3F
 ZERO: Final = 0x30
+CHARACTERS: Final = bytes(range(ZERO, ZERO + MASK + 1))
 
 
-def encode_number(value: int, width: int) -> bytes:
-    """Return a number in `width` characters.
+def encode_numbers(values: Sequence[int], width: int) -> bytes:
+    """Return numbers in `width` characters each, one behind the other.
 
     Raises:
-        FieldError: it needs more.
+        FieldError: one needs more.
     """
-    if not 0 <= value < 1 << BITS * width:
-        raise FieldError(f"{value} does not fit into {width} characters of 6 bits")
-    shifts = range(BITS * (width - 1), -1, -BITS)
-    return bytes(ZERO + (value >> shift & MASK) for shift in shifts)
+    for value in (min(values, default=0), max(values, default=0)):
+        if not 0 <= value < 1 << BITS * width:
+            raise FieldError(f"{value} does not fit into {width} characters of 6 bits")
+    out = bytearray(len(values) * width)
+    for place in range(width):
+        shift = BITS * (width - 1 - place)
+        out[place::width] = bytes([ZERO + (value >> shift & MASK) for value in values])
+    return bytes(out)
 
 
-def parse_number(data: bytes) -> int:
-    """Return the number that characters make.
+def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
+    """Return the numbers that characters make, `width` each.
 
     Raises:
         FieldError: a character that carries none.
+        FramingError: half a number at the end.
     """
-    value = 0
-    for code in data:
-        if not ZERO <= code <= ZERO + MASK:
-            raise FieldError(f"character {code:#04x} is not in 0x30..0x6f")
-        value = value << BITS | code - ZERO
-    return value
+    if strange := data.translate(None, CHARACTERS):
+        raise FieldError(f"character {strange[0]:#04x} is not in 0x30..0x6f")
+    if len(data) % width:
+        raise FramingError(f"{len(data)} characters are no numbers of {width}")
+    values = [0] * (len(data) // width)
+    for place in range(width):
+        codes = data[place::width]
+        values = [value << BITS | code - ZERO for value, code in zip(values, codes, strict=True)]
+    return tuple(values)
+
+
+def encode_number(value: int, width: int) -> bytes:
+    """Return a number in `width` characters; FieldError if it needs more."""
+    return encode_numbers((value,), width)
+
+
+def parse_number(data: bytes) -> int:
+    """Return the number that all characters make; FieldError if one carries none."""
+    return parse_numbers(data, len(data))[0]
 
 
 def line_sum(data: bytes) -> bytes:

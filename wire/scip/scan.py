@@ -8,11 +8,18 @@ r"""The data of a scan: time stamp, and distances in blocks of 64 characters, ea
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from tickrig.wire.errors import FramingError
-from tickrig.wire.scip.encoding import encode_number, parse_number, with_sum, without_sum
+from tickrig.wire.scip.encoding import (
+    encode_number,
+    encode_numbers,
+    parse_number,
+    parse_numbers,
+    with_sum,
+    without_sum,
+)
 
 TIME_WIDTH: Final = 4
 BLOCK_BYTES: Final = 64
@@ -20,9 +27,9 @@ WIDTHS: Final = {"D": 3, "S": 2}
 """Characters of a distance, by the second letter of the command."""
 
 
-def encode_scan(time_ms: int, distances: Iterable[int], width: int) -> tuple[bytes, ...]:
+def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
     """Return the lines behind the status; FieldError for a number that does not fit."""
-    data = b"".join(encode_number(distance, width) for distance in distances)
+    data = encode_numbers(distances, width)
     blocks = [data[at : at + BLOCK_BYTES] for at in range(0, len(data), BLOCK_BYTES)]
     return tuple(with_sum(line) for line in (encode_number(time_ms, TIME_WIDTH), *blocks))
 
@@ -37,7 +44,6 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
     """
     stamp, *blocks = [without_sum(line) for line in lines] or [b""]
     data = b"".join(blocks)
-    if len(stamp) != TIME_WIDTH or len(data) % width:
-        raise FramingError(f"{len(stamp)} characters of time, {len(data)} of data")
-    places = range(0, len(data), width)
-    return parse_number(stamp), tuple(parse_number(data[at : at + width]) for at in places)
+    if len(stamp) != TIME_WIDTH:
+        raise FramingError(f"{len(stamp)} characters of time, not {TIME_WIDTH}")
+    return parse_number(stamp), parse_numbers(data, width)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, sin
 from typing import ClassVar
 
-from tickrig.host.motion.ports import newest, sound
+from tickrig.host.motion.ports import MOST, newest, sound
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
@@ -34,11 +34,8 @@ class UrgToObstacles(RtComponent):
         return ReturnCode.RTC_OK
 
     def _points(self, scan: RangeData) -> list[Pose2D]:
-        first, step = scan.config.minAngle, scan.config.angularRes
-        points = []
-        for place, distance in enumerate(scan.ranges):
-            angle = first + place * step
-            if sound(distance, angle) and distance > 0:
-                x, y = self.sensor_x.value + distance * cos(angle), distance * sin(angle)
-                points.append(Pose2D(Point2D(x, y)))
-        return points
+        first, step, ahead = scan.config.minAngle, scan.config.angularRes, self.sensor_x.value
+        if not sound(first, step):
+            return []
+        seen = [(first + n * step, d) for n, d in enumerate(scan.ranges) if 0 < d <= MOST]
+        return [Pose2D(Point2D(ahead + d * cos(angle), d * sin(angle))) for angle, d in seen]

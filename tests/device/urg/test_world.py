@@ -38,7 +38,7 @@ def test_a_post_behind_is_not_seen() -> None:
 
 @given(numbers, numbers, st.floats(0.01, 5), angles)
 def test_where_a_ray_ends_is_the_rim_of_a_post(x: float, y: float, r: float, angle: float) -> None:
-    way = Post(x, y, r).distance_m(0, 0, cos(angle), sin(angle))
+    way = World(posts=(Post(x, y, r),)).distance_m(0, 0, angle)
     if way < inf:
         assert hypot(way * cos(angle) - x, way * sin(angle) - y) == pytest.approx(r, abs=1e-5)
 

@@ -61,6 +61,18 @@ def test_a_leader_that_is_lost_stops_its_follower() -> None:
     assert 0.5 < stopped.x < 2.5
 
 
+def test_a_cart_waits_before_a_post_until_it_is_taken_away(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(EXAMPLES / "rh3_stop_and_go.py"), run_name="__main__")
+    assert capsys.readouterr().out.splitlines() == [
+        " 5 s: 1.00 m",
+        "10 s: 1.22 m",
+        "15 s: 2.52 m",
+        "20 s: 3.00 m",
+    ]
+
+
 def test_examples_have_40_lines_at_most() -> None:
     for path in EXAMPLES.glob("rh3_*.py"):
         assert len(path.read_text("utf-8").splitlines()) <= 40, path

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from tickrig.device.urg.world import Post, World, room
+from math import pi
+
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.urg.world import Post, World
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.convoy import place
 from tickrig.emulators.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.game_pad import GamePad
@@ -12,8 +16,8 @@ from tickrig.host.motion.options.pad import Hand
 from tickrig.host.motion.options.switch_input import SwitchInput
 
 SECOND_US = 1_000_000
-EMPTY = room(10, 10)
-BLOCKED = EMPTY.with_posts(Post(2.0, 0.1, 0.2))
+EMPTY = World()
+BLOCKED = EMPTY.with_posts(Post(1.2, 0.1, 0.2))
 
 
 class Seeing:
@@ -44,47 +48,63 @@ class Seeing:
 
 def test_it_stops_before_a_post_and_goes_on_when_that_has_gone() -> None:
     cart = Seeing(BLOCKED)
-    cart.goal(3.0)
-    waiting = cart.run(10)
-    assert waiting == cart.run(3)
+    cart.goal(1.6)
+    waiting = cart.run(5)
+    assert waiting == cart.run(0.5)
     assert 0.25 < BLOCKED.clearance_m(waiting.x, waiting.y) < 0.75
-    cart.eye.urg.world = EMPTY
-    end = cart.run(14)
+    cart.eye.world = EMPTY
+    end = cart.run(8)
     assert cart.finished == 1
-    assert end.distance(Pose(3.0)) < 0.005
+    assert end.distance(Pose(1.6)) < 0.005
 
 
 def test_somebody_who_steps_in_its_way_stops_it() -> None:
     cart = Seeing(EMPTY)
     cart.goal(3.0)
-    cart.run(3)
-    for name, value in (("post_x_m", 2.5), ("post_radius_m", 0.2)):
+    cart.run(1)
+    for name, value in (("post_x_m", 1.2), ("post_radius_m", 0.2)):
         cart.eye.urg.inputs.set(name, value)
-    assert cart.run(8).x < 2.1
+    waiting = cart.run(4)
+    assert waiting.x < 0.8
     cart.eye.urg.inputs.set("post_radius_m", 0.0)
-    cart.run(14)
-    assert cart.finished == 1
+    assert cart.run(2).x > waiting.x + 0.3
 
 
 def test_without_its_eyes_it_does_not_move() -> None:
     cart = Seeing(EMPTY)
     cart.goal(2.0)
-    cart.run(3)
+    cart.run(1)
     cart.eye.urg.inputs.set("power_cut", 1)
-    stopped = cart.run(3)
-    assert cart.run(1) == stopped
+    stopped = cart.run(2)
+    assert cart.run(0.5) == stopped
     cart.eye.urg.inputs.set("power_cut", 0)
-    cart.run(10)
-    assert cart.finished == 1
+    assert cart.run(3).x > stopped.x + 0.3
 
 
 def test_idle_ticks_of_the_sensor_are_not_visible() -> None:
     ways = []
     for dense in (True, False):
         cart = Seeing(BLOCKED, dense=dense)
-        cart.goal(3.0)
-        ways.append([cart.run(0.25) for _ in range(12)])
+        cart.goal(2.0)
+        ways.append([cart.run(0.25) for _ in range(6)])
     assert ways[0] == ways[1]
+
+
+def test_a_cart_waits_until_another_has_left_its_way() -> None:
+    loop = ClosedLoop(BaseParameters(), BaseParameters(), world=EMPTY)
+    first, second = loop.carts
+    place(second, Pose(1.5, 0.0, pi / 2))
+    line = loop.eyes[0].line.b
+    guard = Guard(loop.manager, first.chain, lambda name: SimLink(loop.rig, line))
+    loop.activate("tuned")
+    guard.activate()
+    loop.run_to(SECOND_US // 2)
+    first.chain.position_input.goal(Pose(1.8))
+    loop.run_to(4 * SECOND_US)
+    assert 0.5 < first.truth.distance(second.truth) < 1.0
+    second.chain.position_input.goal(Pose(1.5, 1.0, pi / 2))
+    loop.run_to(14 * SECOND_US)
+    assert first.truth.distance(Pose(1.8)) < 0.005
 
 
 class Push:

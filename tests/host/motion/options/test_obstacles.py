@@ -44,6 +44,9 @@ def test_ranges_become_points_in_the_frame_of_the_robot() -> None:
 def test_what_is_no_range_is_no_point() -> None:
     (seen,) = PortBench(UrgToObstacles("U0")).after("obstacles", "ranges", scan(0.0, nan, -1.0))
     assert seen.data == ()
+    strange = RangeData(ranges=(1.0,), config=RangerConfig(minAngle=nan))
+    (seen,) = PortBench(UrgToObstacles("U0")).after("obstacles", "ranges", strange)
+    assert seen.data == ()
 
 
 @pytest.mark.parametrize(
