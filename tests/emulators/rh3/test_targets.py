@@ -134,3 +134,18 @@ def test_a_slower_base_stays_within_the_published_range(
     loop = ClosedLoop(BaseParameters(response_s=response_s, delay_ms=delay_ms))
     expect(loop.chain, response_s)
     assert driven(points, set_id, loop).error_m <= most_m
+
+
+@pytest.mark.parametrize("set_id", TARGETS)
+def test_an_integral_gain_carries_a_load(set_id: str) -> None:
+    """5 Nm against both wheels, of 25 Nm; without it the wheels droop, as the law is P only."""
+    loop = ClosedLoop()
+    for name, gain in (("gain_VP", "40"), ("gain_VI", "1")):
+        loop.chain.ref_hard.configuration.set(name, gain)
+    start(loop, set_id)
+    for side in ("left", "right"):
+        loop.cart.base.inputs.set(f"load_{side}_nm", 5)
+    loop.run_to(loop.now_us + 500_000)
+    journey = drive(loop, GOAL)
+    assert journey.error_m <= TARGETS[set_id].error
+    assert journey.heading_error_rad <= TARGETS[set_id].heading

@@ -116,14 +116,27 @@ def test_a_code_that_nobody_knows_stays_a_number() -> None:
     assert master.poll() == Answer(READ_TWO, refusal=0x63)
 
 
-def test_a_request_without_an_answer_is_made_once_more() -> None:
+@pytest.mark.parametrize("retries", [0, 1, 3])
+def test_a_request_without_an_answer_is_made_again(retries: int) -> None:
     link = Script()
-    master = ModbusMaster(link)
+    master = ModbusMaster(link, retries=retries)
     master.begin(READ_TWO)
     for link.now_us in range(0, 100_000, 5_000):
         assert master.poll() is None
-    assert link.sent == [encode_frame(1, encode_request(READ_TWO))] * 2
-    assert (master.pending, master.misses, master.lost) == (None, 1, 2)
+    assert link.sent == [encode_frame(1, encode_request(READ_TWO))] * (1 + retries)
+    assert (master.pending, master.misses, master.lost) == (None, 1, 1 + retries)
+
+
+def test_an_answer_is_awaited_for_20_ms() -> None:
+    link = Script()
+    master = ModbusMaster(link)
+    master.begin(READ_TWO)
+    link.now_us = 19_999
+    master.poll()
+    assert len(link.sent) == 1
+    link.now_us = 20_000
+    master.poll()
+    assert len(link.sent) == 2
 
 
 def test_an_answer_ends_a_row_of_misses() -> None:

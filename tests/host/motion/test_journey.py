@@ -57,3 +57,8 @@ def test_a_command_beyond_a_limit_is_counted(twist: Twist, count: int) -> None:
 def test_a_speed_that_stays_beyond_a_limit_is_counted(twist: Twist) -> None:
     same = Sample(0.0, Pose(), twist, None)
     assert journey(same, same).violations(LIMITS) == 1
+
+
+def test_a_speed_at_the_limit_is_within_it() -> None:
+    same = Sample(0.0, Pose(), Twist(0.3, -0.3), None)
+    assert journey(same, same).violations(LIMITS) == 0
