@@ -81,7 +81,7 @@ def open_lines(
     readers: list[Reader[Listened]] = []
     try:
         for word in words:
-            readers.append(_open_port(word))
+            readers.append(open_port(word))
         for bus in buses:
             readers.append(_open_bus(bus, options))
     except BaseException:
@@ -92,7 +92,8 @@ def open_lines(
     return LiveSource(readers, chosen + [bus.chosen for bus in buses])
 
 
-def _open_port(word: LineWord) -> LineReader:
+def open_port(word: LineWord) -> LineReader:
+    """Open a serial port; SourceFailed if that cannot be."""
     try:
         return LineReader(word)
     except LinkClosed as error:

@@ -23,7 +23,7 @@ SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
          can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
          slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
-         serial:/dev/ttyUSB0,rrc   a serial port (dump, top): PORT[@BAUD],rrc or ,rtc-lite
+         serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
          run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
          -                         standard input: candump -L, or canmon dump --jsonl"""
 """For the help text of a verb that takes SOURCE words."""
@@ -108,7 +108,7 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
     if len(files) == len(parsed) > 0:
         return FileSource(files)
     if any(isinstance(word, LineWord) for word in parsed):
-        raise Refused("serial lines are shown by dump and top: " + " ".join(words))
+        raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
     from tickrig.host.canmon.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only

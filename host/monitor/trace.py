@@ -12,6 +12,10 @@ from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.heard_line import Listened
+
+LINE: Final = 1 << 32
+"""In a key: a line of a serial port; 1 above it for those to the device."""
 
 CAPACITY: Final = 100_000
 
@@ -20,7 +24,7 @@ Key = tuple[str, int]
 
 
 class TraceRow(NamedTuple):
-    """One frame of the trace.
+    """One frame of the trace, or one line of a serial port.
 
     Attributes:
         number: of the frame since the trace began, from 0.
@@ -32,7 +36,7 @@ class TraceRow(NamedTuple):
     """
 
     number: int
-    heard: Heard
+    heard: Listened
     since_us: int | None
     gap_us: int | None
     changed: int = 0
@@ -105,11 +109,11 @@ class Trace(Ring):
         self._latest: dict[Key, tuple[int, int]] = {}
         self._last_us: int | None = None
 
-    def take(self, heard: Heard, decoded: Decoded | None = None) -> TraceRow:
-        """Add a frame at the end."""
-        at_us, _, frame, _ = heard
-        key = key_of(heard)
-        payload = int.from_bytes(frame.data, "little")
+    def take(self, heard: Listened, decoded: Decoded | None = None) -> TraceRow:
+        """Add a frame or a line at the end."""
+        at_us, key = heard.at_us, key_of(heard)
+        data = heard.frame.data if isinstance(heard, Heard) else heard.data
+        payload = int.from_bytes(data, "little")
         before_us, before = self._latest.get(key, (None, payload))
         row = TraceRow(
             self.count,
@@ -131,8 +135,10 @@ class Trace(Ring):
         self._last_us = None
 
 
-def key_of(heard: Heard) -> Key:
-    """Return bus and identifier; error frames are a kind of their own."""
+def key_of(heard: Listened) -> Key:
+    """Return bus and identifier; error frames are a kind of their own, and so are lines."""
+    if not isinstance(heard, Heard):
+        return heard.channel, LINE + heard.sent
     frame = heard.frame
     return heard.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
 

@@ -26,7 +26,7 @@ from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 
 PAINT_S: Final = 0.1
 SAVE_S: Final = 2.0
-SWITCH_S: Final = 0.000_5
+SWITCH_S: Final = 0.002
 """How long the screen may keep the session from running."""
 
 ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

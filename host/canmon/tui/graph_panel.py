@@ -28,6 +28,7 @@ from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH
 from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
 from tickrig.host.monitor.graph.view import LEAST_US
+from tickrig.host.monitor.heard import Heard
 
 PICTURE: Final = (960, 400)
 QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"
@@ -187,7 +188,8 @@ class GraphPanel(Panel):
         with self.session.lock:
             trace = self.session.model.trace
             rows = trace.rows(trace.first, trace.count)
-            self.graph.add(word, ((row.heard, row.decoded) for row in rows))
+            heard = ((row.heard, row.decoded) for row in rows)
+            self.graph.add(word, ((one, meant) for one, meant in heard if isinstance(one, Heard)))
         self._texts.append(text)
 
     def _remove(self, text: str) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.heard_line import Listened
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.top_model import TopModel
@@ -52,14 +53,20 @@ class Model:
         self.frames = self.now_us = self.lost = 0
         self.failed, self.ended = "", False
 
-    def take(self, heards: Sequence[Heard]) -> list[Meant]:
-        """Take what was heard; return it with what it means."""
-        meant = [(heard, self.decoder.take(heard)) for heard in heards]
-        for heard, decoded in meant:
-            self.board.take(heard, decoded)
-            self.trace.take(heard, decoded)
+    def take(self, heards: Sequence[Listened]) -> list[Meant]:
+        """Take what was heard; return the frames with what they mean."""
+        meant: list[Meant] = []
+        for heard in heards:
+            if isinstance(heard, Heard):
+                decoded = self.decoder.take(heard)
+                self.board.take(heard, decoded)
+                self.trace.take(heard, decoded)
+                meant.append((heard, decoded))
+            else:
+                self.trace.take(heard, heard.decoded)
+                self.top.take((heard,))
         self.top.take_meant(meant)
         self.frames += len(meant)
-        if meant:
-            self.now_us = meant[-1][0].at_us
+        if heards:
+            self.now_us = heards[-1].at_us
         return meant

@@ -1,4 +1,4 @@
-"""Opening the source of a full-screen program: buses to hear and send on, a log, or a pipe."""
+"""Opening the source of a full-screen program: buses to hear and send on, ports, a log, a pipe."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from functools import partial
 from typing import Final
 
 from tickrig.host.canmon.failure import SourceFailed
-from tickrig.host.canmon.source import Source, open_source
-from tickrig.host.canmon.source_word import BusWord, parse_source
+from tickrig.host.canmon.live_source import LiveSource, Reader
+from tickrig.host.canmon.source import open_any
+from tickrig.host.canmon.source_word import BusWord, LineWord, parse_source
 from tickrig.host.canmon.stdin_source import STDIN, StdinSource
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.session import Send, Session
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.monitor.decode.heard_line import Listened
 
 TERMINAL: Final = "/dev/tty"
 
@@ -27,32 +29,39 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
     """
     parsed = [parse_source(word) for word in words]
     buses = [word for word in parsed if isinstance(word, BusWord)]
+    lines = [word for word in parsed if isinstance(word, LineWord)]
     if parsed == [None]:
         return Session(StdinSource(_take_pipe()), model)
-    if len(buses) < len(parsed) or not (words or options):
-        return Session(open_source(words, options), model)
-    return Session(*_open_buses(buses or [BusWord()], options, model))
+    if len(buses) + len(lines) < len(parsed) or not (words or options):
+        return Session(open_any(words, options), model)
+    if not lines:
+        buses = buses or [BusWord()]
+    return Session(*_open_live(buses, lines, options, model))
 
 
-def _open_buses(
-    words: Sequence[BusWord], options: BusOptions, model: Model
-) -> tuple[Source, Model, dict[str, Send]]:
+def _open_live(
+    buses: Sequence[BusWord], lines: Sequence[LineWord], options: BusOptions, model: Model
+) -> tuple[LiveSource[Listened], Model, dict[str, Send]]:
     from tickrig.host.canmon.bus_reader import open_bus  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.canmon.bus_source import BusSource, merged, reader_of  # noqa: PLC0415
+    from tickrig.host.canmon.bus_source import merged, reader_of  # noqa: PLC0415
+    from tickrig.host.canmon.line_source import open_port  # noqa: PLC0415 - pyserial
     from tickrig.host.canmon.transmitter import send_on  # noqa: PLC0415
 
     sends: dict[str, Send] = {}
-    readers = []
+    readers: list[Reader[Listened]] = []
     try:
-        for word in words:
+        for word in buses:
             bus, interface, name = open_bus(merged(word, options))
             readers.append(reader_of(bus, interface, name))
             sends[name] = partial(send_on, bus, name)
+        for line in lines:
+            readers.append(open_port(line))
     except BaseException:
         for reader in readers:
             reader.close()
         raise
-    return BusSource(readers, [word.chosen for word in words]), model, sends
+    chosen = [*(word.chosen for word in buses), *(None for _ in lines)]
+    return LiveSource(readers, chosen), model, sends
 
 
 def _take_pipe() -> int:

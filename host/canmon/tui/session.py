@@ -9,9 +9,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Final, Protocol
 
 from tickrig.host.canmon.failure import SourceFailed
-from tickrig.host.canmon.source import Source
+from tickrig.host.canmon.source import AnySource
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.tui.model import Meant, Model
+from tickrig.host.monitor.decode.heard_line import Listened
 from tickrig.host.monitor.heard import Heard
 from tickrig.wire.can import CanFrame, Frames
 
@@ -74,7 +75,7 @@ class Session:
 
     def __init__(
         self,
-        source: Source,
+        source: AnySource[Listened],
         model: Model,
         buses: Mapping[str, Send] | None = None,
         clock: Callable[[], int] = lambda: time.monotonic_ns() // 1_000,
@@ -142,7 +143,7 @@ class Session:
             if self.source.ended:
                 self._stop.wait(POLL_US / 1e6)
 
-    def _take(self, heards: Sequence[Heard]) -> list[tuple[str, CanFrame]]:
+    def _take(self, heards: Sequence[Listened]) -> list[tuple[str, CanFrame]]:
         self._echo = []
         self._watch.take(heards)
         meant = self.model.take(heards)

@@ -20,8 +20,11 @@ from typing import Final
 
 from tickrig.host.canmon.tui.line import Line, line_text
 from tickrig.host.monitor.dump_line import Stamp, date_text, seconds_text
+from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.ident import ident_of, ident_text
+from tickrig.host.monitor.line_traffic import ARROWS
 from tickrig.host.monitor.quantity import ms_text
+from tickrig.host.monitor.serial_text import bytes_text
 from tickrig.host.monitor.top_model import meaning_text
 from tickrig.host.monitor.trace import TraceRow
 from tickrig.wire.can import CanFrame
@@ -88,7 +91,7 @@ class TraceLines:
         if self.meaning and row.decoded is not None:
             missing = self._data_width - sum(len(text) for text, _ in pieces[3:])
             style = KIND_STYLES.get(row.decoded.kind, "")
-            pieces.append((" " * (missing + 1) + meaning_text(row.decoded), style))
+            pieces.append((" " * (max(0, missing) + 1) + meaning_text(row.decoded), style))
         return tuple(piece for piece in pieces if piece[0])
 
     @property
@@ -112,30 +115,36 @@ class TraceLines:
                 return seconds_text(at_us - self.origin_us, 1)
 
     def _data(self, row: TraceRow) -> Iterator[tuple[str, str]]:
-        frame = row.heard.frame
+        heard = row.heard
+        if not isinstance(heard, Heard):
+            yield bytes_text(heard.data), ""
+            return
+        frame = heard.frame
         if isinstance(frame, CanFrame) and frame.remote:
             yield f"[{frame.dlc}] remote request", ""
             return
         yield f"[{len(frame.data)}]", ""
-        cells = _bit_cells(row) if self.bits else _byte_cells(row)
+        cells = _cells(frame.data, row.changed, self.bits)
         for changed, run in groupby(cells, key=itemgetter(1)):  # few pieces are painted soon
             yield "".join(cell for cell, _ in run), CHANGED if changed else ""
 
 
-def _byte_cells(row: TraceRow) -> Iterator[tuple[str, bool]]:
-    for place, byte in enumerate(row.heard.frame.data):
-        yield f" {byte:02X}", bool(row.changed >> 8 * place & 0xFF)
-
-
-def _bit_cells(row: TraceRow) -> Iterator[tuple[str, bool]]:
-    for place, byte in enumerate(row.heard.frame.data):
+def _cells(data: bytes, changed: int, bits: bool) -> Iterator[tuple[str, bool]]:
+    for place, byte in enumerate(data):
+        differs = changed >> 8 * place & 0xFF
+        if not bits:
+            yield f" {byte:02X}", bool(differs)
+            continue
         for bit in reversed(range(8)):
-            blank = " " * (bit == 7)
-            yield f"{blank}{byte >> bit & 1}", bool(row.changed >> 8 * place + bit & 1)
+            yield f"{' ' * (bit == 7)}{byte >> bit & 1}", bool(differs >> bit & 1)
 
 
 def _ident(row: TraceRow) -> tuple[str, str]:
-    frame = row.heard.frame
+    heard = row.heard
+    style = SENT if heard.sent else HEAD
+    if not isinstance(heard, Heard):
+        return f"{ARROWS[heard.sent]:<9} ", style
+    frame = heard.frame
     if isinstance(frame, ErrorFrame):
         return f"{'error':<9} ", ERROR
-    return f"{ident_text(ident_of(frame)):<9} ", SENT if row.heard.sent else HEAD
+    return f"{ident_text(ident_of(frame)):<9} ", style

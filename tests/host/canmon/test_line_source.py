@@ -154,7 +154,7 @@ def test_a_port_that_is_unplugged_ends_it(ports: tuple[Port, Port]) -> None:
         (["dump", "serial:/dev/nowhere,rrc", "-l", "run.log"], 2, "a log holds frames alone"),
         (["dump", "serial:/dev/nowhere,rrc", "-"], 2, "cannot be mixed"),
         (["dump", "serial:/dev/nowhere,fax"], 2, "'fax' is no filter"),
-        (["stats", "serial:/dev/nowhere,rrc"], 2, "serial lines are shown by dump and top"),
+        (["stats", "serial:/dev/nowhere,rrc"], 2, "serial lines are shown by dump, top and tui"),
     ],
 )
 def test_a_mistake_is_one_line(words: list[str], status: int, said: str) -> None:
