@@ -15,17 +15,18 @@ from tickrig.wire.scip.reply import Reply, ReplySplitter
 from tickrig.wire.scip.scan import WIDTHS, parse_scan
 
 SILENCE_US: Final = 500_000
-"""How long a sensor may be silent: five turns; more where scans are left out."""
+"""How long there may be no good scan: five turns; more where scans are left out."""
 
 ENDLESS: Final = 0
+LEAVE_ADJUST: Final = "2"
 
 
 class UrgClient:
     """Reads what kind of sensor it is, lets it measure without end, and takes its scans.
 
-    It begins with QT, so that a sensor which still measures for somebody before is quiet.
-    After the time of five scans without a word it begins again. A scan that came garbled
-    is left out.
+    It begins with TM2 and QT, so that a sensor which still does something for somebody
+    before is quiet. After the time of five scans without a good one it begins again. A scan
+    that came garbled is left out.
 
     Args:
         link: the line.
@@ -58,7 +59,6 @@ class UrgClient:
         """
         scans, data = [], self._link.receive(0)
         for reply in self._splitter.push(data):
-            self._heard_us = self._link.now_us
             try:
                 scans += self._take(reply)
             except WireError:
@@ -76,12 +76,14 @@ class UrgClient:
 
     def _begin(self) -> None:
         self._splitter, self._heard_us = ReplySplitter(), self._link.now_us
-        self._link.send(Command("QT").encode() + Command("PP").encode())
+        asked = (Command("TM", LEAVE_ADJUST), Command("QT"), Command("PP"))
+        self._link.send(b"".join(command.encode() for command in asked))
 
     def _take(self, reply: Reply) -> list[Scan]:
         command = Command.parse(reply.echo)
         if command.symbol == "PP" and reply.status == status.OK:
             self.kind = Specification.parse(reply.lines)
+            self._heard_us = self._link.now_us
             self._measure(self.kind)
         if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
             return []
@@ -90,6 +92,7 @@ class UrgClient:
         if self.kind is None:
             return []
         time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
+        self._heard_us = self._link.now_us
         return [Scan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
 
     def _measure(self, kind: Specification) -> None:

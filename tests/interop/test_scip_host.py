@@ -6,6 +6,7 @@ import os
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
@@ -16,6 +17,9 @@ import pytest
 from hokuyolx import HokuyoLX
 
 from tickrig.emulators.child import running
+from tickrig.host.serial_link import SerialLink
+from tickrig.host.urg.client import UrgClient
+from tickrig.host.urg.scan import Scan
 
 pytestmark = pytest.mark.realtime
 
@@ -89,3 +93,14 @@ def test_a_foreign_host_reads_the_timer(laser: HokuyoLX) -> None:
     assert laser.tsync_exit()[0] == "00"
     laser.reset()
     laser.standby()
+
+
+def test_our_host_measures_on_a_pty() -> None:
+    with running("tickrig.emulators.urg.cli", *ROOM) as child:
+        client, deadline_s = UrgClient(SerialLink(str(child.link))), time.monotonic() + 10.0
+        scans: list[Scan] = []
+        while len(scans) < 3:
+            assert time.monotonic() < deadline_s
+            scans += client.poll()
+        client.close()
+    assert {dict(scan.points())[0.0] for scan in scans} == {0.75}

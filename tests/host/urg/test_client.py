@@ -1,12 +1,29 @@
 from __future__ import annotations
 
+import contextlib
 from math import hypot, pi
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.host.urg.sensor_bench import SensorBench
 from tickrig.device.urg.parameters import URG_04LX
+from tickrig.emulators.rig import Rig
+from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.sim_link import SimLink
 from tickrig.host.errors import DeviceRefused, LinkClosed
+from tickrig.host.urg.client import UrgClient
+from tickrig.wire.scip.reply import Reply
+from tickrig.wire.scip.scan import encode_scan
+
+REPLIES = [
+    Reply(b"PP", "00", URG_04LX.lines).encode(),
+    Reply(b"PP", "00").encode(),
+    Reply(b"MD0044072501000", "99", encode_scan(5, [100], 3)).encode(),
+    Reply(b"MD", "99").encode(),
+    Reply(b"MD", "50").encode(),
+]
 
 
 def test_it_measures_ten_times_a_second() -> None:
@@ -76,6 +93,25 @@ def test_a_sensor_that_still_measures_is_taken_over() -> None:
     bench.link.send(b"MD0384038401000\n")
     bench.client = type(bench.client)(bench.link)
     assert len(bench.run(1_000)[-1].distances_mm) == 682
+
+
+def test_a_sensor_left_in_adjust_mode_is_taken_over() -> None:
+    bench = SensorBench()
+    bench.link.send(b"TM0\n")
+    bench.client = type(bench.client)(bench.link)
+    assert len(bench.run(500)) >= 2
+
+
+@given(st.lists(st.binary(max_size=80) | st.sampled_from(REPLIES), max_size=8))
+def test_any_noise_on_the_line_is_survived(pieces: list[bytes]) -> None:
+    line = SerialLine(12_000_000)
+    rig = Rig()
+    client = UrgClient(SimLink(rig, line.b))
+    for piece in pieces:
+        line.a.send(rig.now_us, piece)
+        rig.run_for(1_000)
+        with contextlib.suppress(DeviceRefused):
+            assert len(client.poll()) <= 1
 
 
 def test_closing_switches_the_laser_off() -> None:
