@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-import time
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -15,10 +14,9 @@ from tickrig.host.canmon.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.graph_file import write_graph
 from tickrig.host.canmon.graph_request import GraphRequest
-from tickrig.host.canmon.listening import is_over, listen, patience_us, span_option
-from tickrig.host.canmon.screen import Screen
+from tickrig.host.canmon.listening import listen, patience_us, span_option
+from tickrig.host.canmon.painting import paint
 from tickrig.host.canmon.source import Source, explain_sources, open_source
-from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
@@ -29,8 +27,6 @@ from tickrig.host.monitor.graph.series import Series
 from tickrig.host.monitor.graph.signal_word import ObjectName, parse_signal
 from tickrig.host.monitor.graph.view import View
 
-POLL_US: Final = 20_000
-PAINT_US: Final = 100_000
 MOST: Final = 2_000_000
 """Samples of a signal that are kept of a bus."""
 
@@ -98,30 +94,20 @@ def _collect(
     if isinstance(frames, WholeLog):
         collector.take_columns(frames.columns)
     elif frames.live and sys.stdout.isatty():
-        with Screen() as screen:
-            _watch(frames, collector, request, screen)
+        paint(
+            frames,
+            collector.take_all,
+            lambda *at: _live(collector.series, request, *at),
+            request.span_us,
+        )
     else:
         listen(frames, collector.take_all, request.span_us or patience_us(frames, [source]))
 
 
-def _watch(frames: Source, collector: Collector, request: GraphRequest, screen: Screen) -> None:
-    watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
-    pressed: list[str] = []
-    while not (frames.ended or "q" in pressed or is_over(begin_s, request.span_us)):
-        pressed = screen.keys()
-        heards = frames.poll(POLL_US)
-        watch.take(heards)
-        collector.take_all(heards)
-        if time.monotonic() >= due_s:
-            due_s = time.monotonic() + PAINT_US / 1e6
-            screen.paint(_live(collector.series, request, watch.now_us, screen.size()))
-
-
 def _live(
-    series: Sequence[Series], request: GraphRequest, now_us: int, size: tuple[int, int]
+    series: Sequence[Series], request: GraphRequest, now_us: int, width: int, height: int
 ) -> list[str]:
     view = View(now_us - request.window_us, now_us, request.ranges, None, now_us)
-    width, height = size
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -11,9 +10,10 @@ import click
 
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import report, until_interrupted
-from tickrig.host.canmon.listening import POLL_US, is_over, listen, patience_us, span_option
-from tickrig.host.canmon.screen import Screen
-from tickrig.host.canmon.source import Source, explain_sources, open_source
+from tickrig.host.canmon.listening import listen, patience_us, span_option
+from tickrig.host.canmon.painting import paint
+from tickrig.host.canmon.source import explain_sources, open_source
+from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.decode.board_text import board_json, render_board
@@ -22,7 +22,6 @@ from tickrig.host.monitor.decode.eds_objects import EdsObjects
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.heard import Heard
 
-PAINT_S: Final = 0.1
 MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
 
@@ -63,11 +62,12 @@ def command(
     try:
         with until_interrupted():
             if frames.live and sys.stdout.isatty() and not jsonl:
-                view.paint(frames, span_us)
+                paint(frames, view.take, view.painted, span_us)
             else:
                 listen(frames, view.take, span_us or patience_us(frames, source))
-        for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
-            click.echo(line)
+        with until_unread():
+            for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
+                click.echo(line)
     finally:
         frames.close()
     report(frames, strict)
@@ -100,18 +100,9 @@ class NodesView:
         """Return the board as JSON, an object a node."""
         return board_json(self._board, self._now_us(live))
 
-    def paint(self, source: Source, span_us: int | None) -> None:
-        """Take what comes, and show the board ten times a second."""
-        begin_s, due_s = time.monotonic(), 0.0
-        with Screen() as screen:
-            while not (source.ended or is_over(begin_s, span_us)):
-                self.take(source.poll(POLL_US))
-                pressed = screen.keys()
-                if "q" in pressed:
-                    break
-                if time.monotonic() >= due_s:
-                    due_s = time.monotonic() + PAINT_S
-                    screen.paint(render_board(self._board, self._watch.now_us, *screen.size()))
+    def painted(self, now_us: int, width: int, height: int) -> list[str]:
+        """Return the board for a screen."""
+        return render_board(self._board, now_us, width, height)
 
     def _now_us(self, live: bool) -> int:
         """Return the time at a live source, of a file its last frame's."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,26 +17,21 @@ from tickrig.host.canmon.decode_options import (
 )
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import (
-    POLL_US,
     bit_rate_of,
-    is_over,
     listen,
     patience_us,
     span_option,
 )
 from tickrig.host.canmon.meaning import Meaning
-from tickrig.host.canmon.screen import Screen
+from tickrig.host.canmon.painting import paint
 from tickrig.host.canmon.source import AnySource, explain_sources, open_any
 from tickrig.host.canmon.stdout import until_unread
-from tickrig.host.canmon.stopwatch import Stopwatch
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.top_model import TopModel
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.heard_line import Listened
-
-PAINT_US: Final = 100_000
 
 Take = Callable[["Sequence[Listened]"], None]
 
@@ -91,7 +85,13 @@ def command(  # noqa: PLR0913 - options
     try:
         with until_interrupted():
             if on_screen:
-                _paint(frames, model, take, span_us)
+                paint(
+                    frames,
+                    take,
+                    lambda *at: model.lines(at[0], frames.lost, *at[1:]),
+                    span_us,
+                    model.press,
+                )
             else:
                 listen(frames, take, span_us or patience_us(frames, source))
         with until_unread():
@@ -105,19 +105,10 @@ def _meant(model: TopModel, meaning: Meaning) -> Take:
     return lambda heards: model.take_meant(meaning.take(heards))
 
 
-def _paint(source: AnySource[Listened], model: TopModel, take: Take, span_us: int | None) -> None:
-    watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
-    with Screen() as screen:
-        while not (source.ended or model.quit or is_over(begin_s, span_us)):
-            heards = source.poll(POLL_US)
-            take(heards)
-            watch.take(heards)
-            keys = screen.keys()
-            for key in keys:
-                model.press(key)
-            if keys or time.monotonic() >= due_s:
-                due_s = time.monotonic() + PAINT_US / 1e6
-                screen.paint(model.lines(watch.now_us, source.lost, *screen.size()))
+def _lines(
+    model: TopModel, source: AnySource[object], now_us: int, width: int, height: int
+) -> list[str]:
+    return model.lines(now_us, source.lost, width, height)
 
 
 explain_sources(command)

@@ -34,17 +34,15 @@ class TopModel:
     Attributes:
         traffic: what was heard.
         view: how it is shown.
-        quit: the key to leave was pressed.
     """
 
     def __init__(self, bit_rate: int | None = None) -> None:
-        self.traffic, self._serial, self.quit = Traffic(), LineTraffic(), False
+        self.traffic, self._serial = Traffic(), LineTraffic()
         self.view = View(styled=True, bit_rate=bit_rate, keys=True)
         self._held: tuple[Snapshot, tuple[LineRow, ...]] | None = None
         self._now_us = 0
         self._meanings: dict[tuple[str, int], Decoded] = {}
         self._acts: dict[str, Callable[[], None]] = {
-            "q": self._quit,
             " ": self._hold,
             "b": lambda: self._show(bits=not self.view.bits),
             "d": lambda: self._show(meaning=None if self.view.meaning else self._meaning),
@@ -96,9 +94,6 @@ class TopModel:
     def _meaning(self, row: IdRow) -> str:
         decoded = self._meanings.get((row.channel, row.ident))
         return data_text(row, False) if decoded is None else meaning_text(decoded)
-
-    def _quit(self) -> None:
-        self.quit = True
 
     def _snapshot(self) -> tuple[Snapshot, tuple[LineRow, ...]]:
         return self.traffic.snapshot(self._now_us), self._serial.rows()

@@ -20,14 +20,6 @@ def press(model: TopModel, keys: str) -> None:
         model.press(key)
 
 
-def test_q_leaves() -> None:
-    model = top("0 181#00")
-    press(model, "x")
-    assert not model.quit
-    press(model, "q")
-    assert model.quit
-
-
 def test_space_holds_the_picture_while_frames_are_counted() -> None:
     model = top("0 181#00")
     shown(model)
