@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.transmit_task import TransmitTask
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.decode.eds_objects import EdsObjects, read_eds
 from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, Sight
@@ -24,7 +24,7 @@ from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.transmit.transmit_words import parse_words
 from tickrig.wire.can import CanFrame
 
-EPOS = read_eds(Path(__file__).parents[2] / "examples/eds/epos.eds", 5)
+EPOS = Path(__file__).parents[2] / "examples/eds/epos.eds"
 FRAMES, BATCH = 40_000, 400
 PERIOD_US = 10_000
 SETTINGS = {
@@ -67,7 +67,7 @@ def run(seconds: float) -> None:
 def _sessions(what: str, panels: tuple[type[Panel], ...], settings: dict[str, object]) -> None:
     values = []
     for _ in range(RUNS):
-        session = Session(Frames(), Model({5: EPOS}, bit_rate=1_000_000))
+        session = Session(Frames(), Model(_drive(), bit_rate=1_000_000))
         for panel in [panel(session) for panel in panels]:
             panel.load(settings.get(panel.section, {}))
         spent_s = _spent_s(lambda session=session: [session.step() for _ in range(FRAMES // BATCH)])
@@ -76,7 +76,7 @@ def _sessions(what: str, panels: tuple[type[Panel], ...], settings: dict[str, ob
 
 
 def _pictures() -> None:
-    objects = NodeDictionary(Decoder({5: EPOS}).memory("can0", 5))
+    objects = NodeDictionary(Decoder(_drive()).memory("can0", 5))
     count = len(objects.rows())
     paint = [_spent_s(lambda: render_dictionary(objects.rows(), 0)) * 1e3 for _ in range(RUNS)]
     row(f"objects: {count} rows", paint, "ms of processor")
@@ -109,6 +109,10 @@ def _lateness(seconds: float) -> None:
     session.source.close()
     late = [float((at_us - start_us) % PERIOD_US) for at_us in sent_us]
     percentiles(f"a row each 10 ms for {seconds:g} s: late", late, "us")
+
+
+def _drive() -> dict[int, EdsObjects]:
+    return {5: read_eds(EPOS, 5)}
 
 
 def _batch(first: int, count: int = BATCH) -> list[Heard]:
