@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.serve import read_files
+from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.host.rtc_canopen.view import ServerView
@@ -61,5 +61,9 @@ def test_after_noise_the_nodes_can_be_set_up_again(noise: list[tuple[int, list[C
     for node_id, node in bench.server.nodes.items():
         if node.phase is not Phase.READY:
             ServerView(bench.server).boot(node_id)
-    bench.run_ms(4_000)
-    assert [node.phase for node in bench.server.nodes.values()] == [Phase.READY] * 2
+    serve(bench.server, bench.link, bench.now_us + 4_000_000, lambda: ready(bench))
+    assert ready(bench)
+
+
+def ready(bench: Bench) -> bool:
+    return all(node.phase is Phase.READY for node in bench.server.nodes.values())

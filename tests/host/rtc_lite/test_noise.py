@@ -119,7 +119,7 @@ def echoed(bench: Bench) -> list[int]:
     return [int(value)] if isinstance(value, int) else []
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80)
 @given(SPOILS, st.sampled_from(CONFIGS))
 def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], config: NodeConfig) -> None:
     bench = spoilt_bench(spoils, config)
