@@ -127,8 +127,10 @@ class Rh3Base:
             driver.coast()
         left, right = self.sides
         ground.step(left.wheel.speed / COUNTS_PER_RAD, right.wheel.speed / COUNTS_PER_RAD)
-        self._moving = not (ground.resting and driver.resting)
-        self._unseen |= self._moving
+        if ground.speed_m_s or not (ground.resting and driver.resting):
+            self._moving = self._unseen = True
+        else:
+            self._moving = False
 
     def _touched(self) -> None:
         self.inputs.changed, self._unseen = False, True

@@ -105,7 +105,10 @@ class Driver:
         left, right = self.sides
         if left.stalled or right.stalled:
             self.find_faults()
-        if self._power():
+        powered = self._enabled and self._mode is not Mode.FREE
+        if powered != self._powered:
+            powered = self._switch(powered=powered)
+        if powered:
             stop, to_position = self._stopped, self._mode is Mode.POSITION
             left.drive(stop=stop, to_position=to_position)
             right.drive(stop=stop, to_position=to_position)
@@ -176,12 +179,10 @@ class Driver:
         for side in self.sides:
             side.configure()
 
-    def _power(self) -> bool:
-        """Return whether the wheels have power."""
-        powered = self._enabled and self._mode is not Mode.FREE
-        if powered != self._powered:
-            self._powered = powered
-            for side in self.sides:
-                side.take_over()
-            self.find_faults()
-        return self._powered and self._enabled
+    def _switch(self, *, powered: bool) -> bool:
+        """Give or take power; return whether the wheels have it, as a fault may take it."""
+        self._powered = powered
+        for side in self.sides:
+            side.take_over()
+        self.find_faults()
+        return powered and self._enabled
