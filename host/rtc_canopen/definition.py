@@ -63,6 +63,7 @@ class MasterEntry:
         remove_ms: after how long without a sign of life a proxy is removed.
         reconnect: whether a proxy that comes back has its connections again.
         leave: what the server leaves the nodes in: `pre_operational` or `stopped`.
+        sync_ms: communication cycle period, 0 for no SYNC.
     """
 
     node: int = 127
@@ -71,6 +72,7 @@ class MasterEntry:
     remove_ms: int = 1_000
     reconnect: bool = True
     leave: str = "pre_operational"
+    sync_ms: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,6 +94,7 @@ def _master(node: yaml.Node, place: str, ids: Collection[int]) -> MasterEntry:
     fields: dict[str, Reader] = {
         "node": _NODE_ID,
         "heartbeat_ms": _U16,
+        "sync_ms": _U16,
         "rate_hz": rate,
         "remove_ms": whole(0, 3_600_000),
         "reconnect": flag,

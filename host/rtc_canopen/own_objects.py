@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.host.rtc_canopen.definition import SystemDefinition
 from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.cob_id import FLAG_30
 from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
@@ -23,6 +24,9 @@ DEVICE_TYPE: Final = 460
 CONSUMERS: Final = 3
 """A heartbeat may be so many producer times late."""
 
+SYNC_COB_ID: Final = 0x080
+"""The default of 1005h (CiA 301, SYNC)."""
+
 MOST_MS: Final = 0xFFFF
 
 Table = Mapping[tuple[int, int], bytes]
@@ -35,6 +39,7 @@ class OwnObjects:
     |---|---|
     | 1000h | device type, 000001CCh |
     | 1001h | error register, 0 |
+    | 1005h, 1006h | COB-ID SYNC, with bit 30 if it sends it; communication cycle period, us |
     | 1016h | consumer heartbeat time of each node |
     | 1017h | producer heartbeat time |
     | 1018h | identity: vendor-ID 0, which is nobody's |
@@ -49,9 +54,12 @@ class OwnObjects:
         consumed = [
             node.id << 16 | min(CONSUMERS * node.heartbeat_ms, MOST_MS) for node in definition.nodes
         ]
+        sync_ms = definition.master.sync_ms
         self._table: Table = {
             (0x1000, 0): _u32(DEVICE_TYPE),
             (0x1001, 0): bytes(1),
+            (0x1005, 0): _u32(SYNC_COB_ID | bool(sync_ms) * FLAG_30),
+            (0x1006, 0): _u32(1_000 * sync_ms),
             **_array(0x1016, map(_u32, consumed)),
             (0x1017, 0): definition.master.heartbeat_ms.to_bytes(2, "little"),
             **_array(0x1018, [_u32(0)]),

@@ -9,12 +9,14 @@ from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc_canopen.beat import Beat
 from tickrig.host.rtc_canopen.connections import Connections
 from tickrig.host.rtc_canopen.data_flow import DataFlow
 from tickrig.host.rtc_canopen.definition import NodeEntry, SystemDefinition
 from tickrig.host.rtc_canopen.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import EventKind, EventLog
 from tickrig.host.rtc_canopen.links import Links
+from tickrig.host.rtc_canopen.own_objects import SYNC_COB_ID
 from tickrig.host.rtc_canopen.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.receiver import Receiver
 from tickrig.host.rtc_canopen.served_node import ServedNode
@@ -36,7 +38,7 @@ class Server:
     `tick` takes the time and what was heard, and returns what is to be sent, as
     devices do: the same server runs in virtual time on a rig and on a real bus.
 
-    Not emulated: flying master, SYNC, TIME, program download, a CANopen node for
+    Not emulated: flying master, TIME, program download, a CANopen node for
     each proxy on the bus.
 
     Args:
@@ -63,7 +65,9 @@ class Server:
         self.definition, self.manager = definition, manager or Manager()
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
-        self._started, self._heartbeat_us = False, NEVER
+        self._started = False
+        self._heartbeat = Beat(1_000 * definition.master.heartbeat_ms)
+        self._sync = Beat(1_000 * definition.master.sync_ms)
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
@@ -93,8 +97,12 @@ class Server:
             self._carry_out()
             self._start_order.go_on()
         self._data.send_values()
-        self._send_heartbeat()
-        self.due_us = min(self._nodes_due_us, self.manager.due_us, self._heartbeat_us)
+        if self._sync.take(now_us):
+            self.send(SYNC_COB_ID, b"")
+        if self._heartbeat.take(now_us):
+            self._error_control(NmtState.OPERATIONAL)
+        beats_us = min(self._heartbeat.due_us, self._sync.due_us)
+        self.due_us = min(self._nodes_due_us, self.manager.due_us, beats_us)
         out, self._out = tuple(self._out), []
         return out
 
@@ -175,8 +183,8 @@ class Server:
         self.manager.run_context(self._context)
         self._context.start()
         self._error_control(NmtState.INITIALISING)
-        if self.definition.master.heartbeat_ms:
-            self._heartbeat_us = self.now_us + 1_000 * self.definition.master.heartbeat_ms
+        self._heartbeat.start(self.now_us)
+        self._sync.start(self.now_us)
         for node in self.nodes.values():
             node.look(self.now_us)
 
@@ -227,14 +235,6 @@ class Server:
             self.note(EventKind.STATE_CHANGED, node.entry.id, text)
         if state is not LifeCycleState.ERROR:
             proxy.ready = False
-
-    def _send_heartbeat(self) -> None:
-        """Send a heartbeat that is due; after a pause one, not all that were missed."""
-        if self.now_us >= self._heartbeat_us:
-            period_us = 1_000 * self.definition.master.heartbeat_ms
-            late_us = self.now_us - self._heartbeat_us
-            self._heartbeat_us = self.now_us - late_us % period_us + period_us
-            self._error_control(NmtState.OPERATIONAL)
 
     def _error_control(self, state: NmtState) -> None:
         self.send(ERROR_CONTROL_COB_ID + self.definition.master.node, bytes((state,)))

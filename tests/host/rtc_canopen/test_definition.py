@@ -222,7 +222,7 @@ def definitions(draw: st.DrawFn) -> SystemDefinition:
     return SystemDefinition(
         nodes,
         BusEntry(draw(st.none() | words)),
-        MasterEntry(127, 0, draw(st.floats(0.5, 1_000)), leave="stopped", reconnect=False),
+        MasterEntry(127, 0, draw(st.floats(0.5, 1_000)), leave="stopped", sync_ms=5),
         tuple(draw(st.lists(sdo, max_size=2))),
         tuple(draw(st.lists(st.just(link), max_size=1))),
         tuple(draw(st.lists(st.just(joint), max_size=1))),

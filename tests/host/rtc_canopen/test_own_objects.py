@@ -19,6 +19,8 @@ DEFINITION = parse_definition(
     [
         ("4000100000000000", "43001000CC010000"),  # K18
         ("4001100000000000", "4F01100000000000"),
+        ("4005100000000000", "4305100080000000"),
+        ("4006100000000000", "4306100000000000"),
         ("4016100000000000", "4F16100002000000"),
         ("4016100100000000", "431610012C011000"),  # K14: 16 · 65536 + 300
         ("4016100200000000", "43161002FFFF2000"),
@@ -48,3 +50,12 @@ def test_the_server_answers_on_the_bus_by_its_node_id() -> None:
     bench.other.send(frames("67E#4000100000000000"))
     bench.run_ms(5)
     assert "5FE#43001000CC010000" in [str(heard) for _, heard in bench.log.heard]
+
+
+def test_the_objects_say_that_the_server_sends_sync() -> None:
+    definition = parse_definition("master: {sync_ms: 20}\nnodes: [{id: 16, name: A, eds: a}]\n")
+    said = [
+        OwnObjects(definition).answer(bytes.fromhex(request)) or b""
+        for request in ("4005100000000000", "4006100000000000")
+    ]
+    assert [data.hex().upper() for data in said] == ["4305100080000040", "43061000204E0000"]

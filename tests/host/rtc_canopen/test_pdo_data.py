@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 from tests.emulators.can_bench import frames
@@ -109,3 +110,20 @@ def test_a_pdo_with_an_object_that_no_port_has_gets_no_port(tmp_path: Path) -> N
     proxy = bench.proxy(16)
     assert proxy is not None
     assert "tpdo1" not in proxy.ports
+
+
+def test_the_server_sends_sync_and_synchronous_pdos_come() -> None:
+    bench = Bench(
+        "master: {sync_ms: 20}\n"
+        "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device,"
+        " pdos: {tpdo1: {type: 1}}}]\n",
+        {16: "f-palette"},
+    )
+    bench.boot()
+    bench.activate(16)
+    bench.log.heard.clear()
+    bench.run_ms(100)
+    heard = [(at, str(frame)) for at, frame in bench.log.heard]
+    assert [text for _, text in heard if text in ("080#", "190#00")] == ["080#", "190#00"] * 5
+    syncs = [at for at, text in heard if text == "080#"]
+    assert [later - before for before, later in pairwise(syncs)] == [20_000] * 4

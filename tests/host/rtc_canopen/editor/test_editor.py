@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.host.rtc_canopen.bench import EDS, SYSTEMS
+from tests.host.rtc_canopen.bench import EDS
 from tests.host.rtc_canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
@@ -278,10 +278,6 @@ def test_the_definition_is_saved_with_what_was_changed_and_loaded_again(tmp_path
             ("Palette0.ai", "Motor0.angle")
         ]
         assert (tmp_path / saved.nodes[0].eds).resolve() == EDS / "f-palette.eds"
-        await desk.press("ctrl+o")
-        await desk.answer(str(SYSTEMS / "fig120.yaml"))
-        await desk.pass_ms(700)
-        assert desk.session.view.links
         await desk.press("ctrl+o")
         await desk.answer(str(file))
         await desk.pass_ms(700)
