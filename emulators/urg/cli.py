@@ -64,7 +64,7 @@ def main(context: click.Context, /, serial: str, noise: float, baud: int, **opti
     urg-emu --link /tmp/urg --control /tmp/urg.ctl --room 4,3 --post 1,0.5,0.1
     tickrig ctl /tmp/urg.ctl set pose 0.5 0 1.57
     tickrig ctl /tmp/urg.ctl set post 1 0 0.2
-    printf '0 send VV\\n1 expect 00P within 10ms' | urg-emu --scenario -
+    printf '0 send VV\\n1ms expect 00P within 10ms' | urg-emu --scenario -
 
     \b
     Completion of options in the shell:
