@@ -186,7 +186,7 @@ class DictionaryPanel(Panel):
 
     def _may_send(self) -> bool:
         if not self.session.armed:
-            self.notify("not armed: nothing is sent; A arms")
+            self.notify("not armed: nothing is sent; A arms", markup=False)
         return self.session.armed
 
     def _title(self) -> str:

@@ -210,7 +210,7 @@ class GraphPanel(Panel):
             write_graph(path, series, view, PICTURE)
         except click.ClickException as error:
             raise ValueError(error.message) from None
-        self.notify(f"{path} is written")
+        self.notify(f"{path} is written", markup=False)
 
     def _state(self) -> str:
         graph = self.graph

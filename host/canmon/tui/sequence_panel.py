@@ -129,7 +129,7 @@ class SequencePanel(Panel):
         if sequence is None:
             return
         if not self.session.armed:
-            self.notify("not armed: nothing is sent; A arms")
+            self.notify("not armed: nothing is sent; A arms", markup=False)
             return
         self._steps = []
         with self.session.lock:
@@ -220,7 +220,7 @@ class SequencePanel(Panel):
             Path(text).write_text(self.texts[self.number], "utf-8")
         except OSError as error:
             raise ValueError(f"{text}: {error.strerror}") from None
-        self.notify(f"{text} is written")
+        self.notify(f"{text} is written", markup=False)
 
     def _called(self) -> str:
         return sequence_name(self.texts[self.number], self.number + 1)

@@ -139,7 +139,8 @@ class TransmitPanel(Panel):
             with self.session.lock:
                 act(self.chosen)
         except ValueError as error:
-            self.notify(f"{error}; A arms" if not self.session.armed else str(error))
+            how = "" if self.session.armed else "; A arms"
+            self.notify(f"{error}{how}", markup=False)
         self.look()
 
     def _add(self, text: str) -> None:

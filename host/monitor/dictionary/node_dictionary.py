@@ -9,7 +9,7 @@ from tickrig.host.monitor.decode.memory import Entry, NodeMemory
 from tickrig.host.monitor.decode.transfer import Outcome, Transfer, write_entry
 from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
 from tickrig.wire.canopen.abort import describe_abort
-from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 
 FIRST_OBJECT: Final = 0x1000
 """Below it are data types (CiA 301, structure of the object dictionary)."""
@@ -81,7 +81,7 @@ class NodeDictionary:
     def _mapped(self, kind: str) -> dict[str, Entry]:
         """Return what is mapped to a PDO, by the names that the decoder gives."""
         index = MAPPINGS[kind[:4]] + int(kind[4:]) - 1
-        count = self.memory.number(index, 0) or 0
+        count = min(self.memory.number(index, 0) or 0, MAX_MAPPED_OBJECTS)
         found = (
             MappedObject.parse(self.memory.number(index, sub + 1) or 0) for sub in range(count)
         )
