@@ -32,7 +32,10 @@ def newest(port: InPort[T]) -> T | None:
 
 def sound(*numbers: float) -> bool:
     """Return whether these are numbers of a cart: not NaN, infinite or beyond `MOST`."""
-    return all(-MOST <= number <= MOST for number in numbers)
+    for number in numbers:  # noqa: SIM110 - all() takes twice as long
+        if not -MOST <= number <= MOST:
+            return False
+    return True
 
 
 def to_pose(data: Pose2D) -> Pose | None:
