@@ -30,6 +30,8 @@ def connect(
     Raises:
         RtcRefused: ports that do not fit, are joined already, or properties that cannot be.
     """
+    if first is second:
+        raise RtcRefused(f"{first.full_name} is one port; a connector joins two")
     if first.connector_to(second):
         message = f"{first.full_name} and {second.full_name} are connected"
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)

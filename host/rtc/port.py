@@ -128,7 +128,8 @@ class Port(Generic[C]):
 
     def connector_to(self, other: AnyPort) -> C | None:
         """Return the connector that joins it with another port, if there is one."""
-        return next((own for own in self.connectors if own in other.connectors), None)
+        shared = (own for own in self.connectors if own in other.connectors)
+        return next(shared, None) if other is not self else None
 
     def disconnect_all(self) -> None:
         """End all its connectors."""

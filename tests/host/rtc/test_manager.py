@@ -227,6 +227,15 @@ def test_disconnect_ends_a_connector_and_only_once() -> None:
     assert chain.numbers == [1]
 
 
+def test_a_port_is_neither_connected_with_itself_nor_disconnected_from_itself() -> None:
+    manager = Chain().manager
+    with pytest.raises(RtcRefused, match="ConsoleIn0.out is one port; a connector joins two"):
+        manager.connect("ConsoleIn0.out", "ConsoleIn0.out")
+    with pytest.raises(RtcRefused, match="are not connected"):
+        manager.disconnect("ConsoleIn0.out", "ConsoleIn0.out")
+    assert len(manager.connectors) == 1
+
+
 def test_a_value_that_waits_makes_the_manager_due_now() -> None:
     chain = Chain(subscription_type="new")
     chain.manager.run_to(1_500)
