@@ -15,6 +15,7 @@ from tickrig.host.motion.iis.running_information import RunningInformation
 from tickrig.host.motion.ports import arrived, to_pose_2d
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 SECOND_US = 1_000_000
 WIDE = {"dataport.buffer.length": "64"}
@@ -32,10 +33,9 @@ class IisCart:
         for first, second in (
             ("Goal0.position", "OmniTo2WD.goal"),
             ("Goal0.min_path", "Navigation.min_path"),
-            ("Path0.min_path", "Navigation.min_path"),
+            ("Path0.target_path", "PathFollower.target_path"),
             ("Odometry.OdometryPosition", "Path0.position"),
             ("Odometry.OdometryPosition", "Info0.position"),
-            ("Navigation.status", "Path0.status"),
         ):
             manager.connect(first, second, WIDE)
         self.loop.activate("tuned")
@@ -103,6 +103,20 @@ def test_a_new_path_replaces_the_old_one_while_it_is_driven() -> None:
     cart.run(2)
     cart.feed("Path0.path", path(Pose(), Pose(1.0, 0.0)))
     assert cart.run(8).distance(Pose(1.0)) < 0.005
+
+
+def test_a_cart_backs_up_where_the_speed_is_negative() -> None:
+    cart = IisCart()
+    velocities = cart.listen("Info0.velocity", iis.TimedVelocity2D)
+    back = iis.TimedPath2DSeq(
+        pose=path(Pose(), Pose(-0.5)).pose, velocity=(Velocity2D(), Velocity2D(vx=-0.2))
+    )
+    cart.feed("Path0.path", back)
+    cart.run(2)
+    assert list(arrived(velocities))[-1].data.vx == pytest.approx(-0.2, abs=0.01)
+    end = cart.run(4)
+    assert end.distance(Pose(-0.5)) < 0.005
+    assert abs(end.heading) < 0.01
 
 
 def test_running_information_is_told_every_10_ms() -> None:
