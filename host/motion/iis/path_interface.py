@@ -77,6 +77,7 @@ class PathInterface(RtComponent):
         self._points: list[WayPoint] = []
         self._line, self._at, self._speed = Pose(), 0, 0.0
         self._stage, self._fresh = Stage.IDLE, False
+        self._order: Path | None = None
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin without a path."""
@@ -91,6 +92,9 @@ class PathInterface(RtComponent):
         latest = newest(self.position)
         if latest is not None and (pose := to_pose(latest.data)) is not None:
             self._judge(now, pose)
+        if self._order is not None:
+            self.target_path.write(self._order)
+            self._order = None
         return ReturnCode.RTC_OK
 
     def _take(self, now: Time, path: iis.TimedPath2DSeq) -> None:
@@ -103,7 +107,7 @@ class PathInterface(RtComponent):
         self._points = [WayPoint(*pair) for pair in zip(poses, speeds, strict=True)]
         self._fresh = len(poses) > 1
         if not self._fresh:
-            self._send(now, RunMode.STOP, Pose())
+            self._command(now, RunMode.STOP, Pose())
         for pose in poses[:1]:
             self._tell(now, pose, PASSED if self._fresh else STOPPED)
 
@@ -139,7 +143,7 @@ class PathInterface(RtComponent):
 
     def _turn(self, now: Time, stage: Stage, line: Pose) -> None:
         self._stage, self._line, self._speed = stage, line, 0.0
-        self._send(now, RunMode.SPIN, line, w=1.0)
+        self._command(now, RunMode.SPIN, line, w=1.0)
 
     def _drive(self, now: Time, pose: Pose) -> None:
         """Drive on, no faster than the cart can brake before the way point."""
@@ -148,21 +152,24 @@ class PathInterface(RtComponent):
         way = copysign(1.0, wanted) if wanted else 1.0
         left = -way * self._line.along(pose) - self.goal_distance.value
         if left < 0:
-            self._send(now, RunMode.STOP, Pose())
+            self._command(now, RunMode.STOP, Pose())
             self._tell(now, self._points[self._at].pose, PASSED)
             self._next(now, pose)
             return
         can = sqrt(2 * self.braking.value * max(0.0, left - self._speed * self.latency.value))
         self._speed = min(most, max(can, self.creep_vel.value))
-        self._send(now, RunMode.LINEFOLLOW, self._line, v=way * self._speed)
+        self._command(now, RunMode.LINEFOLLOW, self._line, v=way * self._speed)
 
     def _finish(self, now: Time) -> None:
         self._stage = Stage.IDLE
-        self._send(now, RunMode.STOP, Pose())
+        self._command(now, RunMode.STOP, Pose())
         self._tell(now, self._points[-1].pose, STOPPED)
 
-    def _send(self, now: Time, mode: RunMode, line: Pose, v: float = 0.0, w: float = 0.0) -> None:
-        self.target_path.write(Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now))
+    def _command(
+        self, now: Time, mode: RunMode, line: Pose, v: float = 0.0, w: float = 0.0
+    ) -> None:
+        """Tell the follower; it takes one message a period, so the last one counts."""
+        self._order = Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now)
 
     def _tell(self, now: Time, point: Pose, flag: int) -> None:
         data = to_pose_2d(point._replace(heading=positive(point.heading)))

@@ -82,6 +82,13 @@ def test_the_last_way_point_is_told_with_the_flag_when_it_stops() -> None:
     assert on.after("target_path", "position", at(2, 0.999)) == []
 
 
+def test_the_follower_has_one_message_a_period() -> None:
+    on = bench()
+    on.feed("path", way(START, START, CORNER, END))
+    counts = [len(on.after("target_path", "position", at(x))) for x in (0, 0, 1, 1.999, 1.999)]
+    assert counts == [1, 1, 1, 1, 0]
+
+
 def test_headings_are_told_in_0_to_2_pi() -> None:
     on = bench()
     on.feed("path", way(START, END))
