@@ -14,8 +14,8 @@ from tickrig.host.canmon.check_options import read_rules, rule_options
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import bit_rate_of, listen, patience_us, span_option
 from tickrig.host.canmon.source import Source, explain_sources, open_source
-from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
@@ -71,6 +71,7 @@ def command(
     verdict = Verdict(jsonl)
     try:
         if log is not None:
+            verdict.frames = len(log.columns)
             verdict.take(_at_once(log, rules, bit_rate))
         else:
             checker = Checker(rules, bit_rate)
@@ -78,7 +79,8 @@ def command(
     finally:
         frames.close()
     _write(report_path, junit(" ".join(words), rules.names(), verdict.findings))
-    click.echo(verdict.summary(), err=True)
+    if not frames.failed:
+        click.echo(verdict.summary(), err=True)
     report(frames, strict)
     if verdict.findings:
         click.get_current_context().exit(BROKEN)
@@ -89,10 +91,12 @@ class Verdict:
 
     Attributes:
         findings: all of them.
+        frames: how many were held against the rules.
     """
 
     def __init__(self, jsonl: bool) -> None:
         self.findings: list[Finding] = []
+        self.frames = 0
         self._text = finding_json if jsonl else str
 
     def take(self, findings: Sequence[Finding]) -> None:
@@ -105,7 +109,7 @@ class Verdict:
     def summary(self) -> str:
         """Say how it ended."""
         if not self.findings:
-            return "all rules hold"
+            return "all rules hold" + ", but there were no frames" * (not self.frames)
         rules = Counter(finding.rule for finding in self.findings)
         counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(rules.items()))
         return f"{len(self.findings)} findings: {counts}"
@@ -146,6 +150,7 @@ def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int
 
     def take(heards: Sequence[Heard]) -> None:
         watch.take(heards)
+        verdict.frames += len(heards)
         verdict.take([finding for heard in heards for finding in checker.take(heard)])
 
     with until_interrupted():

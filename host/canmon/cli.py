@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 import click
 
 from tickrig import __version__
+from tickrig.host.canmon.unread import until_unread
 
 VERBS: Final[dict[str, str]] = {
     "dump": "dump",
@@ -41,6 +42,11 @@ class LazyGroup(click.Group):
         command = module.command
         assert isinstance(command, click.Command)
         return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a verb; it ends when nobody reads what it prints."""
+        with until_unread():
+            return super().invoke(ctx)
 
 
 @click.group(cls=LazyGroup)

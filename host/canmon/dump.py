@@ -23,7 +23,8 @@ from tickrig.host.canmon.meaning import Meaning, Meant
 from tickrig.host.canmon.printer import Output, printer_of
 from tickrig.host.canmon.source import AnySource, explain_sources, open_any
 from tickrig.host.canmon.source_word import LineWord, parse_source
-from tickrig.host.canmon.stdout import Printed, until_unread
+from tickrig.host.canmon.stdout import Printed
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused

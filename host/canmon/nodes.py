@@ -13,8 +13,8 @@ from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import listen, patience_us, span_option
 from tickrig.host.canmon.painting import paint
 from tickrig.host.canmon.source import explain_sources, open_source
-from tickrig.host.canmon.stdout import until_unread
 from tickrig.host.canmon.stopwatch import Stopwatch
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder

@@ -13,7 +13,7 @@ from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.source import log_path
-from tickrig.host.canmon.stdout import until_unread
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused

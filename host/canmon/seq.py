@@ -12,7 +12,7 @@ import click
 from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
-from tickrig.host.canmon.stdout import until_unread
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.canmon.watch import Watch
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH

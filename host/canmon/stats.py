@@ -10,7 +10,7 @@ import click
 from tickrig.host.canmon.ending import report, until_interrupted
 from tickrig.host.canmon.listening import bit_rate_of, listen, patience_us, span_option
 from tickrig.host.canmon.source import explain_sources, open_source
-from tickrig.host.canmon.stdout import until_unread
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.heard import Heard

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 from tickrig.host.canmon.meaning import Meant
 from tickrig.host.canmon.printer import CSV_HEADER, Output, Printer
@@ -29,12 +27,3 @@ class Printed:
         if lines:
             sys.stdout.write("\n".join(lines) + "\n")
             sys.stdout.flush()
-
-
-@contextmanager
-def until_unread() -> Iterator[None]:
-    """End the block quietly when nobody reads standard output any more, as before `| head`."""
-    try:
-        yield
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at exit

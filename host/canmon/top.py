@@ -25,7 +25,7 @@ from tickrig.host.canmon.listening import (
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.painting import paint
 from tickrig.host.canmon.source import AnySource, explain_sources, open_any
-from tickrig.host.canmon.stdout import until_unread
+from tickrig.host.canmon.unread import until_unread
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.top_model import TopModel

@@ -8,6 +8,7 @@ reading goes on behind it.
 from __future__ import annotations
 
 import io
+import logging
 import struct
 import zlib
 from collections.abc import Iterator
@@ -32,6 +33,9 @@ BROKEN: Final = (
     *(struct.error, zlib.error, BLFParseError, can.CanError),
 )
 """What python-can's readers raise in files that they do not understand."""
+
+UNSAID: Final = logging.NullHandler()
+"""For what python-can logs of each bad line of TRC: it is counted here."""
 
 OTHER_OBJECTS: Final = "objects that are no frames"
 
@@ -80,10 +84,16 @@ class CanLogReader:
                 else:
                     yield from can.MF4Reader(file)
             except BROKEN as error:
-                reason = " ".join(str(error).split()) or type(error).__name__
+                reason = self._why(error)
                 raise LogError(f"{self._path} is no {self._kind} log: {reason}") from error
 
+    def _why(self, error: Exception) -> str:
+        if not self._path.stat().st_size:
+            return "it is empty"
+        return " ".join(str(error).split()) or type(error).__name__
+
     def _text(self, file: BinaryIO) -> Iterator[can.Message]:
+        logging.getLogger("can.io.trc").addHandler(UNSAID)
         with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
             lines = WatchedLines(text, self._kind, self.tally)
             reader = _TEXT[self._kind](lines)

@@ -34,7 +34,7 @@ class BadLines:
     def words(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if there are none."""
         said = [
-            f"{name}: line {number} is no frame: {line!r:.{SHOWN}}" for number, line in self.first
+            f"{name}: line {number} is no frame: {line!a:.{SHOWN}}" for number, line in self.first
         ]
         if self.count > len(self.first):
             said.append(f"{name}: {self.count} lines are no frames; the first {KEPT} are shown")
