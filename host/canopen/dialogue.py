@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
 from tickrig.host.canopen.script import (
@@ -28,10 +28,8 @@ from tickrig.wire.canopen.sdo import (
     UploadInitiateResponse,
     parse_response,
 )
+from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID
 from tickrig.wire.errors import WireError
-
-SDO_REQUEST: Final = 0x600
-SDO_RESPONSE: Final = 0x580
 
 Failure = SdoFailed | StateTimeout | WrongIdentity
 Send = Callable[[int, bytes], None]
@@ -176,13 +174,19 @@ class Dialogue:
         return self._step is not None
 
     def _say(self, data: bytes) -> None:
-        self._send(SDO_REQUEST + self._node_id, data)
+        self._send(REQUEST_COB_ID + self._node_id, data)
 
 
 def _answers(ask: Ask, answer: Response) -> bool:
-    """Say whether a response is of the object that was asked for, as far as it says so."""
-    if isinstance(answer, DownloadInitiateResponse | UploadInitiateResponse):
-        return (answer.index, answer.sub) == (ask.index, ask.sub)
+    """Say whether a response is of the object that was asked for, as far as it says so.
+
+    An abort of 0000h:00 is of whatever is under way: the server could not read the request.
+    """
+    match answer:
+        case Abort(index=0, sub=0):
+            return True
+        case Abort() | DownloadInitiateResponse() | UploadInitiateResponse():
+            return (answer.index, answer.sub) == (ask.index, ask.sub)
     return True
 
 

@@ -181,3 +181,17 @@ def test_noise_ends_a_transfer_or_leaves_it_waiting(noise: list[bytes], reading:
     if talk.dialogue.job is not None:
         talk.dialogue.tick(SDO_TIMEOUT_US)
     assert talk.dialogue.job is None
+
+
+def test_an_abort_of_another_object_comes_too_late_and_is_passed_over() -> None:
+    talk = Talk(upload(0x1000, 0))
+    talk.answer(1, "8018100400000005")
+    assert talk.failure is None
+    talk.answer(2, "4300100091010700")
+    assert talk.result == bytes.fromhex("91010700")
+
+
+def test_an_abort_of_no_object_ends_what_is_under_way() -> None:
+    talk = Talk(upload(0x1000, 0))
+    talk.answer(1, "8000000001000405")
+    assert str(talk.failure).startswith("1000h:00")

@@ -138,6 +138,22 @@ def test_the_walk_through_the_life_cycle_is_that_of_the_vector() -> None:
     assert bench.state == "Inactive"
 
 
+def test_the_commands_of_the_vector_lead_where_their_rows_say() -> None:
+    rows = json.loads(GOLDEN.read_text("utf-8"))["nmt"]
+    said = []
+    for row in rows:
+        bench = RtcBench().enter("Active" if row["data"].startswith("80") else "Inactive")
+        sent = bench.step(f"{row['id']}#{row['data'].replace(' ', '')}")
+        said.append((row["note"], sent, bench.state))
+    assert said == [
+        ("start all", PDO, "Active"),
+        ("stop node 16", [], "Error"),
+        ("enter pre-operational node 16", [], "Inactive"),
+        ("reset node 16", BOOT_UP, "Inactive"),
+        ("reset communication node 16", BOOT_UP, "Inactive"),
+    ]
+
+
 @pytest.mark.parametrize("state", ["Inactive", "Active", "Error"])
 def test_a_command_to_all_nodes_acts_by_the_state_of_each(state: str) -> None:
     bench = RtcBench().enter(state)
