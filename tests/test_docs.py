@@ -25,6 +25,7 @@ def blocks(page: str, language: str) -> list[str]:
     [
         "README.md",
         "docs/canmon-decode.md",
+        "docs/canmon-logs.md",
         "docs/canmon-model.md",
         "docs/canopen.md",
         "docs/device-rtc.md",
