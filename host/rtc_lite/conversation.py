@@ -6,7 +6,7 @@ import logging
 from typing import Final
 
 from tickrig.host.link import Link
-from tickrig.host.rtc_lite.frame_link import FrameLink
+from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
 from tickrig.host.rtc_lite.rtno_link import RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
@@ -29,6 +29,9 @@ POLL_US: Final = 1_000
 
 PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
+
+FAULTS: Final = frozenset(FAULT_COMMANDS)
+"""What stands in the place of a status when a device could not read a request."""
 
 RETRIES: Final = 3
 """For requests that may be repeated (DECISION L13)."""
@@ -96,11 +99,18 @@ class Conversation:
         return reply
 
     def insist(self, command: Command) -> Reply | None:
-        """Send a request until it is answered, 4 times at most; a missing reply has no effect."""
-        for _ in range(1 + RETRIES):
-            if (reply := self._exchange(command)) is not None:
-                return reply
-        return None
+        """Send a request until it is answered, 4 times at most; a missing reply has no effect.
+
+        A fault is no answer: what was on the line before has spoilt the request.
+        """
+        reply = self._exchange(command)
+        for _ in range(RETRIES):
+            if reply is not None and reply.status not in FAULTS:
+                break
+            if reply is not None:
+                self.listen(SILENCE_US)
+            reply = self._exchange(command)
+        return reply
 
     def post(self, command: Command, data: bytes = b"") -> None:
         """Send a request and wait for nothing."""

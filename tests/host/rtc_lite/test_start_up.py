@@ -55,6 +55,17 @@ def test_a_profile_says_what_the_device_is() -> None:
     assert [port.name for port in proxy.profile.port_profiles] == ["Echo0.in", "Echo0.out"]
 
 
+@pytest.mark.parametrize("noise", [b"\nZz", b"\nAA", b"\nPS\x02", b"\nPS\x0f\x2d", b"\n"])
+def test_half_a_frame_that_was_on_the_line_before_does_not_prevent_a_start_up(
+    noise: bytes,
+) -> None:
+    bench = Bench(Echo)
+    bench.links[0].send(noise)
+    bench.rig.run_for(10_000)
+    bench.attach(0, "Echo")
+    assert bench.nodes[0].read("state") == "Inactive"
+
+
 def test_questions_are_asked_4_times() -> None:
     link = ScriptedNode()
     link.answers[Command.STATE] = []
