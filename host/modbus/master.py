@@ -8,7 +8,13 @@ from typing import Final
 
 from tickrig.host.link import Link
 from tickrig.wire.errors import WireError
-from tickrig.wire.modbus.requests import ERROR_BIT, ExceptionCode, Request, encode_request
+from tickrig.wire.modbus.requests import (
+    ERROR_BIT,
+    ExceptionCode,
+    Request,
+    encode_request,
+    encode_response,
+)
 from tickrig.wire.modbus.rtu import MAX_FRAME_BYTES, encode_frame, parse_frame
 
 TIMEOUT_US: Final = 20_000
@@ -35,6 +41,9 @@ class Answer:
 class ModbusMaster:
     """Asks one slave; one request is on its way at a time.
 
+    On a line with echo it passes over what it said itself. A late answer is taken for that
+    to the next request, if it has its shape.
+
     pymodbus and minimalmodbus wait on the machine's clock and cannot wait on a rig's; so
     the master is ours, over the codec that the slave uses too, and they judge the slave.
 
@@ -57,7 +66,8 @@ class ModbusMaster:
         self._timeout_us, self._retries = timeout_us, retries
         self.pending: Request | None = None
         self.misses = self.lost = 0
-        self._received, self._tries, self._until_us = b"", 0, 0
+        self._sent = self._received = b""
+        self._tries = self._until_us = 0
 
     def begin(self, request: Request) -> None:
         """Make a request; what was on its way is given up.
@@ -92,7 +102,8 @@ class ModbusMaster:
     def _send(self, request: Request) -> None:
         self._link.receive(0)
         self._received = b""
-        self._link.send(encode_frame(self._address, encode_request(request)))
+        self._sent = encode_frame(self._address, encode_request(request))
+        self._link.send(self._sent)
         self._until_us = self._link.now_us + self._timeout_us
 
     def _miss(self, request: Request) -> None:
@@ -105,8 +116,11 @@ class ModbusMaster:
             self.misses += 1
 
     def _parse(self, request: Request) -> Answer | None:
+        frame = self._received
+        if len(frame) > len(self._sent) and frame.startswith(self._sent):
+            frame = frame[len(self._sent) :]  # the adapter hears what it says
         try:
-            address, message = parse_frame(self._received)
+            address, message = parse_frame(frame)
         except WireError:
             return None
         if address != self._address or message[0] & ~ERROR_BIT != request.function:
@@ -114,7 +128,7 @@ class ModbusMaster:
         if message[0] & ERROR_BIT:
             return Answer(request, refusal=_code(message[1]))
         if request.read is None:
-            return Answer(request)
+            return Answer(request) if message == encode_response(request) else None
         count = request.read[1]
         if len(message) != 2 + 2 * count:
             return None

@@ -54,8 +54,8 @@ class Slave:
 class Bench:
     """A master and a slave on a line of two wires."""
 
-    def __init__(self, seed: int = 0) -> None:
-        line = Rs485Line(115_200)
+    def __init__(self, seed: int = 0, *, echo: bool = False) -> None:
+        line = Rs485Line(115_200, echo=echo)
         self.port = FaultyPort(line.a, BYTE_FAULTS, seed)
         self.rig = Rig(Station(Slave(), self.port))
         self.link = SimLink(self.rig, line.b)
@@ -89,6 +89,7 @@ class Script:
         self.now_us = NEVER
 
 
+@pytest.mark.parametrize("echo", [False, True])
 @pytest.mark.parametrize(
     ("request_", "values"),
     [
@@ -98,8 +99,23 @@ class Script:
         (Request(READ_WRITE, (0, 2), (0, (5,))), (5, 8)),
     ],
 )
-def test_each_function_is_answered(request_: Request, values: tuple[int, ...]) -> None:
-    assert Bench().answers(request_) == [Answer(request_, values)]
+def test_each_function_is_answered(
+    request_: Request, values: tuple[int, ...], *, echo: bool
+) -> None:
+    assert Bench(echo=echo).answers(request_) == [Answer(request_, values)]
+
+
+def test_an_echo_is_no_answer() -> None:
+    link = Script()
+    master = ModbusMaster(link)
+    for request in (
+        READ_TWO,
+        Request(WRITE, write=(0, (5,))),
+        Request(READ_WRITE, (0, 2), (0, (5,))),
+    ):
+        master.begin(request)
+        link.waiting = link.sent[-1]
+        assert master.poll() is None
 
 
 def test_a_refusal_is_an_answer() -> None:
