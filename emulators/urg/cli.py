@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final
 
 import click
@@ -11,6 +12,7 @@ from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
 from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.serial_options import line_options
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
 from tickrig.emulators.trace import Mark
@@ -27,6 +29,9 @@ from tickrig.host.cli.refused import Refused
 
 USB_BAUD: Final = 12_000_000
 """As fast as USB at full speed."""
+
+BUFFER_BYTES: Final = 16_384
+"""Room for several whole scans at once."""
 
 _WORLD: Final = add_options(
     click.option("--room", "size", metavar="WIDTH,DEPTH", help="Four walls around the origin, m."),
@@ -75,7 +80,7 @@ def main(context: click.Context, /, serial: str, noise: float, baud: int, **opti
         world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
     except ValueError as error:
         raise Refused(str(error)) from None
-    line = LineKind(baud)
+    line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
     kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=_talk)
     config = config_to_trace(parameters, world)
     run = SerialRun(kind, Urg(parameters, world), config, Options(**options))

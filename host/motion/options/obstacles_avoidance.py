@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Twist
 from tickrig.host.motion.limiter import Limits
@@ -13,7 +13,8 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDouble
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
-ANY: float = 1e9
+ANY: Final = 1e9
+"""A limit that limits nothing."""
 
 
 class ObstaclesAvoidance(RtComponent):

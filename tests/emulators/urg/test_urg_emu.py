@@ -39,6 +39,11 @@ def test_a_scenario_is_played_in_virtual_time() -> None:
     assert emu(*words, text=SCENARIO).stdout == result.stdout
 
 
+def test_whole_scans_at_once_find_room_on_the_line() -> None:
+    text = "0 send BM\n1ms send GD0000076800\n2ms send MD0000076800001\n300ms end"
+    assert emu("--scenario", "-", text=text).stderr == "ran 0.300 s; bytes lost: 0\n"
+
+
 def test_a_recorded_scenario_replays_identically(tmp_path: Path) -> None:
     trace = tmp_path / "run.trace"
     words = (*WORLD, "--noise", "1", "--seed", "7", "--fault", "flip=0.001")
