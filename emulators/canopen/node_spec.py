@@ -10,8 +10,8 @@ from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.user_file import SUFFIX
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.user_file import SUFFIX
 
 LSS: Final = "lss"
 """Instead of a node-ID: the node waits for LSS to give it one."""

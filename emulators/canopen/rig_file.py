@@ -12,8 +12,8 @@ from tickrig.emulators.canopen.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
 from tickrig.emulators.canopen.profiles import CHOICES
-from tickrig.emulators.user_file import SUFFIX
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.user_file import SUFFIX
 
 NODE_KEYS: Final = ("id", "eds", "model", "rtc", "profile")
 DEVICE_KEYS: Final = ("eds", "model", "rtc")

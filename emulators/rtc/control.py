@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from tickrig.emulators.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
-from tickrig.emulators.user_file import told
+from tickrig.host.cli.user_file import told
 from tickrig.host.rtc.configuration import Configuration
 from tickrig.host.rtc.literal import literal
 from tickrig.host.rtc.manager import DEFAULT_RATE_HZ, Manager

@@ -17,8 +17,8 @@ from tickrig.emulators.rtc.system_file import file_format, read_system, write_sy
 from tickrig.emulators.run import say
 from tickrig.emulators.serving_clock import ServingClock
 from tickrig.emulators.signals import stopped_by_signals
-from tickrig.emulators.user_file import find_class, told
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.manager import Manager

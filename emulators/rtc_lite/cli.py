@@ -16,9 +16,9 @@ from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
 from tickrig.emulators.serial_options import line_options
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.user_file import told
 from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.user_file import told
 from tickrig.wire.rtc_lite.codes import Command, ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
 from tickrig.wire.rtc_lite.framing import Framing

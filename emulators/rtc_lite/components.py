@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.relays import Echo, LiteA, LiteB
-from tickrig.emulators.user_file import SUFFIX, find_class, told
+from tickrig.host.cli.user_file import SUFFIX, find_class, told
 
 COMPONENTS: Final[Mapping[str, type[Component]]] = MappingProxyType(
     {"echo": Echo, "lite-a": LiteA, "lite-b": LiteB}

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.device.chance import Chance, threshold_of
+from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.faults import Fault, FaultKind
 from tickrig.wire.rtc_lite.codes import Command
 

@@ -22,7 +22,8 @@ PROGRAM = (
     "from tickrig.host.rtc_canopen.commands.server import main;"
     " main(prog_name='rtc-canopen-server')"
 )
-EDS = Path(__file__).parents[2] / "examples" / "eds"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+EDS = EXAMPLES / "eds"
 DEFINITION = f"""
 nodes:
 - {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device, heartbeat_ms: 1000}}
@@ -30,6 +31,7 @@ nodes:
 pdo_links: [{{from: 16.tpdo2, to: 32.rpdo2}}]
 start: {{order: [32, 16], autoactivate: true}}
 """
+HEARTBEAT = "role: device\n  heartbeat_ms: 1000"
 PATIENCE_S = 60.0
 
 
@@ -37,7 +39,6 @@ class Server:
     """A running server, and the events that it tells."""
 
     def __init__(self, bus: Bus, file: Path) -> None:
-        file.write_text(DEFINITION, "utf-8")
         words = [str(file), *bus.arguments, "--quiet", "--log", "-"]
         self.process = subprocess.Popen(
             [sys.executable, "-u", "-c", PROGRAM, *words],
@@ -84,7 +85,9 @@ def nodes(bus: Bus) -> Iterator[Slave]:
 
 @pytest.fixture
 def server(bus: Bus, nodes: Slave, tmp_path: Path) -> Iterator[Server]:
-    server = Server(bus, tmp_path / "robot.yaml")
+    file = tmp_path / "robot.yaml"
+    file.write_text(DEFINITION, "utf-8")
+    server = Server(bus, file)
     yield server
     server.end(signal.SIGKILL)
 
@@ -101,3 +104,22 @@ def test_nodes_are_set_up_started_lost_and_found(nodes: Slave, server: Server) -
     server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
     assert server.end() == 0
     nodes.wait_for("32/state", "Pre-operational")
+
+
+def test_the_motor_of_fig_120_follows_though_the_server_is_killed(
+    bus: Bus, nodes: Slave, tmp_path: Path
+) -> None:
+    text = (EXAMPLES / "rtc_canopen" / "fig120.yaml").read_text("utf-8")
+    text = text.replace("../eds", str(EDS)).replace("role: device", HEARTBEAT)
+    (tmp_path / "fig120.yaml").write_text(text, "utf-8")
+    server = Server(bus, tmp_path / "fig120.yaml")
+    try:
+        server.wait_for("PdoLinked", 32)
+        server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+        nodes.wait_for("16/state", "Operational")
+    finally:
+        server.end(signal.SIGKILL)
+    nodes.set("16/ai1_v", 2.5)
+    nodes.wait_for("32/0x6411:1", 16_384)
+    nodes.wait_for("32/0x2001", 3)  # on, reached
+    assert abs(nodes.get("32/angle_deg") - 90) < 0.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from tickrig.host.rtc_canopen.commands.opening import (
     STANDARD_OUTPUT,
     BusFailed,
     bus_of,
+    component_option,
+    furnish,
     log_listener,
     open_link,
     read_server,
@@ -27,9 +30,12 @@ from tickrig.wire.can_error import ErrorState
 @click.command(cls=BusCommand)
 @click.argument("file", type=PATH)
 @bus_options
+@component_option
 @click.option("--log", type=PATH, help="File for the events, a line of JSON each.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
-def main(file: Path, log: Path | None, *, start: bool, **options: Any) -> None:
+def main(
+    file: Path, log: Path | None, components: Sequence[str], *, start: bool, **options: Any
+) -> None:
     """Serve a System Definition, and show and change it while it runs (extra tickrig[tui]).
 
     The same server as rtc-canopen-server, on a terminal: nodes and proxies, their
@@ -39,6 +45,7 @@ def main(file: Path, log: Path | None, *, start: bool, **options: Any) -> None:
     \b
     rtc-canopen-editor robot.yaml
     rtc-canopen-editor robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
+    rtc-canopen-editor robot.yaml --component Logger0=parts.py:Logger
     """  # noqa: D301 - click wants the backspace
     try:
         from tickrig.host.rtc_canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
@@ -48,7 +55,7 @@ def main(file: Path, log: Path | None, *, start: bool, **options: Any) -> None:
 
     if log == STANDARD_OUTPUT:
         raise Refused("--log -: the screen is on standard output; name a file")
-    server = read_server(file)
+    server = read_server(file, components)
     if not sys.stdout.isatty():
         raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
     with ExitStack() as stack:
@@ -59,7 +66,7 @@ def main(file: Path, log: Path | None, *, start: bool, **options: Any) -> None:
             session.bus_state(state)
 
         link, name = open_link(bus, bus_state, stack)
-        session = Session(server, file, link, listeners=listeners)
+        session = Session(server, file, link, lambda other: furnish(other, components), listeners)
         if start:
             server.start()
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Final, TextIO
 import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.link import Link
+from tickrig.host.rtc.component import RtComponent
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
@@ -28,24 +31,58 @@ ECHOING: Final = ("udp_multicast",)
 STANDARD_OUTPUT: Final = Path("-")
 
 
+component_option: Final[Decorator] = click.option(
+    "--component",
+    "components",
+    multiple=True,
+    metavar="NAME=FILE.py:Class",
+    help="An RT component beside the proxies, Active at once; may be repeated.",
+)
+
+
 class BusFailed(click.ClickException):
     """One line on standard error, and exit status 3."""
 
     exit_code = 3
 
 
-def read_server(file: Path) -> Server:
-    """Make the server of a System Definition; Refused if that or an EDS cannot be used."""
+def read_server(file: Path, components: Sequence[str]) -> Server:
+    """Make the server of a System Definition, with components; Refused if one cannot be used."""
     try:
         from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - canopen is slow
     except ModuleNotFoundError as error:
         raise Refused(f"{error}: pip install 'tickrig[rtc]'") from None
     try:
-        return open_server(file)
+        server = open_server(file)
+        furnish(server, components)
     except OSError as error:
         refuse_path("file", error)
     except ValueError as error:
         raise Refused(str(error)) from None
+    return server
+
+
+def furnish(server: Server, words: Sequence[str]) -> None:
+    """Put components of users' files beside the proxies.
+
+    Args:
+        server: they run at the rate of its proxies.
+        words: as `Logger0=parts.py:Logger`.
+
+    Raises:
+        ValueError: one cannot be.
+    """
+    for word in words:
+        name, equals, spec = word.partition("=")
+        if not (name and equals):
+            raise ValueError(f"--component {word!r} is not NAME=FILE.py:Class")
+        file = spec.rpartition(":")[0]
+        try:
+            component = find_class(spec, RtComponent)(name)
+            server.manager.add(component, server.definition.master.rate_hz)
+            server.manager.activate(name)
+        except Exception as error:  # a user's file may raise anything
+            raise ValueError(f"--component {name}: {told(error, file)}") from error
 
 
 def open_link(

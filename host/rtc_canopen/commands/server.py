@@ -20,6 +20,7 @@ from tickrig.host.link import NEVER, Link
 from tickrig.host.rtc_canopen.commands.opening import (
     BusFailed,
     bus_of,
+    component_option,
     log_listener,
     open_link,
     read_server,
@@ -35,6 +36,7 @@ ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 @click.command(cls=BusCommand)
 @click.argument("file", type=PATH)
 @bus_options
+@component_option
 @click.option("--log", type=PATH, help="File for the events, a line of JSON each (- is stdout).")
 @click.option("--for", "span", metavar="TIME", help="End after 90s, 500ms; else at Ctrl-C.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
@@ -51,10 +53,11 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     \b
     rtc-canopen-server robot.yaml
     rtc-canopen-server robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
+    rtc-canopen-server robot.yaml --component Logger0=parts.py:Logger
     rtc-canopen-server robot.yaml --check
     """  # noqa: D301 - click wants the backspace
     span_us = _span_us(span)
-    server = read_server(file)
+    server = read_server(file, options.pop("components"))
     definition = server.definition
     if options.pop("check"):
         click.echo(f"{file}: {len(definition.nodes)} nodes, no mistake found")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.link import Link
-from tickrig.host.rtc.manager import Manager
 from tickrig.host.rtc_canopen.definition_file import save_definition
 from tickrig.host.rtc_canopen.events import Listener
 from tickrig.host.rtc_canopen.serve import open_server
@@ -21,7 +20,7 @@ from tickrig.wire.can_error import ErrorState
 LONGEST_US: Final = 10_000
 """So soon is done what was asked for."""
 
-Populate = Callable[[Manager], None]
+Furnish = Callable[[Server], None]
 """Puts components of others beside the proxies."""
 
 
@@ -34,7 +33,7 @@ class Session:
         server: the server.
         path: its System Definition.
         link: the bus.
-        populate: puts more components into the manager of each server.
+        furnish: puts more components into each server that is loaded.
         listeners: told the events of each server.
 
     Attributes:
@@ -48,16 +47,16 @@ class Session:
         server: Server,
         path: Path,
         link: Link[Frames],
-        populate: Populate = lambda manager: None,
+        furnish: Furnish = lambda server: None,
         listeners: tuple[Listener, ...] = (),
     ) -> None:
         self.lock, self.path, self._folder = threading.RLock(), path, path.parent
-        self._link, self._populate, self._listeners = link, populate, listeners
+        self._link, self._furnish, self._listeners = link, furnish, listeners
         self._leaving: Frames = ()
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "server")
         self._thread: Future[None] | None = None
         self.server = server
-        self._furnish()
+        server.log.listeners += listeners
 
     @property
     def view(self) -> ServerView:
@@ -83,10 +82,11 @@ class Session:
             OSError: it cannot be read.
         """
         server = open_server(path)
+        self._furnish(server)
+        server.log.listeners += self._listeners
         with self.lock:
             self._leaving += self.server.stop(self.server.now_us)
             self.server, self.path, self._folder = server, path, path.parent
-            self._furnish()
 
     def save(self, path: Path) -> None:
         """Save the definition with connections and links as they are now; OSError if it cannot."""
@@ -121,10 +121,6 @@ class Session:
         if self._thread is not None:
             self._thread.result()
         self._link.send((*self._leaving, *self.server.stop(self._link.now_us)))
-
-    def _furnish(self) -> None:
-        self.server.log.listeners += self._listeners
-        self._populate(self.server.manager)
 
     def _run(self) -> None:
         while not self._stop.is_set():

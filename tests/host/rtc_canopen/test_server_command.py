@@ -9,8 +9,11 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.host.rtc_canopen.bench import EDS
+from tests.host.rtc_canopen.bench import EDS, SYSTEMS
+from tickrig.host.rtc import LifeCycleState
+from tickrig.host.rtc_canopen.commands.opening import furnish
 from tickrig.host.rtc_canopen.commands.server import main
+from tickrig.host.rtc_canopen.serve import open_server
 
 PALETTE = f"nodes: [{{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}]\n"
 
@@ -60,6 +63,8 @@ def test_a_file_that_cannot_be_used_is_one_line(
     ("words", "reason"),
     [
         (("--for", "soon"), "--for: 'soon' is not a time: write 1.5s, 200ms or 250us"),
+        (("--component", "Logger0"), "--component 'Logger0' is not NAME=FILE.py:Class"),
+        (("--component", "A=none.py:B"), "--component A: none.py: No such file or directory"),
         (("-i", "carrier-pigeon"), "-i 'carrier-pigeon' is none of python-can"),
         (("-i", "virtual", "-c", "x", "--log", "/none/x"), "--log /none/x: No such file"),
     ],
@@ -84,3 +89,27 @@ def test_it_looks_for_its_nodes_on_the_bus_of_the_file(file: Path, tmp_path: Pat
     assert [message.arbitration_id for message in heard if message] == [0x77F, 0x610, 0x000]
     assert "1 nodes on virtual rtc. Ctrl-C ends." in result.stderr
     assert all(json.loads(line)["event"] for line in log.read_text("utf-8").splitlines())
+
+
+PARTS = """
+from tickrig.host.rtc_canopen.robots.joystick import Joystick as Stick
+
+class Broken(Stick):
+    def on_initialize(self):
+        raise OSError("no stick")
+"""
+
+
+def test_components_of_a_file_run_beside_the_proxies(tmp_path: Path) -> None:
+    parts = tmp_path / "parts.py"
+    parts.write_text(PARTS, "utf-8")
+    server = open_server(SYSTEMS / "fig120.yaml")
+    furnish(server, [f"Stick0={parts}:Stick", f"Stick1={parts}:Stick"])
+    server.tick(20_000, ())
+    server.tick(40_000, ())
+    states = [server.manager.state_of(name) for name in ("Stick0", "Stick1")]
+    assert states == [LifeCycleState.ACTIVE] * 2
+    with pytest.raises(ValueError, match="--component Stick0: a component 'Stick0' is there"):
+        furnish(server, [f"Stick0={parts}:Stick"])
+    with pytest.raises(ValueError, match="--component Stick2: on_initialize of Stick2 returned"):
+        furnish(server, [f"Stick2={parts}:Broken"])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
 
 from textual.pilot import Pilot
 from textual.widgets import Input
@@ -18,7 +17,7 @@ from tickrig.emulators.rig import Rig, Station
 from tickrig.host.canmon.tui.line_view import LineView, line_text
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
-from tickrig.host.rtc_canopen.editor.session import Session
+from tickrig.host.rtc_canopen.editor.session import Furnish, Session
 from tickrig.host.rtc_canopen.events import Event
 from tickrig.host.rtc_canopen.serve import open_server
 
@@ -35,15 +34,15 @@ class Desk:
         nodes: by node-ID.
     """
 
-    def __init__(self, path: Path, cast: dict[int, str], **options: Any) -> None:
+    def __init__(self, path: Path, cast: dict[int, str], furnish: Furnish) -> None:
         wire = CanWire()
         self.nodes: dict[int, Node] = {n: node(wire, n, model) for n, model in cast.items()}
         rig = Rig(*(Station(one, one.port) for one in self.nodes.values()))
         self.link = CanHost(rig, wire.end())
         self.events: list[Event] = []
-        self.session = Session(
-            open_server(path), path, self.link, listeners=(self.events.append,), **options
-        )
+        server = open_server(path)
+        furnish(server)
+        self.session = Session(server, path, self.link, furnish, (self.events.append,))
         self.app = SystemEditor(self.session, "rig")
         self.pilot: Pilot[None]
 
@@ -94,12 +93,12 @@ def at_desk(
     path: Path = FIG_120,
     cast: dict[int, str] | None = None,
     size: tuple[int, int] = (80, 24),
-    **options: Any,
+    furnish: Furnish = lambda server: None,
 ) -> None:
     """Let somebody work at a desk where all nodes have booted."""
 
     async def main() -> None:
-        desk = Desk(path, cast or CAST, **options)
+        desk = Desk(path, cast or CAST, furnish)
         async with desk.app.run_test(size=size) as pilot:
             desk.pilot = pilot
             await desk.pass_ms(700)

@@ -7,10 +7,13 @@ from pathlib import Path
 import pytest
 
 from tests.host.rtc_canopen.bench import EDS
+from tests.host.rtc_canopen.components import Knob
 from tests.host.rtc_canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.editor.question import Question
+from tickrig.host.rtc_canopen.server import Server
+from tickrig.wire.rtc_types.basic import TimedShortSeq
 
 TWO = f"""
 nodes:
@@ -387,12 +390,8 @@ def test_when_nothing_answers_the_tree_and_objects_are_empty(two: Path) -> None:
 
 
 def test_components_beside_the_proxies_are_shown_and_connected(two: Path) -> None:
-    from tests.host.rtc_canopen.components import Knob  # noqa: PLC0415
-    from tickrig.host.rtc import Manager  # noqa: PLC0415
-    from tickrig.wire.rtc_types.basic import TimedShortSeq  # noqa: PLC0415
-
-    def populate(manager: Manager) -> None:
-        manager.add(Knob("Knob0", TimedShortSeq))
+    def furnish(server: Server) -> None:
+        server.manager.add(Knob("Knob0", TimedShortSeq))
 
     async def act(desk: Desk) -> None:
         await desk.go_to("out Knob0.out")
@@ -409,4 +408,4 @@ def test_components_beside_the_proxies_are_shown_and_connected(two: Path) -> Non
         await desk.press("enter")
         assert "out Knob0.out" not in desk.shown()
 
-    at_desk(act, two, populate=populate)
+    at_desk(act, two, furnish=furnish)
