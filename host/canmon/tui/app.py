@@ -45,6 +45,8 @@ class Monitor(App[None]):
     CSS = """
     TabbedContent, ContentSwitcher, TabPane, Panel { height: 1fr; }
     TabPane { padding: 0; }
+    TabbedContent, ContentSwitcher, TabPane { visibility: hidden; }
+    ContentTabs, Panel { visibility: visible; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f1,question_mark", "help", "help", key_display="F1"),

@@ -47,7 +47,7 @@ class LineView(ScrollView, can_focus=True):
         super().__init__(id=id)
         self.lines: list[Line] = []
         self.begin, self.follows = 0, True
-        self._shown = Size(), Size()
+        self._shown_rows = 0
         self._ground = Style(), 0, 0
         self._total = 0
         self._strips: dict[Line, Strip] = {}
@@ -86,7 +86,7 @@ class LineView(ScrollView, can_focus=True):
         width = max(map(line_width, lines), default=0)
         if self.virtual_size != (size := Size(width, rounded_up(self._total))):
             self.virtual_size = size
-        self._shown = self.size, size
+        self._shown_rows = self.rows
         changed = [
             number - self.top
             for number in range(self.top, self.top + self.rows)
@@ -98,7 +98,7 @@ class LineView(ScrollView, can_focus=True):
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
         """Tell that lines came into view that are not there."""
         super().watch_scroll_y(old_value, new_value)
-        if self._shown == (self.size, self.virtual_size):  # not by another size of the window
+        if self._shown_rows == self.rows:  # else it was the window that got another size
             self.follows = self.at_end
         shown = min(self.rows, self._total - self.top)
         if self.top < self.begin or self.top + shown > self.begin + len(self.lines):
