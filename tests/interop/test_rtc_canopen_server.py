@@ -27,7 +27,7 @@ EDS = EXAMPLES / "eds"
 DEFINITION = f"""
 nodes:
 - {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device, heartbeat_ms: 1000}}
-- {{id: 32, name: Motor0, eds: {EDS}/motor-core-unit.eds, role: device, heartbeat_ms: 1000}}
+- {{id: 32, name: Motor0, eds: {EDS}/motor-core-unit.eds, role: device, heartbeat_ms: 2000}}
 pdo_links: [{{from: 16.tpdo2, to: 32.rpdo2}}]
 start: {{order: [32, 16], autoactivate: true}}
 """

@@ -68,18 +68,6 @@ class SystemEditor(App[None]):
         (0, "-narrow"),
         (130, "-wide"),
     ]
-    HELP = """
-    # System Editor
-
-    **System**: nodes with the state of the proxy, that of NMT, and how long ago the heartbeat
-    was; their PDOs and ports; components; what joins them. **Objects**: those of the node in
-    whose rows the cursor is. **Events**: the latest at the bottom.
-
-    To join two: mark a port or PDO, go to another, connect them through the PC (ports) or link
-    them without it (PDOs). To end it: go to it at the end of the system, remove it.
-
-    A click moves the cursor; a double click writes an object, or opens and folds a node.
-    """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f1,question_mark", "help", "help", key_display="F1"),
         Binding("a", "ask('activate')", "activate"),

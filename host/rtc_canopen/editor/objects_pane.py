@@ -19,6 +19,16 @@ class ObjectsPane(CursorView[Entry]):
         objects: those of the node, None without one.
     """
 
+    HELP = """
+    # Objects
+
+    Those that the EDS of the node has, in whose rows the cursor of the system is. Each is read
+    by SDO when it comes into view; while they are live, again and again. A value that changed
+    is yellow, a refusal red.
+
+    Numbers are written as 12, -2 or 0x1F, bytes as 37 02. A double click writes.
+    """
+
     def __init__(self) -> None:
         super().__init__("objects")
         self.forget()

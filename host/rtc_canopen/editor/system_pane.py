@@ -23,6 +23,17 @@ class SystemPane(CursorView[Item]):
         node_id: the node in whose rows the cursor was last; 0 for none.
     """
 
+    HELP = """
+    # System
+
+    Nodes with the state of the proxy, that of NMT, and how long ago the heartbeat was; their
+    PDOs and ports; other components; at the end what joins them.
+
+    To join two: mark a port or PDO, go to another, then connect them through the PC (ports) or
+    link them without it (PDOs). To end it: go to it at the end, and remove it.
+
+    A click moves the cursor; a double click, or one at the margin, opens and folds.
+    """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("left", "fold(True)", "fold", show=False),
         Binding("right", "fold(False)", "open", show=False),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from textual.widgets import Markdown
 
 from tests.host.rtc_canopen.bench import EDS
 from tests.host.rtc_canopen.components import Knob
@@ -363,7 +364,11 @@ def test_panes_are_side_by_side_where_there_is_room(
 def test_help_is_shown_and_hidden() -> None:
     async def act(desk: Desk) -> None:
         await desk.press("f1")
-        assert desk.app.screen.query("HelpPanel")
+        (text,) = desk.app.screen.query("HelpPanel Markdown").results(Markdown)
+        assert "mark a port or PDO" in text.source
+        await desk.press("tab")
+        await desk.pilot.pause()
+        assert "Those that the EDS of the node has" in text.source
         await desk.press("question_mark")
         assert not desk.app.screen.query("HelpPanel")
 
