@@ -7,11 +7,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Final
 
 SUB_BITS: Final = 6
 EXACT_US: Final = 1 << SUB_BITS + 1
 """Times below it have a bucket each."""
+
+KEPT: Final = 2_048
+"""Buckets whose middle need not be computed again: all there are below an hour."""
 
 
 def bucket_of(time_us: int) -> int:
@@ -31,6 +35,7 @@ def bucket_range(bucket: int) -> tuple[int, int]:
     return low, low + (1 << shift) - 1
 
 
+@lru_cache(maxsize=KEPT)
 def middle_us(bucket: int) -> int:
     """Return the time in the middle of a bucket."""
     low, high = bucket_range(bucket)
