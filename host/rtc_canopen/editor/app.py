@@ -136,8 +136,9 @@ class SystemEditor(App[None]):
             view = self.session.view
             system, events = view.system, view.events[-EVENTS_SHOWN:]
         self.system.look(system)
+        self.objects.turn_to(self.system.node_id, self.session.eds_paths)
         with self.session.lock:
-            self.objects.look(view, self.system.node_id, self.session.eds_paths)
+            self.objects.look(view)
         self.objects.paint_objects()
         marked = self.system.marked.key if self.system.marked else ""
         file = self.session.path.name
@@ -167,16 +168,16 @@ class SystemEditor(App[None]):
     def action_ask(self, what: str) -> None:
         """Ask the proxy or component under the cursor for a state."""
         if (owner := self.system.owner) is not None:
-            self._try(lambda view: ASK[what](view, owner.name))
+            self._command(lambda view: ASK[what](view, owner.name))
 
     def action_boot(self) -> None:
         """Set the node up again, also one that was refused."""
         if node_id := self.system.node_id:
-            self._try(lambda view: view.boot(node_id))
+            self._command(lambda view: view.boot(node_id))
 
     def action_start(self) -> None:
         """Activate all nodes in the start order."""
-        self._try(ServerView.start)
+        self._command(ServerView.start)
 
     def action_mark(self) -> None:
         """Mark a port or PDO, or let it go."""
@@ -189,14 +190,14 @@ class SystemEditor(App[None]):
         marked, row = self.system.marked, self.system.row
         if marked is None or row is None:
             self._refuse("mark a port or PDO first (m)")
-        elif self._try(lambda view: getattr(joining, how)(view, marked.item, row.item)):
+        elif self._command(lambda view: getattr(joining, how)(view, marked.item, row.item)):
             self.system.marked = None
             self.look()
 
     def action_remove(self) -> None:
         """End the link or connection under the cursor."""
         if (row := self.system.row) is not None:
-            self._try(lambda view: joining.remove(view, row.item))
+            self._command(lambda view: joining.remove(view, row.item))
 
     def action_read(self) -> None:
         """Read the object under the cursor again."""
@@ -220,7 +221,7 @@ class SystemEditor(App[None]):
 
         def write(words: str | None) -> None:
             if words is not None:
-                self._try(lambda view: objects.write(view, row.item, words))
+                self._command(lambda view: objects.write(view, row.item, words))
 
         question = Question(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
         self.push_screen(question, write)
@@ -240,16 +241,24 @@ class SystemEditor(App[None]):
 
     def _ask_path(self, text: str, do: Callable[[Path], None]) -> None:
         def answered(path: str | None) -> None:
-            if path and self._try(lambda view: do(Path(path))):
+            if path and self._try(lambda: do(Path(path))):
                 self.notify(f"{text}: {path}", markup=False)
 
         self.push_screen(Question(text, str(self.session.path)), answered)
 
-    def _try(self, command: Command) -> bool:
-        """Give a command; if it is refused, say why."""
-        try:
+    def _command(self, command: Command) -> bool:
+        """Give the server a command; if it is refused, say why."""
+
+        def give() -> None:
             with self.session.lock:
                 command(self.session.view)
+
+        return self._try(give)
+
+    def _try(self, do: Callable[[], object]) -> bool:
+        """Do something; if it is refused, say why."""
+        try:
+            do()
         except (RtcRefused, ServerRefused, ValueError) as error:
             return self._refuse(str(error))
         except OSError as error:

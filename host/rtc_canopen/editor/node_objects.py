@@ -41,13 +41,13 @@ class NodeObjects:
         eds: what its EDS says.
 
     Attributes:
-        name: of the device.
+        node_id: the node.
         live: those in view are read again and again.
     """
 
     def __init__(self, node_id: int, eds: EdsObjects) -> None:
-        self._node_id, self._eds = node_id, eds
-        self.name, self.live = self._eds.name, False
+        self.node_id, self._eds = node_id, eds
+        self.live = False
         self._values: dict[Entry, bytes] = {}
         self._changed: set[Entry] = set()
         self._problems: dict[Entry, str] = {}
@@ -82,7 +82,7 @@ class NodeObjects:
         for entry in (*self._wanted, *self._due(seen)):
             if len(self._reading) < AT_ONCE and entry not in self._reading:
                 self._wanted = [one for one in self._wanted if one != entry]
-                self._reading[entry] = view.read(self._node_id, *entry)
+                self._reading[entry] = view.read(self.node_id, *entry)
 
     def read(self, entry: Entry) -> None:
         """Read an object in its turn."""
@@ -96,7 +96,7 @@ class NodeObjects:
             ValueError: no value of its type.
         """
         data = encode_words(self._eds.texts[entry], words)
-        self._writing.append((entry, view.write(self._node_id, *entry, data)))
+        self._writing.append((entry, view.write(self.node_id, *entry, data)))
 
     def text_of(self, entry: Entry) -> ObjectText:
         """Return what is known of an object."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from tickrig.host.monitor.decode.eds_objects import Entry, read_eds
+from tickrig.host.monitor.decode.eds_objects import EdsError, EdsObjects, Entry, read_eds
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.node_objects import NodeObjects
 from tickrig.host.rtc_canopen.served_node import Phase
@@ -38,22 +38,33 @@ class ObjectsPane(CursorView[Entry]):
         self.objects: NodeObjects | None = None
         self._of: dict[int, NodeObjects] = {}
 
-    def look(self, view: ServerView, node_id: int, eds: Mapping[int, Path]) -> None:
-        """Turn to the objects of a node, and read those in view; node 0 is none."""
-        if not node_id:
-            self.objects, self.border_title = None, "objects"
+    def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
+        """Show the objects of a node from now on, 0 for none; reads its EDS the first time."""
+        if node_id and node_id not in self._of:
+            self._of[node_id] = _read(node_id, eds[node_id])
+        self.objects = self._of.get(node_id)
+
+    def look(self, view: ServerView) -> None:
+        """Read those in view; the server waits meanwhile."""
+        if (objects := self.objects) is None:
+            self.border_title = "objects"
             return
-        if node_id not in self._of:
-            self._of[node_id] = NodeObjects(node_id, read_eds(eds[node_id], node_id))
-        self.objects = objects = self._of[node_id]
-        node = view.node(node_id)
+        node = view.node(objects.node_id)
         if node.phase is not Phase.READY:
             objects.forget()
         answers = node.phase is Phase.READY and node.nmt_state != "STOPPED"
         objects.look(view, [row.item for row in self.in_view], answers=answers)
         live = ", live" if objects.live else ""
-        self.border_title = f"objects of {node_id} {node.name}{live}"
+        self.border_title = f"objects of {node.node_id} {node.name}{live}"
 
     def paint_objects(self) -> None:
         """Show what is known of them."""
         self.offer([] if self.objects is None else self.objects.rows)
+
+
+def _read(node_id: int, path: Path) -> NodeObjects:
+    """Return the objects of an EDS; none if it is there no more."""
+    try:
+        return NodeObjects(node_id, read_eds(path, node_id))
+    except (OSError, EdsError):
+        return NodeObjects(node_id, EdsObjects())

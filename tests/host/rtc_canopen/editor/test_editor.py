@@ -394,6 +394,20 @@ def test_when_nothing_answers_the_tree_and_objects_are_empty(two: Path) -> None:
     at_desk(act, two, {5: "f-palette"})
 
 
+def test_an_eds_that_is_gone_has_no_objects(two: Path, tmp_path: Path) -> None:
+    eds = tmp_path / "copy.eds"
+    eds.write_bytes((EDS / "f-palette.eds").read_bytes())
+    two.write_text(f"nodes: [{{id: 16, name: P, eds: {eds}}}, {{id: 32, name: M, eds: {eds}}}]\n")
+
+    async def act(desk: Desk) -> None:
+        eds.unlink()
+        await desk.go_to("32 M")
+        assert desk.shown("objects") == ""
+        assert str(desk.app.objects.border_title) == "objects of 32 M"
+
+    at_desk(act, two, {5: "f-palette"})
+
+
 def test_components_beside_the_proxies_are_shown_and_connected(two: Path) -> None:
     def furnish(server: Server) -> None:
         server.manager.add(Knob("Knob0", TimedShortSeq))
