@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.bus import Bus
@@ -87,6 +87,7 @@ def play(traffic: Traffic, *, sparse: bool) -> list[tuple[int, CanFrame]]:
     return sent + run_to(bus, now_us + 300 * TICK_US, sparse=sparse)
 
 
+@settings(max_examples=60)
 @given(TRAFFIC)
 def test_dense_and_sparse_runs_are_the_same(traffic: Traffic) -> None:
     assert play(traffic, sparse=True) == play(traffic, sparse=False)
