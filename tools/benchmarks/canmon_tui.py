@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from benchmarks.table import row
 IDS = 50
 FRAMES_S = 1_000
 SIZE = (45, 120)
-SETTLE_S = 4.0
+SETTLE_S = 3.0
 RUNS = 5
 GROUP = "ff11::7469:6d6f"
 PORT = 41_000 + os.getpid() % 1_000
@@ -44,38 +44,48 @@ time.sleep(1_000)
 ]
 VIEWER = [sys.executable, "-m", "can.viewer", "-i", "udp_multicast", "-c", GROUP]
 VIEWER += ["--bus-kwargs", f"port={PORT}", "hop_limit=0"]
-PROGRAMS = {
-    "the session alone, no screen": (INGEST, "ready", ""),
-    "canmon tui, trace": (TUI, "LISTEN-ONLY", ""),
-    "canmon tui, trace, overwrite": (TUI, "LISTEN-ONLY", "o"),
-    "canmon tui, nodes": (TUI, "LISTEN-ONLY", "2"),
-    "canmon tui, statistics": (TUI, "LISTEN-ONLY", "3"),
-    "can_viewer of python-can": (VIEWER, "Count", ""),
-}
+TABS = {"nodes": "2", "trace, overwrite": "o", "statistics": "3", "trace": ""}
+"""Tabs, and what is pressed to see them."""
 
 
 def run(seconds: float) -> None:
     """Print the rows of this suite."""
+    ingest: list[float] = []
+    viewer: list[float] = []
+    beyond: dict[str, list[float]] = {}
     with tempfile.TemporaryDirectory() as folder, _traffic():
         env = {**os.environ, "TERM": "xterm-256color", "PYTHONPYCACHEPREFIX": folder}
         for name in ("COLUMNS", "LINES", "PYTHONDONTWRITEBYTECODE"):
             env.pop(name, None)
-        children = {name: _start(*what, env) for name, what in PROGRAMS.items()}
-        time.sleep(SETTLE_S)
-        before = {name: _cpu_s(child) for name, child in children.items()}
-        shares: dict[str, list[float]] = {name: [] for name in children}
-        for _ in range(RUNS):
-            start = time.perf_counter()
-            time.sleep(seconds / RUNS)
-            for name, child in children.items():
-                now = _cpu_s(child)
-                span_s = time.perf_counter() - start
-                shares[name].append((now - before[name]) * 100 / span_s)
-                before[name] = now
-        for child in children.values():
-            child.terminate(force=True)
-    for name, values in shares.items():
-        row(f"{FRAMES_S} frames/s, {IDS} identifiers: {name}", values, "% of a core")
+        for tab, keys in TABS.items():
+            children = [
+                _start(INGEST, "ready", "", env),
+                _start(TUI, "LISTEN-ONLY", keys, env),
+                _start(VIEWER, "Count", "", env),
+            ]
+            alone, shown, other = _shares(children, seconds / RUNS)
+            ingest, viewer = ingest + alone, viewer + other
+            beyond[tab] = [one - base for one, base in zip(shown, alone, strict=True)]
+            for child in children:
+                child.terminate(force=True)
+    what = f"{FRAMES_S} frames/s, {IDS} identifiers"
+    row(f"{what}: the session alone, no screen", ingest, "% of a core")
+    for tab, values in beyond.items():
+        row(f"{what}: screen of canmon tui, {tab}, beyond that", values, "% of a core")
+    row(f"{what}: can_viewer of python-can, all of it", viewer, "% of a core")
+
+
+def _shares(children: Sequence[pexpect.spawn[str]], span_s: float) -> list[list[float]]:
+    """Return the share of a core that each takes, in spans beside each other."""
+    time.sleep(SETTLE_S)
+    shares: list[list[float]] = [[] for _ in children]
+    for _ in range(RUNS):
+        before, start = [_cpu_s(child) for child in children], time.perf_counter()
+        time.sleep(span_s)
+        took_s = time.perf_counter() - start
+        for values, child, was in zip(shares, children, before, strict=True):
+            values.append((_cpu_s(child) - was) * 100 / took_s)
+    return shares
 
 
 def _start(command: list[str], text: str, keys: str, env: Mapping[str, str]) -> pexpect.spawn[str]:
