@@ -104,7 +104,7 @@ class SequencePanel(Panel):
         """Show it, the latest in view; or the steps."""
         self.query_one("#state", TitleLine).show(self._state())
         view = self.query_one(LineView)
-        follows = view.at_end
+        follows = view.follows
         lines = [plain(line) for line in self._steps] or list(map(_line, self._notes))
         view.show(lines or [plain("F5 runs it, F7 shows its steps")])
         if follows:
