@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 from rich.segment import Segment
 from rich.style import Style
@@ -103,6 +103,10 @@ class LineView(ScrollView, can_focus=True):
         shown = min(self.rows, self._total - self.top)
         if self.top < self.begin or self.top + shown > self.begin + len(self.lines):
             self.post_message(self.Moved())
+
+    def scroll_to(self, x: float | None = None, y: float | None = None, **how: Any) -> None:
+        """Scroll at once: what is animated, the next picture would undo."""
+        super().scroll_to(x, y, **{**how, "animate": False})
 
     def show_end(self) -> None:
         """Scroll to the last line, at once."""
