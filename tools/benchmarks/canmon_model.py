@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import can
@@ -62,16 +63,17 @@ def run(seconds: float) -> None:
         whole("clean", clean)
         whole("dirty", dirty)
         python_can_reader(clean)
+        growth(Path(folder, "part.log"))
     live()
     painting()
     first_paint()
 
 
-def write_log(path: Path, *, dirty: bool) -> None:
+def write_log(path: Path, *, dirty: bool, frames: int = FRAMES) -> None:
     """Write PDOs of 50 nodes at about 6,700 frames/s, a heartbeat each 1.1 s."""
     chance, at_us = random.Random(1), 1_700_000_000_000_000
     with path.open("w", encoding="ascii") as file:
-        for n in range(FRAMES):
+        for n in range(frames):
             at_us += chance.randrange(100, 200)
             node = n % IDS + 1
             text = f"{0x180 + node:03X}#{n:08X}{chance.randrange(1 << 32):08X}"
@@ -102,6 +104,20 @@ def whole(what: str, path: Path) -> None:
     seconds(f"canmon check, {what} log", ["canmon", "check", str(path), *WORDS])
     seconds(f"canmon stats, {what} log", ["canmon", "stats", str(path)])
     seconds(f"canopen-lens, {what} log", ["canopen-lens", str(path), "--lang", "en"])
+
+
+def growth(path: Path) -> None:
+    """Check dirty logs of three sizes: what a finding takes should stay the same."""
+    for frames in (FRAMES // 16, FRAMES // 4, FRAMES):
+        write_log(path, dirty=True, frames=frames)
+        columns = read_columns(path)
+        found = check_columns(columns, RULES, BIT_RATE)
+        each = _cpu_s(partial(check_columns, columns, RULES, BIT_RATE))
+        what = f"{frames:,} dirty frames: {len(found):,} findings"
+        row(what, [1e6 * value / len(found) for value in each], "us a finding")
+        seconds(
+            f"canopen-lens, {frames:,} dirty frames", ["canopen-lens", str(path), "--lang", "en"]
+        )
 
 
 def python_can_reader(path: Path) -> None:
