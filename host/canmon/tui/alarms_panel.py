@@ -11,8 +11,6 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Static, TextArea
 
 from tickrig.host.canmon.tui.alarm_task import AlarmTask
-from tickrig.host.canmon.tui.line import Line, plain
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.nested_settings import below
 from tickrig.host.canmon.tui.panel import Panel
@@ -21,6 +19,8 @@ from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarm_text import HEAD, render_alarms
 from tickrig.host.monitor.check.alarms import State
 from tickrig.host.monitor.check.words import SWITCHES, VALUES, parse_rules
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
 
 STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
 

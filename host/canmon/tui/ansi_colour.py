@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from tickrig.host.canmon.tui.line import Line
+from tickrig.host.tui.line import Line
 
 COLOURS: Final = {
     "31": "red",

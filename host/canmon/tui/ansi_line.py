@@ -6,9 +6,9 @@ r"""Lines with the escape sequence of reverse text, as `top` writes them, with s
 
 from __future__ import annotations
 
-from tickrig.host.canmon.tui.line import Line
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.monitor.payload_text import PLAIN, REVERSE
+from tickrig.host.tui.line import Line
 
 
 def ansi_line(text: str) -> Line:

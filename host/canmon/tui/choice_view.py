@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 from textual.binding import Binding, BindingType
 from textual.events import Click
 
-from tickrig.host.canmon.tui.line_view import Line, LineView
+from tickrig.host.tui.line_view import Line, LineView
 
 CHOSEN: Final = "reverse"
 

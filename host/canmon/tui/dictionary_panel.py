@@ -11,7 +11,6 @@ from textual.binding import Binding, BindingType
 from tickrig.host.canmon.tui.ask_line import AskLine
 from tickrig.host.canmon.tui.choice_view import ChoiceView
 from tickrig.host.canmon.tui.dictionary_task import DictionaryTask, Node
-from tickrig.host.canmon.tui.line import Line, plain
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.sending_bus import next_bus
@@ -23,6 +22,7 @@ from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
 from tickrig.host.monitor.dictionary.object_row import ObjectRow
 from tickrig.host.monitor.dictionary.object_words import encode_words
+from tickrig.host.tui.line import Line, plain
 
 
 class DictionaryPanel(Panel):

@@ -15,7 +15,6 @@ from tickrig.host.canmon.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.ansi_colour import colour_line
 from tickrig.host.canmon.tui.ask_line import AskLine
 from tickrig.host.canmon.tui.graph_task import GraphTask
-from tickrig.host.canmon.tui.line import Line
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.nested_settings import below, texts_of
 from tickrig.host.canmon.tui.panel import Panel
@@ -29,6 +28,7 @@ from tickrig.host.monitor.graph.plot import LABEL_WIDTH
 from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
 from tickrig.host.monitor.graph.view import LEAST_US
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.tui.line import Line
 
 PICTURE: Final = (960, 400)
 QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"

@@ -6,10 +6,10 @@ from typing import Final
 
 from textual.app import ComposeResult
 
-from tickrig.host.canmon.tui.line_view import Line, LineView, plain
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.monitor.decode.board_text import render_board
+from tickrig.host.tui.line_view import Line, LineView, plain
 
 WIDE: Final = 400
 MANY: Final = 1_000

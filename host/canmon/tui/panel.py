@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 from textual.containers import Vertical
 
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.session import Session
+from tickrig.host.tui.line_view import LineView
 
 
 class Panel(Vertical):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from textual.events import Click
 from textual.message import Message
 
-from tickrig.host.canmon.tui.line_view import LineView
+from tickrig.host.tui.line_view import LineView
 
 
 class PictureView(LineView, inherit_bindings=False):

@@ -13,8 +13,6 @@ from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
 from tickrig.host.canmon.tui.ask_line import AskLine
-from tickrig.host.canmon.tui.line import Line, plain
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.sending_bus import checked_bus, next_bus
@@ -26,6 +24,8 @@ from tickrig.host.monitor.sequence.line_sequence import SequenceError
 from tickrig.host.monitor.sequence.note_text import note_line
 from tickrig.host.monitor.sequence.sequence_run import Mark, Note
 from tickrig.host.monitor.sequence.steps import Sequence, outline
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
 
 STYLES: Final = {Mark.MET: "green", Mark.MISSED: "bold red", Mark.END: "bold"}
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")

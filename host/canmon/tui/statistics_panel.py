@@ -10,13 +10,13 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.ansi_line import ansi_line
-from tickrig.host.canmon.tui.line import Line, plain
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.settings import choice, truth
 from tickrig.host.monitor.top_table import UNBOUNDED, Order
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
 
 TITLE: Final = "CAN-ID"
 """Is in the last line above the rows."""

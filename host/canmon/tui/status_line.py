@@ -10,10 +10,10 @@ from textual.events import Click
 from textual.strip import Strip
 from textual.widget import Widget
 
-from tickrig.host.canmon.tui.line_view import Line
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.monitor.quantity import load_text
 from tickrig.host.monitor.traffic import BusRow
+from tickrig.host.tui.line_view import Line
 
 ARMED: Final = (" ARMED ", "bold white on red")
 LISTENING: Final = (" LISTEN-ONLY ", "bold black on green")

@@ -18,7 +18,6 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Final
 
-from tickrig.host.canmon.tui.line import Line, line_text
 from tickrig.host.monitor.dump_line import Stamp, date_text, seconds_text
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.ident import ident_of, ident_text
@@ -27,6 +26,7 @@ from tickrig.host.monitor.quantity import ms_text
 from tickrig.host.monitor.serial_text import bytes_text
 from tickrig.host.monitor.top_model import meaning_text
 from tickrig.host.monitor.trace import TraceRow
+from tickrig.host.tui.line import Line, line_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

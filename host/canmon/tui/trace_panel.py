@@ -10,7 +10,6 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Input, Static
 
-from tickrig.host.canmon.tui.line_view import Line, LineView, line_text
 from tickrig.host.canmon.tui.model import Meant, Model
 from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.session import NEVER, Session
@@ -22,6 +21,7 @@ from tickrig.host.monitor.decode.filter_error import FilterError
 from tickrig.host.monitor.dump_line import Stamp
 from tickrig.host.monitor.sieve import Latest, Sieve
 from tickrig.host.monitor.trace import Ring
+from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
 
 STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)

@@ -10,7 +10,6 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.ask_line import AskLine
 from tickrig.host.canmon.tui.choice_view import ChoiceView
-from tickrig.host.canmon.tui.line import plain
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.nested_settings import below, tables
 from tickrig.host.canmon.tui.panel import Panel
@@ -21,6 +20,7 @@ from tickrig.host.canmon.tui.transmit_settings import read_row, row_settings
 from tickrig.host.canmon.tui.transmit_task import TransmitTask
 from tickrig.host.monitor.transmit.transmit_text import ON, render_transmit
 from tickrig.host.monitor.transmit.transmit_words import TransmitWords, parse_words
+from tickrig.host.tui.line import plain
 
 QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
 

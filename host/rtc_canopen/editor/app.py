@@ -14,7 +14,6 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 from textual.widgets import Footer
 
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc_canopen.editor import joining
@@ -27,6 +26,7 @@ from tickrig.host.rtc_canopen.editor.system_pane import SystemPane
 from tickrig.host.rtc_canopen.editor.system_rows import Item
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.view import ServerView
+from tickrig.host.tui.line_view import LineView
 
 PAINT_S: Final = 0.1
 SWITCH_S: Final = 0.000_5

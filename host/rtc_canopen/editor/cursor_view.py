@@ -9,8 +9,8 @@ from textual.binding import Binding, BindingType
 from textual.events import Blur, Click, Focus
 from textual.message import Message
 
-from tickrig.host.canmon.tui.line_view import Line, LineView
 from tickrig.host.rtc_canopen.editor.row import Row
+from tickrig.host.tui.line_view import Line, LineView
 
 T = TypeVar("T")
 

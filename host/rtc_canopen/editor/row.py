@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Generic, NamedTuple, TypeVar
 
-from tickrig.host.canmon.tui.line_view import Line
+from tickrig.host.tui.line_view import Line
 
 T = TypeVar("T")
 

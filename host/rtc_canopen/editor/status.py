@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.canmon.tui.line_view import Line
 from tickrig.host.rtc_canopen.events import Event, EventKind
 from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.view import NodeView
+from tickrig.host.tui.line_view import Line
 
 DIM: Final = "bright_black"
 MARK: Final = "bold yellow"

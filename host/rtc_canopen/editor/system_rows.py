@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator
 from functools import lru_cache
 from typing import Final
 
-from tickrig.host.canmon.tui.line_view import Line
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.editor.row import Row
 from tickrig.host.rtc_canopen.served_node import Phase
@@ -18,6 +17,7 @@ from tickrig.host.rtc_canopen.view import (
     PortView,
     SystemView,
 )
+from tickrig.host.tui.line_view import Line
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
 SystemRow = Row[Item]

@@ -12,8 +12,6 @@ from tickrig.host.canmon.file_source import FileSource
 from tickrig.host.canmon.source_word import FileWord
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.bench import Bench
-from tickrig.host.canmon.tui.line import line_text
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.opening import open_session
@@ -22,6 +20,8 @@ from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_panel import TracePanel
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.tui.line import line_text
+from tickrig.host.tui.line_view import LineView
 
 DRIVE = Path(__file__).parents[3] / "golden/canmon/drive.log"
 OURS = (TracePanel, NodesPanel, StatisticsPanel)

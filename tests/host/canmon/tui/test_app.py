@@ -22,7 +22,6 @@ from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.bench_setup import BenchSetup
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.bench import Bench
-from tickrig.host.canmon.tui.line import line_text
 from tickrig.host.canmon.tui.model import Meant, Model
 from tickrig.host.canmon.tui.opening import open_session
 from tickrig.host.canmon.tui.panels import PANELS
@@ -31,6 +30,7 @@ from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.trace_panel import TracePanel
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.tui.line import line_text
 from tickrig.wire.can import CanFrame, Frames
 
 

@@ -5,7 +5,7 @@ from typing import Any
 from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, shown, wire_session
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.line_view import LineView
+from tickrig.host.tui.line_view import LineView
 
 
 def test_nodes_and_their_emcys_are_shown() -> None:

@@ -9,7 +9,6 @@ import pytest
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.tui.graph_panel import GraphPanel
-from tickrig.host.canmon.tui.line import line_text
 from tickrig.host.canmon.tui.model import Model
 from tickrig.host.canmon.tui.opening import open_session
 from tickrig.host.canmon.tui.trace_line import TraceLines
@@ -20,6 +19,7 @@ from tickrig.host.monitor.decode.heard_line import HeardLine
 from tickrig.host.monitor.decode.serial_rrc import RrcLines
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.sieve import Sieve
+from tickrig.host.tui.line import line_text
 from tickrig.wire.can import CanFrame
 
 STEPS = 2_000

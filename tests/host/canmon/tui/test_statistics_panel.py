@@ -8,10 +8,10 @@ import pytest
 from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, shown, wire_session
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.tui.line_view import LineView
 
 
 @pytest.fixture

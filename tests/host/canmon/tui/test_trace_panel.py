@@ -16,10 +16,10 @@ from tests.host.canmon.tui.pilot import (
 )
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.line_view import LineView
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.tui.trace_panel import TracePanel
 from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.tui.line_view import LineView
 
 
 @pytest.fixture

@@ -14,12 +14,12 @@ from tickrig.emulators.can_host import CanHost
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.canmon.tui.line_view import LineView, line_text
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.session import Furnish, Session
 from tickrig.host.rtc_canopen.events import Event
 from tickrig.host.rtc_canopen.serve import open_server
+from tickrig.host.tui.line_view import LineView, line_text
 
 FIG_120 = SYSTEMS / "fig120.yaml"
 CAST = {16: "f-palette", 32: "motor-core-unit"}

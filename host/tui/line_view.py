@@ -16,7 +16,7 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tickrig.host.canmon.tui.line import Line, line_text, line_width, plain
+from tickrig.host.tui.line import Line, line_text, line_width, plain
 
 __all__ = ["Line", "LineView", "line_text", "plain"]
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from rich.style import Style
 
-from tickrig.host.canmon.tui.line_view import line_strip, rounded_up
+from tickrig.host.tui.line_view import line_strip, rounded_up
 
 LINE = (("185 ", "bold"), ("37 02", ""))
 

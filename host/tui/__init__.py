@@ -1,0 +1,1 @@
+"""Widgets that the screens of host tools share (extra `tui`)."""
