@@ -52,4 +52,16 @@ class LazyGroup(click.Group):
 @click.group(cls=LazyGroup)
 @click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
 def main() -> None:
-    """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input."""
+    """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.
+
+    \b
+    canmon dump can0                              frames, and what they mean
+    canmon top run.log                            all identifiers in a table
+    canmon nodes can0 --eds 3=drive.eds           all nodes
+    canmon check run.log --no-emcy --nodes 3,5    exit status 1 if a rule is broken
+    canmon tui can0                               all there is on one screen
+
+    \b
+    Completion of verbs and options in the shell:
+    eval "$(_CANMON_COMPLETE=bash_source canmon)"
+    """  # noqa: D301 - click wants the backspace
