@@ -106,6 +106,8 @@ class LineView(ScrollView, can_focus=True):
 
     def scroll_to(self, x: float | None = None, y: float | None = None, **how: Any) -> None:
         """Scroll at once: what is animated, the next picture would undo."""
+        if y is not None and not how.get("force"):  # somebody scrolls; the screen may be moving
+            self.follows = y >= self.max_scroll_y
         super().scroll_to(x, y, **{**how, "animate": False})
 
     def show_end(self) -> None:

@@ -68,6 +68,8 @@ def test_the_latest_frame_is_in_view_until_somebody_scrolls_up(wire: Wire) -> No
     async def act(monitor: Monitor, pilot: Any) -> None:
         hear(session, wire, *(f"181#{n:02X}" for n in range(100)))
         assert "[1] 63" in shown(monitor)[-1]
+        view = monitor.shown.query_one(LineView)
+        await until(pilot, lambda: view.allow_vertical_scroll)  # the screen is laid out
         await pilot.press("home")
         await until(pilot, lambda: "[1] 00" in shown(monitor)[0])
         hear(session, wire, "181#FF")
