@@ -58,7 +58,9 @@ class CanEmulator(Workbench):
         self._host = self._open_end()
         beyond = self._open_end(None if outside else frozenset())
         bridges = [CanBridge(beyond, outside)] if outside else []
-        self.rig = Rig(*stations, bridges=bridges, couplings=couplings, clock=clock)
+        self.rig = Rig(
+            *stations, bridges=bridges, couplings=couplings, clock=clock, agenda=self.agenda
+        )
 
     def _open_end(self, accepts: Accepted = None) -> CanEnd:
         """Connect an end that comes back from bus-off at once."""

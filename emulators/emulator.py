@@ -12,6 +12,7 @@ from tickrig.emulators.byte_faults import BYTE_FAULTS
 from tickrig.emulators.clock import Clock
 from tickrig.emulators.emulated import Emulated
 from tickrig.emulators.faults import FaultKind, FaultyPort
+from tickrig.emulators.host_end import HostEnd
 from tickrig.emulators.port import ByteLine, Port
 from tickrig.emulators.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig import Rig, Station
@@ -57,6 +58,10 @@ class Emulator(Workbench):
         trace: where to record the run.
         link: path under which the host finds it, for people.
         line: what the line is like.
+
+    Attributes:
+        line: the line itself.
+        host_end: the caller's end of it, for a `SimLink` too; what passes here is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -73,33 +78,33 @@ class Emulator(Workbench):
     ) -> None:
         self._trace, self._outside = trace, outside
         line = line or LineKind()
-        self._line = line.wire(line.baud)
-        port = FaultyPort(self._line.a, line.faults, seed)
+        self.line = line.wire(line.baud)
+        port = FaultyPort(self.line.a, line.faults, seed)
         super().__init__(name, device, port, link)
         if line.splitter is not None:
             self.log = WireLog(splitter=line.splitter)
         station = Station(TracedDevice(device, trace) if trace else device, port)
-        bridges = [Bridge(self._line.b, Tap(outside, self.log.hear))] if outside else []
-        self.rig = Rig(station, bridges=bridges, clock=clock)
+        self.host_end = HostEnd(self.line.b, self.log.hear)
+        bridges = [Bridge(self.line.b, Tap(outside, self.log.hear))] if outside else []
+        self.rig = Rig(station, bridges=bridges, clock=clock, agenda=self.agenda)
 
     @property
     def _host_due_us(self) -> int:
-        return NEVER if self._outside else self._line.b.due_us
+        return NEVER if self._outside else self.host_end.due_us
 
     def _listen(self, now_us: int) -> None:
-        if self._outside is None and (data := self._line.b.poll(now_us)):
-            self.log.hear(now_us, Mark.FROM_DEVICE, data)
+        if self._outside is None:
+            self.host_end.poll(now_us)
 
     def send(self, now_us: int, data: bytes) -> None:
         """Put bytes on the line, as the host would."""
-        self.log.hear(now_us, Mark.TO_DEVICE, data)
-        self._line.b.send(now_us, data)
+        self.host_end.send(now_us, data)
 
     @property
     def lost(self) -> dict[str, int]:
         """Bytes that found a buffer full, on the line or outside."""
         outside = self._outside.lost if self._outside else 0
-        return {"lost_bytes": self._line.a.lost + self._line.b.lost + outside}
+        return {"lost_bytes": self.line.a.lost + self.line.b.lost + outside}
 
     @property
     def lost_bytes(self) -> int:

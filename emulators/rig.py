@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, Protocol
 
 from tickrig.device.core import NEVER, Device, W
+from tickrig.emulators.agenda import Agenda
 from tickrig.emulators.clock import Clock, VirtualClock
 from tickrig.emulators.coupling import Coupling
 from tickrig.emulators.port import Port, Wire, WirePort
@@ -75,14 +76,20 @@ class Rig:
     Stations on a shared wire stand in a timetable and cost nothing until they
     have work; the others are looked at in every step.
 
+    What the agenda holds is done by whoever makes time pass, in whatever way:
+    after all that happens before its time, and before the tick of its time.
+
     Args:
         stations: the devices, each on its port.
         bridges: joints with the outside world (real time).
         couplings: what joins the devices beside their wires, in the order in which they act.
         clock: a `VirtualClock` unless given.
         dense: run every tick of every device.
+        agenda: what is to be done between ticks; a new one unless given.
 
     Attributes:
+        agenda: what is to be done between ticks.
+        acting_us: the time for which an action of the agenda is being done, else None.
         now_us: time since the start of the rig.
         late_us: by how much the latest step was late.
         late_steps: how many steps began more than `LATE_US` late.
@@ -95,8 +102,11 @@ class Rig:
         couplings: Sequence[Coupling] = (),
         clock: Clock | None = None,
         dense: bool = False,
+        agenda: Agenda | None = None,
     ) -> None:
         self.now_us = self.late_us = self.late_steps = 0
+        self.agenda = agenda or Agenda()
+        self.acting_us: int | None = None
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
         self._jumps = not dense and isinstance(self._clock, VirtualClock)
@@ -129,25 +139,23 @@ class Rig:
 
     @property
     def next_us(self) -> int:
-        """When there is something to do next: a tick with work, or something ends on a wire."""
+        """When there is something to do next: an action, a tick with work, an end on a wire."""
         self._look()
         return min(self._planned_us, self._wires_due_us)
 
     def step(self) -> None:
         """Go to the next time with something to do, and do it; nothing if that never comes."""
         if (next_us := self.next_us) != NEVER:
-            self._run(next_us)
+            self._happen(next_us)
 
     def run_to(self, t_us: int, host: Host | None = None) -> None:
         """Step through all that happens up to and at `t_us`, or until something is at a host."""
         self._look()
         while (next_us := self._go_on(t_us, host)) <= t_us:
-            self._run(next_us)
+            self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
                 return
-        for wire in self._wires:
-            wire.advance(t_us)
-        self._idle_to(t_us)
+        self._pass_to(t_us)
 
     def run_for(self, duration_us: int) -> None:
         """Step through `duration_us`."""
@@ -162,7 +170,7 @@ class Rig:
             if next_us > deadline_us:
                 self._idle_to(deadline_us)
                 return done()
-            self._run(next_us)
+            self._happen(next_us)
         return True
 
     def _look(self) -> None:
@@ -179,8 +187,8 @@ class Rig:
 
     @property
     def _planned_us(self) -> int:
-        """The next tick that is known to have work."""
-        now_us, next_us = self.now_us, self._timetable.first_us
+        """The next action, or the next tick that is known to have work."""
+        now_us, next_us = self.now_us, min(self._timetable.first_us, self.agenda.due_us)
         for bridge in self._bridges:
             next_us = min(next_us, bridge.due_us)
         if self._jumps:
@@ -211,6 +219,29 @@ class Rig:
             heard = [wire.advance_until_heard(limit_us) for wire in self._wires]
             if not any(heard) and self._wires_due_us > limit_us:
                 return next_us
+
+    def _happen(self, next_us: int) -> None:
+        """Do what is due next: all actions of that time, or else its tick."""
+        if self.agenda.due_us <= next_us:
+            self._act(next_us)
+        else:
+            self._run(next_us)
+
+    def _act(self, now_us: int) -> None:
+        """Do what is due at `now_us`, before the tick of that time."""
+        self._pass_to(max(self.now_us, now_us - 1))
+        self.acting_us = now_us
+        try:
+            self.agenda.run(now_us)
+        finally:
+            self.acting_us = None
+        self._look()
+
+    def _pass_to(self, t_us: int) -> None:
+        """Let time pass in which no tick has work."""
+        for wire in self._wires:
+            wire.advance(t_us)
+        self._idle_to(t_us)
 
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:

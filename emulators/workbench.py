@@ -24,7 +24,7 @@ class Workbench(ABC):
 
     Attributes:
         operator: sets inputs, presses buttons, makes faults.
-        agenda: what is to be done between ticks.
+        agenda: what is to be done between ticks, by whoever makes the rig's time pass.
         log: the latest lines or frames on the wire.
         rig: the rig.
         after_step: told the time after each step.
@@ -36,7 +36,6 @@ class Workbench(ABC):
     def __init__(self, name: str, device: Touchable, wire: WireFaults, link: str) -> None:
         self.name, self.wire, self.link, self.running = name, wire, link, True
         self._touched = device
-        self._acting_us: int | None = None
         self.agenda, self.log = Agenda(), WireLog()
         self.after_step: list[Callable[[int], None]] = []
         self.operator = Operator(device.inputs, device.tick_us, self.agenda, wire)
@@ -49,8 +48,8 @@ class Workbench(ABC):
     @property
     def touch_us(self) -> int:
         """When what is done now takes effect: at once in an action, else at the next tick."""
-        if self._acting_us is not None:
-            return self._acting_us
+        if self.rig.acting_us is not None:
+            return self.rig.acting_us
         now_us, tick_us = self.rig.now_us, self.device.tick_us
         return now_us - now_us % tick_us + tick_us if now_us else 0
 
@@ -58,20 +57,12 @@ class Workbench(ABC):
         """Go to the next time at which something happens, and let it happen."""
         next_us = min(self.rig.next_us, self._host_due_us)
         if self.agenda.due_us <= min(next_us, NEVER - 1):
-            next_us = max(self.agenda.due_us, self.rig.now_us)
-            self._act(next_us)
+            self.rig.step()  # the actions alone; the tick of their time is the next step
         elif next_us < NEVER:
             self.rig.run_to(next_us)
         self._listen(self.rig.now_us)
         for look in self.after_step:
             look(next_us)
-
-    def _act(self, now_us: int) -> None:
-        """Do what is due at `now_us`, before the tick of that time."""
-        self.rig.run_to(now_us - 1)
-        self._acting_us = now_us
-        self.agenda.run(now_us)
-        self._acting_us = None
 
     @property
     @abstractmethod

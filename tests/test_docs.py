@@ -30,6 +30,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/canopen.md",
         "docs/device-rtc.md",
         "docs/rh3.md",
+        "docs/scenario.md",
         "docs/rtc-lite.md",
         "docs/rtc.md",
         "docs/rtc-canopen.md",
