@@ -50,7 +50,7 @@ def command(
     strict: bool,
     **options: Any,
 ) -> None:
-    """Hold traffic against rules; exit status 1 if one does not hold.
+    """Hold traffic against rules; exit status 1 if one does not hold, 5 if there was none.
 
     Rules are options, or a TOML file with the same names: no_emcy = true,
     heartbeat = ["3=100ms±20%"]. Each finding is a line with time and frame.
@@ -78,12 +78,22 @@ def command(
             _one_by_one(frames, checker, verdict, span_us or patience_us(frames, words))
     finally:
         frames.close()
-    _write(report_path, junit(" ".join(words), rules.names(), verdict.findings))
-    if not frames.failed:
+    unjudged = "" if verdict.frames else _no_frame(frames, words)
+    suite, why = " ".join(words), frames.failed or unjudged
+    _write(report_path, junit(suite, rules.names(), verdict.findings, why))
+    if not why or verdict.findings:
         click.echo(verdict.summary(), err=True)
     report(frames, strict)
     if verdict.findings:
         click.get_current_context().exit(BROKEN)
+    if unjudged:
+        raise NothingJudged(unjudged)
+
+
+class NothingJudged(click.ClickException):
+    """One line on standard error, and exit status 5."""
+
+    exit_code = 5
 
 
 class Verdict:
@@ -109,7 +119,7 @@ class Verdict:
     def summary(self) -> str:
         """Say how it ended."""
         if not self.findings:
-            return "all rules hold" + ", but there were no frames" * (not self.frames)
+            return "all rules hold"
         rules = Counter(finding.rule for finding in self.findings)
         counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(rules.items()))
         return f"{len(self.findings)} findings: {counts}"
@@ -127,6 +137,12 @@ def finding_json(finding: Finding) -> str:
     if heard is not None:
         said |= {"ch": heard.channel, "frame": str(heard.frame)}
     return json.dumps(said, ensure_ascii=False)
+
+
+def _no_frame(source: Source, words: Sequence[str]) -> str:
+    """Say why nothing was judged."""
+    where = "no frame came" if source.live else f"no frame in {' '.join(words)}"
+    return f"nothing was judged: {where}"
 
 
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:

@@ -67,6 +67,7 @@ class Alarms:
 
     Attributes:
         findings: the latest, oldest first.
+        judged: a frame was held against the rules.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
@@ -75,6 +76,7 @@ class Alarms:
     rules: Rules
     bit_rate: int | None = None
     findings: deque[Finding] = field(init=False)
+    judged: bool = field(init=False)
     _checker: Checker = field(init=False)
     _alarms: dict[str, Alarm] = field(init=False)
     _begin_us: int | None = field(init=False)
@@ -89,10 +91,11 @@ class Alarms:
         self._checker = Checker(self.rules, self.bit_rate)
         self._alarms = {name: Alarm(name) for name in self.rules.names()}
         self.findings = deque(maxlen=KEPT)
-        self._begin_us = None
+        self._begin_us, self.judged = None, False
 
     def take(self, heard: Heard) -> None:
         """Hold a frame against the rules."""
+        self.judged = True
         for finding in self._checker.take(heard):
             self._found(finding)
 

@@ -24,15 +24,17 @@ NODE_MASK: Final = 0x7F
 
 
 class FrameRule:
-    """A rule with nothing to say at the end, unless it has an `end` of its own.
+    """A rule that sees all frames it wants, and has nothing to say at the end.
 
     Attributes:
         name: as findings have it.
-        suspects: frames that can break it.
     """
 
     name = ""
-    suspects = Suspects()
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect all."""
+        return Suspects()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Say nothing."""
@@ -66,11 +68,14 @@ class NoSdoAbort(FrameRule):
     """No aborted transfer at a default SDO server."""
 
     name = "no-sdo-abort"
-    suspects = Suspects(first_bytes=frozenset([ClientCommand.ABORT]))
 
     def wants(self, ident: int, /) -> bool:
         """Take the COB-IDs of the default servers."""
         return ident in ANSWER_IDS or ident in REQUEST_IDS
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect aborts."""
+        return Suspects(first_bytes=frozenset([ClientCommand.ABORT]))
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
         """Name object and abort code."""
@@ -110,7 +115,6 @@ class Known(FrameRule):
     """
 
     name = "known"
-    suspects = Suspects(firsts=True)
 
     def __init__(self, idents: frozenset[int]) -> None:
         self._idents = idents
@@ -118,6 +122,10 @@ class Known(FrameRule):
     def wants(self, ident: int, /) -> bool:
         """Take all others."""
         return ident not in self._idents and ident != ERROR
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect the first frame."""
+        return Suspects(firsts=True)
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
         """Tell the first frame."""

@@ -12,28 +12,32 @@ CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n
 """Characters that XML does not have."""
 
 
-def junit(suite: str, names: Sequence[str], findings: Iterable[Finding]) -> str:
+def junit(suite: str, names: Sequence[str], findings: Iterable[Finding], unjudged: str = "") -> str:
     """Return the report.
 
     Args:
         suite: what was checked.
         names: of all rules, also of those that hold.
         findings: in their order.
+        unjudged: why rules without a finding cannot be said to hold; empty if they can.
     """
     by_rule: dict[str, list[Finding]] = {name: [] for name in names}
     for finding in findings:
         by_rule[finding.rule].append(finding)
     failures = sum(bool(found) for found in by_rule.values())
-    head = f"<testsuite name={_attribute(suite)} tests='{len(names)}' failures='{failures}'>"
-    cases = [_case(suite, name, found) for name, found in by_rule.items()]
+    errors = len(by_rule) - failures if unjudged else 0
+    counts = f"tests='{len(names)}' failures='{failures}' errors='{errors}'"
+    head = f"<testsuite name={_attribute(suite)} {counts}>"
+    cases = [_case(suite, name, found, unjudged) for name, found in by_rule.items()]
     lines = ["<?xml version='1.0' encoding='utf-8'?>", "<testsuites>", head, *cases]
     return "\n".join([*lines, "</testsuite>", "</testsuites>", ""])
 
 
-def _case(suite: str, name: str, found: Sequence[Finding]) -> str:
+def _case(suite: str, name: str, found: Sequence[Finding], unjudged: str) -> str:
     head = f"<testcase classname={_attribute(suite)} name={_attribute(name)}"
     if not found:
-        return f"{head}/>"
+        error = f"><error message={_attribute(unjudged)}/></testcase>"
+        return head + (error if unjudged else "/>")
     message = f"{len(found)} findings, first: {found[0].text}"
     text = escape("\n".join(map(str, found)).translate(CONTROLS))
     return f"{head}><failure message={_attribute(message)}>{text}</failure></testcase>"

@@ -1,14 +1,18 @@
-"""Rules about nodes: that they are there, and stay up."""
+"""Rules about nodes: that they are there, and stay up.
+
+A node was heard by whatever it sent on one of its default COB-IDs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.monitor.check.frame_rules import NODE_MASK, FrameRule
+from tickrig.host.monitor.check.frame_rules import FrameRule
 from tickrig.host.monitor.check.rule import Suspects
 from tickrig.host.monitor.check.time_rules import BOOT_UP
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.node_of import sender_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
 
@@ -17,7 +21,7 @@ ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID 
 
 
 class NodesPresent(FrameRule):
-    """These nodes are heard: boot-up, heartbeat or guarding."""
+    """These nodes are heard."""
 
     name = "nodes"
 
@@ -34,8 +38,9 @@ class NodesPresent(FrameRule):
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Name those that were never heard."""
+        heard = set(map(sender_of, latest_us))
         for node in self._nodes:
-            if ERROR_CONTROL_COB_ID + node not in latest_us:
+            if node not in heard:
                 yield f"node {node} was never heard"
 
 
@@ -43,27 +48,36 @@ class NoReboot(FrameRule):
     """No node that was heard before boots without an NMT reset."""
 
     name = "no-reboot"
-    suspects = Suspects(first_bytes=RESETS | frozenset(BOOT_UP))
 
     def __init__(self) -> None:
         self._asked: set[int] = set()
+        self._heard: set[tuple[str, int]] = set()
 
     def wants(self, ident: int, /) -> bool:
-        """Take NMT commands and error control."""
-        return ident == NMT_COB_ID or ident in ERROR_CONTROL_IDS
+        """Take NMT commands and what nodes send."""
+        return ident == NMT_COB_ID or sender_of(ident) is not None
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
+        if ident == NMT_COB_ID:
+            return Suspects(first_bytes=RESETS)
+        boot_up = frozenset(BOOT_UP) if ident in ERROR_CONTROL_IDS else frozenset()
+        return Suspects(first_bytes=boot_up, firsts=True)
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
         """Note a reset; say that a boot-up comes without one."""
         frame = heard.frame
         assert isinstance(frame, CanFrame)
-        if frame.can_id == NMT_COB_ID:
+        node = sender_of(frame.can_id)
+        if node is None:
             if len(frame.data) == 2 and frame.data[0] in RESETS:
                 self._ask(frame.data[1])
             return None
-        if frame.data != BOOT_UP:
+        is_new = (heard.channel, node) not in self._heard
+        self._heard.add((heard.channel, node))
+        if frame.can_id not in ERROR_CONTROL_IDS or frame.data != BOOT_UP:
             return None
-        node = frame.can_id & NODE_MASK
-        expected = gap_us is None or node in self._asked
+        expected = is_new or node in self._asked
         self._asked.discard(node)
         return None if expected else f"node {node} boots again without an NMT reset"
 

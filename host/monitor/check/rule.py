@@ -12,7 +12,7 @@ NO_GAP_US: Final = -1
 
 
 class Suspects(NamedTuple):
-    """Which frames of its identifiers a rule must see; all others break it in no case.
+    """Which frames of an identifier a rule must see; no other can change what it finds.
 
     Where nothing is given, all of them.
 
@@ -34,7 +34,6 @@ class Rule(Protocol):
 
     Attributes:
         name: as findings and reports have it.
-        suspects: which frames of those it wants can break it.
     """
 
     @property
@@ -42,13 +41,12 @@ class Rule(Protocol):
         """As findings and reports have it."""
         ...
 
-    @property
-    def suspects(self) -> Suspects:
-        """Which of the frames that it wants it must see."""
-        ...
-
     def wants(self, ident: int, /) -> bool:
         """Say whether frames of an identifier matter; error frames have `ident.ERROR`."""
+        ...
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Say which frames of an identifier that it wants it must see."""
         ...
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:

@@ -54,16 +54,17 @@ class SortedLog:
         rows, gaps_us = [errors], [np.full(len(errors), NO_GAP_US)]
         for ident, begin, end in self._idents():
             if rule.wants(ident):
-                places = begin + np.flatnonzero(self._suspected(rule, begin, end))
+                suspected = self._suspected(rule.suspects(ident), begin, end)
+                places = begin + np.flatnonzero(suspected)
                 rows.append(self._row(places))
                 gaps_us.append(np.where(places == begin, NO_GAP_US, self._gaps_us[places]))
         every = np.concatenate(rows)
         order = np.argsort(every, kind="stable")
         return every[order], np.concatenate(gaps_us)[order]
 
-    def _suspected(self, rule: Rule, begin: int, end: int) -> npt.NDArray[np.bool_]:
-        below_us, above_us, first_bytes, firsts = rule.suspects
-        if rule.suspects == Suspects():
+    def _suspected(self, suspects: Suspects, begin: int, end: int) -> npt.NDArray[np.bool_]:
+        below_us, above_us, first_bytes, firsts = suspects
+        if suspects == Suspects():
             return np.ones(end - begin, np.bool_)
         gaps_us = self._gaps_us[begin:end]
         suspected = np.zeros(end - begin, np.bool_)

@@ -33,19 +33,21 @@ class Heartbeat:
 
     Attributes:
         name: as findings have it.
-        suspects: what comes too soon or too late, and boot-ups.
     """
 
     def __init__(self, times: HeartbeatTimes) -> None:
         self._times, self._ident = times, ERROR_CONTROL_COB_ID + times.node
         self.name = f"heartbeat {times.node}"
-        boot_up = frozenset(BOOT_UP)
-        self.suspects = Suspects(times.low_us, times.high_us, boot_up, firsts=True)
         self._booted_us: dict[str, int] = {}
 
     def wants(self, ident: int, /) -> bool:
         """Take its COB-ID."""
         return ident == self._ident
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect what comes too soon or too late, and boot-ups."""
+        _, low_us, high_us = self._times
+        return Suspects(low_us, high_us, frozenset(BOOT_UP), firsts=True)
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
         """Compare the gap, unless the frame or the one before it is a boot-up."""
@@ -77,17 +79,19 @@ class MaxGap:
 
     Attributes:
         name: as findings have it.
-        suspects: what comes too late.
     """
 
     def __init__(self, ident: int, most_us: int) -> None:
         self._ident, self._most_us = ident, most_us
         self.name = f"max-gap {ident_text(ident)}"
-        self.suspects = Suspects(above_us=most_us)
 
     def wants(self, ident: int, /) -> bool:
         """Take its frames."""
         return ident == self._ident
+
+    def suspects(self, ident: int, /) -> Suspects:
+        """Suspect what comes too late."""
+        return Suspects(above_us=self._most_us)
 
     def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
         """Compare the gap."""

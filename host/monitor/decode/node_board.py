@@ -82,6 +82,7 @@ class NodeBoard:
 
     def _process_data(self, channel: str, node: int, decoded: Decoded) -> None:
         status = self._status(channel, node)
+        status.heard = True
         for signal in decoded.signals:
             if signal.name == STATUSWORD and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)

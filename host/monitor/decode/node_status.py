@@ -59,6 +59,7 @@ class NodeStatus:
         sdo_error: the last of them, for people.
         drive_state: of CiA 402, empty while no statusword was heard.
         name: the device name it told.
+        heard: it has sent anything that is known to be its own.
     """
 
     channel: str
@@ -77,7 +78,7 @@ class NodeStatus:
     sdo_error: str = ""
     drive_state: str = ""
     name: str = ""
-    _heard: bool = False
+    heard: bool = False
     _reset_asked: bool = False
     _gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
 
@@ -123,7 +124,7 @@ class NodeStatus:
     def boot(self, at_us: int) -> None:
         """Take its boot-up: it is pre-operational then (CiA 301, boot-up)."""
         self.boots += 1
-        self.unasked_boots += self._heard and not self._reset_asked
+        self.unasked_boots += self.heard and not self._reset_asked
         self._reset_asked, self.drive_state, self.error_code = False, "", 0
         self._gaps.clear()
         self._tell(at_us, NmtState.PRE_OPERATIONAL)
@@ -136,11 +137,11 @@ class NodeStatus:
         self._tell(at_us, state)
 
     def _tell(self, at_us: int, state: int) -> None:
-        self.state, self.commanded, self.told_us, self._heard = state, None, at_us, True
+        self.state, self.commanded, self.told_us, self.heard = state, None, at_us, True
 
     def emcy(self, at_us: int, decoded: Decoded) -> None:
         """Take an EMCY."""
-        self._heard = True
+        self.heard = True
         if not decoded.signals:
             return
         code = decoded.signals[0].value
@@ -151,7 +152,7 @@ class NodeStatus:
 
     def transfer(self, transfer: Transfer) -> None:
         """Take an SDO transfer that ended."""
-        self._heard = self._heard or transfer.outcome.answered
+        self.heard = self.heard or transfer.outcome.answered
         if transfer.outcome is not Outcome.DONE:
             self.sdo_errors += 1
             self.sdo_error = str(transfer)

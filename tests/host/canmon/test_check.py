@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import json
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -107,8 +108,45 @@ def test_a_line_that_is_no_frame_breaks_no_loss(tmp_path: Path) -> None:
 
 def test_lost_frames_end_a_strict_check_with_4(tmp_path: Path) -> None:
     log = write(tmp_path / "run.jsonl", '{"v":1,"ev":"drop","n":12}\n')
-    assert check(log, "--no-emcy").exit_code == 0
+    assert check(log, "--no-emcy").exit_code == 5
     assert check(log, "--no-emcy", "--strict").exit_code == 4
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+@pytest.mark.parametrize("text", ["", "what?\n", "(1.000000) can0 123##1AA\n"])
+def test_where_nothing_was_judged_nothing_is_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool, text: str
+) -> None:
+    if at_once:
+        monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    log = write(tmp_path / "run.log", text)
+    report = tmp_path / "out.xml"
+    result = check(log, "--no-emcy", "--junit", str(report))
+    assert (result.exit_code, result.stdout) == (5, "")
+    said = f"nothing was judged: no frame in {log}"
+    assert result.stderr.splitlines()[-1] == f"Error: {said}"
+    suite = ET.fromstring(report.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert [suite.get(name) for name in ("tests", "failures", "errors")] == ["1", "0", "1"]
+    assert [error.get("message") for error in suite.iter("error")] == [said]
+
+
+def test_a_silent_bus_is_no_good_bus() -> None:
+    result = check("virtual:silent", "--for", "20ms", "--no-emcy")
+    assert (result.exit_code, result.stderr) == (5, "Error: nothing was judged: no frame came\n")
+
+
+def test_what_must_come_is_judged_by_silence(tmp_path: Path) -> None:
+    result = check(write(tmp_path / "run.log", ""), "--nodes", "3", "--no-emcy")
+    assert (result.exit_code, result.stdout) == (1, "(0.000000) nodes: node 3 was never heard\n")
+
+
+def test_a_report_of_a_log_that_breaks_off_does_not_say_that_it_is_well(tmp_path: Path) -> None:
+    log, report = tmp_path / "run.log.gz", tmp_path / "out.xml"
+    log.write_bytes(gzip.compress(LOG.encode())[:-12])
+    assert check(str(log), "--no-sdo-abort", "--junit", str(report)).exit_code == 3
+    (error,) = ET.fromstring(report.read_bytes()).iter("error")
+    assert str(log) in (error.get("message") or "")
 
 
 def test_the_load_is_checked_against_the_bit_rate(log: str) -> None:
@@ -126,7 +164,7 @@ def test_a_rule_file_may_name_the_bit_rate(log: str, tmp_path: Path) -> None:
 
 def test_a_source_may_name_the_bit_rate() -> None:
     words = ("--for", "50ms", "--max-load", "50")
-    assert check("virtual:check@500k", *words).exit_code == 0
+    assert check("virtual:check@500k", *words).exit_code == 5
     assert check("virtual:check", *words).exit_code == 2
 
 

@@ -67,16 +67,6 @@ def test_an_empty_file_of_a_binary_format_is_said_to_be_empty(
     assert result.stderr == f"Error: {path} is no blf log: it is empty\n"
 
 
-def test_rules_that_met_no_frame_say_so(tmp_path: Path) -> None:
-    path = tmp_path / "run.log"
-    path.touch()
-    result = canmon("check", str(path), "--no-emcy")
-    assert (result.exit_code, result.stderr) == (
-        0,
-        "all rules hold, but there were no frames\n",
-    )
-
-
 @pytest.mark.parametrize("name", ["run.log", "run.trc"])
 def test_lines_of_noise_are_shown_in_ascii_by_canmon_alone(tmp_path: Path, name: str) -> None:
     path = tmp_path / name

@@ -38,6 +38,13 @@ def test_a_rule_is_broken_for_a_while_and_then_was_until_it_is_acknowledged() ->
     assert [alarm.count for alarm in made.rows()] == [1]
 
 
+def test_before_any_frame_no_rule_is_said_to_hold() -> None:
+    made = alarms(no_emcy=True, nodes=3)
+    made.look(GRACE_US)
+    shown = [line.split()[:3] for line in render_alarms(made, GRACE_US)[1:3]]
+    assert shown == [["no-emcy", "no", "frame"], ["nodes", "BROKEN", "1"]]
+
+
 def test_a_heartbeat_that_stops_is_one_finding_however_long_it_lasts() -> None:
     made = taken(alarms(heartbeat="5=100ms±20%"), "2.9 705#05\n3.0 705#05")
     assert states(made, 3 * S + 120_000) == [State.HOLDS]

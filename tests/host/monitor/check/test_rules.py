@@ -109,6 +109,25 @@ def test_nodes_that_were_never_heard_are_found() -> None:
     assert broken(rules, "1 705#7F") == ["1 node 3 was never heard", "1 node 6 was never heard"]
 
 
+@pytest.mark.parametrize("can_id", ["083", "183", "283", "383", "483", "583", "703"])
+def test_a_node_was_heard_by_whatever_it_sent(can_id: str) -> None:
+    assert broken(parse_rules({"nodes": 3}), f"1 {can_id}#80") == []
+    boots = f"1 {can_id}#80\n2 703#00"
+    assert broken(Rules(no_reboot=True), boots) == ["2 node 3 boots again without an NMT reset"]
+
+
+@pytest.mark.parametrize("frame", ["000#0103", "080#", "203#00", "603#40", "703#R", "00000183#"])
+def test_what_others_send_to_a_node_is_not_the_node(frame: str) -> None:
+    assert broken(parse_rules({"nodes": 3}), f"1 {frame}") == ["1 node 3 was never heard"]
+    assert broken(Rules(no_reboot=True), f"1 {frame}\n2 703#00") == []
+
+
+def test_a_node_of_another_bus_is_another_node() -> None:
+    checker = Checker(Rules(no_reboot=True))
+    heards = hear("1 183#", "can0") + hear("2 703#00", "can1")
+    assert [finding for heard in heards for finding in checker.take(heard)] == []
+
+
 @pytest.mark.parametrize("command", ["8103", "8200"])
 def test_a_boot_after_a_reset_is_right(command: str) -> None:
     assert broken(Rules(no_reboot=True), f"1 703#00\n2 703#05\n3 000#{command}\n4 703#00") == []

@@ -89,6 +89,15 @@ def test_a_boot_up_that_nobody_asked_for_is_counted() -> None:
     assert (row.boots, row.unasked_boots, row.state_text) == (2, 1, "pre-operational")
 
 
+def test_a_node_that_sent_a_pdo_of_its_own_boots_again() -> None:
+    mapped = {(0x1A00, 0): b"\1", (0x1A00, 1): bytes.fromhex("10004160")}
+    decoder = Decoder({5: EdsObjects(values=mapped)})
+    board = NodeBoard(decoder)
+    for heard in trace("185#3702 705#00"):
+        board.take(heard, decoder.take(heard))
+    assert board.rows()[0].unasked_boots == 1
+
+
 def test_a_boot_up_after_a_reset_was_asked_for() -> None:
     row = status("705#00 000#8105 705#00 000#8200 705#00")
     assert (row.boots, row.unasked_boots) == (3, 0)
