@@ -213,10 +213,10 @@ class Rig:
                 return next_us
             if host is not None and host.arrived_us < next_us:
                 return max(self.now_us, host.arrived_us)
-            limit_us = min(next_us - 1, until_us)
+            limit_us = end_us = min(next_us - 1, until_us)
             if len(self._wires) > 1:  # what ends on one may let a station send on another
-                limit_us = min(limit_us, self._wires_due_us)
-            heard = [wire.advance_until_heard(limit_us) for wire in self._wires]
+                end_us = min(limit_us, self._wires_due_us)
+            heard = [wire.advance_until_heard(end_us) for wire in self._wires]
             if not any(heard) and self._wires_due_us > limit_us:
                 return next_us
 

@@ -3,8 +3,11 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.emulators.can_bench import frames
 from tests.emulators.echo import Echo
+from tests.emulators.test_can_rig import Node
 from tickrig.device.core import NEVER
+from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 
@@ -101,3 +104,14 @@ def test_a_rig_in_real_time_wakes_at_each_tick_but_runs_only_those_with_work() -
     Rig(Station(echo, SerialLine().a), clock=clock).run_for(60_000)
     assert clock.asked == [10_000, 20_000, 30_000, 40_000, 50_000, 60_000]
     assert echo.ticks == [30_000, 60_000]
+
+
+def test_of_several_wires_each_frame_is_heard_at_its_time() -> None:
+    quiet, busy = CanWire(), CanWire()
+    listener = Node(2, accepts=frozenset({0x80}))
+    stations = [Station(Node(1), quiet.end()), Station(listener, busy.end())]
+    rig, asked = Rig(*stations), busy.end()
+    quiet.end().send(1_000, frames("123#"))
+    asked.send(1_000, frames("300#11223344 301#11223344 080#"))
+    rig.run_to(10_000)
+    assert (listener.heard, listener.ticks) == (["080#"], [2_000, 5_000])
