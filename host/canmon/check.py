@@ -39,7 +39,7 @@ NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
 @span_option
 @click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report.")
 @click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(
     *,

@@ -27,7 +27,7 @@ from tickrig.host.cli.options import PATH
 @click.argument("log", type=PATH)
 @filter_option
 @decode_options
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],

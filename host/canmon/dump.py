@@ -60,7 +60,7 @@ _ending: Final = add_options(
     click.option(
         "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
     ),
-    click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost."),
+    click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."),
 )
 
 

@@ -27,15 +27,17 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 
     Raises:
         SourceFailed: it ended before its time.
-        FramesLost: frames were lost, and the caller is strict.
+        FramesLost: frames were lost or could not be taken, and the caller is strict.
     """
     source.close()
     for word in (*source.words(), *more):
         click.echo(word, err=True)
     if source.failed:
         raise SourceFailed(source.failed)
-    if strict and source.lost:
-        raise FramesLost(f"{source.lost} frames were lost")
+    missing = [f"{source.lost} frames were lost"] if source.lost else []
+    missing += [f"{source.unread} lines or frames passed over"] if source.unread else []
+    if strict and missing:
+        raise FramesLost(", ".join(missing))
 
 
 @contextmanager

@@ -46,6 +46,11 @@ class FileSource:
         return sum(reader.tally.lost for reader in self._readers)
 
     @property
+    def unread(self) -> int:
+        """Lines and frames that could not be taken."""
+        return sum(reader.tally.unread for reader in self._readers)
+
+    @property
     def failed(self) -> str:
         """Why reading ended early."""
         return self._failed

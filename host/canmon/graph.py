@@ -46,7 +46,7 @@ SIZE: Final = (100, 28)
 @click.option("--size", metavar="WxH", default="960x400", help="Of a picture; 960x400 pixels.")
 @click.option("--window", metavar="TIME", default="10s", help="Shown of a bus; 10s.")
 @span_option
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """Draw curves of SOURCE: in the terminal, or to files.

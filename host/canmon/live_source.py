@@ -95,6 +95,11 @@ class LiveSource(Generic[Item]):
         return self._overruns + sum(reader.lost for reader in self._readers)
 
     @property
+    def unread(self) -> int:
+        """Frames that came and could not be taken, as those of CAN FD."""
+        return sum(reader.tally.unread for reader in self._readers)
+
+    @property
     def failed(self) -> str:
         """Why a bus is gone."""
         return self._failed

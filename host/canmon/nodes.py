@@ -31,7 +31,7 @@ MANY: Final = 1_000
 @eds_option
 @span_option
 @click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(
     *,

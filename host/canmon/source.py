@@ -57,6 +57,11 @@ class AnySource(Protocol[Taken_co]):
         ...
 
     @property
+    def unread(self) -> int:
+        """Lines and frames that got here and could not be taken, as noise and CAN FD."""
+        ...
+
+    @property
     def failed(self) -> str:
         """Why it ended before its time; empty if it did not."""
         ...

@@ -26,7 +26,7 @@ from tickrig.host.monitor.traffic import Snapshot, Traffic
 )
 @span_option
 @click.option("--jsonl", is_flag=True, help="One JSON object a row.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(
     *,

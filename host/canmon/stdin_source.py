@@ -33,6 +33,11 @@ class StdinSource:
         return self._lines.tally.lost
 
     @property
+    def unread(self) -> int:
+        """Lines and frames that could not be taken."""
+        return self._lines.tally.unread
+
+    @property
     def failed(self) -> str:
         """Why reading ended early."""
         return self._failed

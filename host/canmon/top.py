@@ -42,7 +42,7 @@ Take = Callable[["Sequence[Listened]"], None]
 @filter_option
 @decode_options
 @span_option
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(  # noqa: PLR0913 - options
     *,

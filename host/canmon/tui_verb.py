@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
 )
 @decode_options
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
 @bus_options
 def command(
     *,

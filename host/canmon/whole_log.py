@@ -39,6 +39,11 @@ class WholeLog:
         """Frames that its recorder says it lost."""
         return self.columns.tally.lost
 
+    @property
+    def unread(self) -> int:
+        """Lines and frames that could not be taken."""
+        return self.columns.tally.unread
+
     def poll(self, timeout_us: int, /) -> list[Heard]:
         """Return nothing: all is in the columns."""
         return []

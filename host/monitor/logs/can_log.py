@@ -22,7 +22,7 @@ from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.can_heard import to_heard
 from tickrig.host.monitor.logs.log_format import LogFormat
 from tickrig.host.monitor.logs.log_reader import LogError, open_log
-from tickrig.host.monitor.logs.tally import BadLines, Tally
+from tickrig.host.monitor.logs.tally import OTHER_OBJECTS, BadLines, Tally
 from tickrig.host.monitor.logs.watched_lines import WatchedLines
 
 UNNAMED: Final = "can0"
@@ -36,8 +36,6 @@ BROKEN: Final = (
 
 UNSAID: Final = logging.NullHandler()
 """For what python-can logs of each bad line of TRC: it is counted here."""
-
-OTHER_OBJECTS: Final = "objects that are no frames"
 
 _TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),

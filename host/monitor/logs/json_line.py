@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import WireError
@@ -19,8 +19,6 @@ from tickrig.wire.errors import WireError
 VERSION: Final = 1
 LINE_EVENT: Final = "line"
 """A line of a serial port, which no log of CAN holds."""
-
-SERIAL_LINES: Final = "lines of a serial port"
 
 
 def json_line(heard: Heard, more: str = "") -> str:

@@ -13,6 +13,13 @@ SHOWN: Final = 60
 """Characters of a bad line that are shown."""
 
 
+SERIAL_LINES: Final = "lines of a serial port"
+OTHER_LINES: Final = "lines with other events"
+OTHER_OBJECTS: Final = "objects that are no frames"
+NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS)
+"""What a log may hold beside frames."""
+
+
 @dataclass(slots=True)
 class BadLines:
     """Lines that are none of their log.
@@ -47,13 +54,20 @@ class Tally:
 
     Attributes:
         bad_lines: lines that are none of the log.
-        passed_over: kinds of frames that classic CAN does not have, and how many.
+        passed_over: kinds of frames that classic CAN does not have, and of what is no
+            frame at all (`NO_FRAMES`), and how many.
         lost: frames that the recorder says it lost.
     """
 
     bad_lines: BadLines = field(default_factory=BadLines)
     passed_over: Counter[str] = field(default_factory=Counter)
     lost: int = 0
+
+    @property
+    def unread(self) -> int:
+        """Lines and frames that came and were not returned."""
+        frames = sum(n for what, n in self.passed_over.items() if what not in NO_FRAMES)
+        return self.bad_lines.count + frames
 
     def words(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if all was returned."""

@@ -8,16 +8,29 @@ from collections.abc import Iterator
 from typing import Final, TextIO
 
 from tickrig.host.monitor.logs.log_format import LogFormat
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.tally import OTHER_LINES, Tally
 
-OTHER_LINES: Final = "lines with other events"
+_SILENT: Final = {
+    LogFormat.ASC: re.compile(
+        r"\s*(?:$|//|date\b|base\b|(?:no\s+)?internal\s+events|(?:begin|end)\s+triggerblock"
+        r"|[0-9]+\.[0-9]+\s+(?:Start of measurement|//))",
+        re.IGNORECASE,
+    ),
+    LogFormat.TRC: re.compile(r"\s*(?:$|;)"),
+    LogFormat.CSV: re.compile(r"\s*(?:$|[^0-9])"),
+}
+"""Headers, comments and empty lines."""
 
 _EVENTS: Final = {
-    LogFormat.ASC: re.compile(r"\s*[0-9]+\.[0-9]+\s+(?!Start of measurement|//)\S"),
-    LogFormat.TRC: re.compile(r"\s*[^;\s]"),
-    LogFormat.CSV: re.compile(r"\s*[0-9]"),
+    LogFormat.ASC: re.compile(
+        r"\s*[0-9]+\.[0-9]+\s+(?!CANFD\b|[0-9]+\s+(?:[0-9A-F]+x?|ErrorFrame)\b)\S", re.IGNORECASE
+    ),
+    LogFormat.TRC: re.compile(
+        r"\s*[0-9]+\)?\s+[0-9.]+\s+(?:[0-9]+\s+)?(?:Warng|Error|ST|ER|EC|EV|F{8})\b"
+    ),
+    LogFormat.CSV: re.compile(r"(?!)"),
 }
-"""Lines that carry something: neither header nor comment."""
+"""Lines with what is no data or remote frame. What is neither of these was meant as a frame."""
 
 
 class WatchedLines(Iterator[str]):
@@ -31,7 +44,8 @@ class WatchedLines(Iterator[str]):
     """
 
     def __init__(self, file: TextIO, kind: LogFormat, tally: Tally) -> None:
-        self._file, self._event, self._tally = file, _EVENTS[kind], tally
+        self._file, self._silent, self._event = file, _SILENT[kind], _EVENTS[kind]
+        self._tally = tally
         self._line, self._number, self._again, self.ended = "", 0, False, False
 
     def __next__(self) -> str:
@@ -39,9 +53,7 @@ class WatchedLines(Iterator[str]):
         if self._again:
             self._again = False
             return "\n"
-        if self._event.match(self._line):
-            self._tally.passed_over[OTHER_LINES] += 1
-        self._line = ""
+        self._pass_over()
         try:
             self._line = next(self._file)
         except StopIteration:
@@ -49,6 +61,16 @@ class WatchedLines(Iterator[str]):
             raise
         self._number += 1
         return self._line
+
+    def _pass_over(self) -> None:
+        """Count the latest line, if it was not taken."""
+        line, self._line = self._line, ""
+        if self._silent.match(line):
+            return
+        if self._event.match(line):
+            self._tally.passed_over[OTHER_LINES] += 1
+        else:
+            self._tally.bad_lines.add(self._number, line.rstrip("\r\n"))
 
     def taken(self) -> None:
         """Note that the latest line came to a frame."""

@@ -24,7 +24,7 @@ BUS = "can0"
 class RigSource:
     """The rig's wire as a source; its time passes while it is polled."""
 
-    live, ended, lost, failed = True, False, 0, ""
+    live, ended, lost, unread, failed = True, False, 0, 0, ""
 
     def __init__(self, host: CanHost) -> None:
         self._host = host

@@ -110,6 +110,29 @@ def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> Non
     assert reader.tally.passed_over == {"lines with other events": 1, "CAN FD frames": 1}
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "bad"),
+    [
+        ("run.asc", "   0.000700 1  705             Ry   d 1 7F\n", 1),
+        ("run.asc", "   0.000700 CANFD   1 R\n", 1),
+        ("run.asc", "\x01noise\n", 1),
+        ("run.asc", "   0.000700 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n", 0),
+        ("run.trc", "     5)      1845.0  Ry         0705  1  7F\n", 1),
+        ("run.trc", "     5)      1845.0  Error      0004  4  00 00 00 08\n", 0),
+    ],
+)
+def test_a_line_that_its_reader_passes_over_is_bad_unless_it_is_an_event(
+    name: str, text: str, bad: int, tmp_path: Path
+) -> None:
+    head = ASC if name == "run.asc" else TRC
+    reader = read_log(log(tmp_path, name, head + text))
+    assert len(list(reader)) == len(list(read_log(log(tmp_path, name, head))))
+    reader = read_log(log(tmp_path, name, head + text))
+    list(reader)
+    assert reader.bad_lines.count == 1 + bad
+    assert reader.tally.passed_over["lines with other events"] == 2 - bad
+
+
 def test_bad_lines_of_trc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.trc", TRC))
     assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
