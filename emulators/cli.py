@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import click
 
-from tickrig import __version__
 from tickrig.emulators.ctl_cli import ctl
 from tickrig.emulators.demo_cli import demo
 from tickrig.emulators.replay_cli import replay_command
 from tickrig.emulators.rtc.cli import rtc
+from tickrig.host.cli.options import version_option
 
 
 @click.group()
-@click.version_option(__version__, message="%(prog)s %(version)s")
+@version_option()
 def main() -> None:
     """Work with emulated devices.
 

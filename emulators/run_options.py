@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from tickrig import __version__
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
 
 
 def run_options(wire_faults: str) -> Decorator:
@@ -22,5 +21,5 @@ def run_options(wire_faults: str) -> Decorator:
         ),
         click.option("--seed", type=int, default=0, help="Seed of the wire faults' chance.  [0]"),
         click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
-        click.version_option(__version__, message="%(prog)s (tickrig) %(version)s"),
+        version_option(),
     )

@@ -16,7 +16,7 @@ from tickrig.emulators.rh3.outing import Outing, demand_arrival, stopped_at_the_
 from tickrig.emulators.rh3.path_file import read_path
 from tickrig.emulators.rh3.squares import Size, play_squares
 from tickrig.emulators.rh3.track_plot import write_track
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.drive import drive
 from tickrig.host.motion.geometry import Pose
@@ -62,7 +62,7 @@ _PLOT: Final[Decorator] = click.option(
 
 
 @click.group()
-@click.version_option(package_name="tickrig", message="%(version)s")
+@version_option()
 def main() -> None:
     """Let a cart of Reference Hardware 3 drive: six components over a base.
 

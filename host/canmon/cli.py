@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import click
 
-from tickrig import __version__
 from tickrig.host.canmon.unread import until_unread
+from tickrig.host.cli.options import version_option
 
 VERBS: Final[dict[str, str]] = {
     "dump": "dump",
@@ -50,7 +50,7 @@ class LazyGroup(click.Group):
 
 
 @click.group(cls=LazyGroup)
-@click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
+@version_option()
 def main() -> None:
     """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.
 

@@ -8,6 +8,8 @@ from typing import Any, Final
 
 import click
 
+from tickrig import __version__
+
 PATH: Final = click.Path(path_type=Path)
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -22,3 +24,8 @@ def add_options(*options: Decorator) -> Decorator:
         return command
 
     return decorate
+
+
+def version_option() -> Decorator:
+    """Return a decorator that adds `--version`, in the form that all commands have."""
+    return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Final, NoReturn
 
 import click
+
+NEEDS_YAML: Final = "a System Definition needs PyYAML: pip install 'tickrig[rtc]'"
 
 
 class Refused(click.ClickException):

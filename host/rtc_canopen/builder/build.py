@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from tickrig.host.rtc_canopen.builder.c_header import write_header
 from tickrig.host.rtc_canopen.builder.fragment import write_fragment
 from tickrig.host.rtc_canopen.builder.names import check_identifiers, snake_name
 from tickrig.host.rtc_canopen.builder.profile_file import Project
-from tickrig.host.rtc_canopen.builder.skeleton import write_skeleton
+from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
 from tickrig.wire.canopen.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import device_info, object_table
-
-SKELETON_SUFFIX: Final = ".py"
 
 
 def build(project: Project) -> dict[str, str]:

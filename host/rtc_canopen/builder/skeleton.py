@@ -10,6 +10,8 @@ from tickrig.host.rtc_canopen.builder.profile_file import Project
 from tickrig.wire.rtc_canopen.port_types import INTEGER, PortType
 from tickrig.wire.rtc_canopen.profile import Direction, PortProfile, RtcProfile
 
+SKELETON_SUFFIX: Final = ".py"
+
 CALLBACKS: Final = (
     ("on_initialize", "Result", "Begin; after an error the node stays silent."),
     ("on_activated", "Result", "Become Active; an error leads to Error."),

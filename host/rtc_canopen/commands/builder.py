@@ -6,15 +6,10 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.rtc_canopen.builder.build import SKELETON_SUFFIX, build
-from tickrig.host.rtc_canopen.builder.profile_file import (
-    EXAMPLE,
-    Project,
-    parse_project,
-)
-from tickrig.host.rtc_canopen.builder.summary import summary
+from tickrig.host.cli.options import PATH, version_option
+from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
+from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project
+from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX
 
 
 @click.command()
@@ -23,6 +18,7 @@ from tickrig.host.rtc_canopen.builder.summary import summary
 @click.option("--force", is_flag=True, help="Overwrite the skeleton, which is yours to fill.")
 @click.option("--all", "every", is_flag=True, help="Show every object, not only those of ports.")
 @click.option("--example", is_flag=True, help="Print a profile to begin with, and end.")
+@version_option()
 def main(
     profile: Path | None, out: Path | None, *, force: bool, every: bool, example: bool
 ) -> None:
@@ -46,6 +42,8 @@ def main(
     if profile is None:
         raise Refused("give a PROFILE, or --example for one to begin with")
     project, files = _build(profile)
+    from tickrig.host.rtc_canopen.builder.summary import summary  # noqa: PLC0415 - the extra [rtc]
+
     if out is not None:
         _write(out, files, force=force)
     for line in summary(project.profile, every=every):
@@ -53,6 +51,10 @@ def main(
 
 
 def _build(path: Path) -> tuple[Project, dict[str, str]]:
+    try:
+        from tickrig.host.rtc_canopen.builder.build import build  # noqa: PLC0415 - the extra [rtc]
+    except ModuleNotFoundError:
+        raise Refused(NEEDS_YAML) from None
     try:
         project = parse_project(path.read_text("utf-8"))
         return project, build(project)

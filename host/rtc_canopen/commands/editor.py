@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.errors import LinkClosed
 from tickrig.host.rtc_canopen.commands.opening import (
@@ -33,6 +33,7 @@ from tickrig.wire.can_error import ErrorState
 @component_option
 @click.option("--log", type=PATH, help="File for the events, a line of JSON each.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
+@version_option()
 def main(
     file: Path, log: Path | None, components: Sequence[str], *, start: bool, **options: Any
 ) -> None:

@@ -12,7 +12,7 @@ import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.options import Decorator
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.link import Link
 from tickrig.host.rtc.component import RtComponent
@@ -50,8 +50,8 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
     """Make the server of a System Definition, with components; Refused if one cannot be used."""
     try:
         from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - canopen is slow
-    except ModuleNotFoundError as error:
-        raise Refused(f"{error}: pip install 'tickrig[rtc]'") from None
+    except ModuleNotFoundError:
+        raise Refused(NEEDS_YAML) from None
     try:
         server = open_server(file)
         furnish(server, components)

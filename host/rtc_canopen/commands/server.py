@@ -13,7 +13,7 @@ import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.errors import LinkClosed
 from tickrig.host.link import NEVER, Link
@@ -42,6 +42,7 @@ ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
 @click.option("--check", is_flag=True, help="Read FILE and its EDS files, and end.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not tell the events on standard error.")
+@version_option()
 def main(file: Path, span: str | None, **options: Any) -> None:
     """Manage the CANopen nodes of a System Definition as RT components.
 

@@ -1,0 +1,149 @@
+"""Every console command, in an environment without extras."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import packages_distributions, requires
+from pathlib import Path
+
+import click
+import pytest
+from packaging.requirements import Requirement
+
+from tickrig import __version__
+from tickrig.emulators.cli import main as tickrig
+from tickrig.emulators.rh3.motion_cli import main as rh3
+from tickrig.host.canmon.cli import main as canmon
+
+ROOT = Path(__file__).parents[1]
+SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["scripts"]
+LOG = "(1.000000) can0 185#0102\n"
+
+BAD = {
+    "tickrig": ("ctl /nowhere describe", "/nowhere: No such file"),
+    "rrc-emu": ("--panel", "pip install 'tickrig[tui]'"),
+    "rtc-lite-emu": ("--node nowhere.py:Echo", "nowhere.py: No such file"),
+    "canmon": ("tui a.log", "pip install 'tickrig[tui]'"),
+    "rh3": ("goto 1 0 0 --plot a.png", "pip install 'tickrig[plot]'"),
+    "rh3-emu": ("--address 0", "0"),
+    "urg-emu": ("--room 4", "a room is WIDTH,DEPTH"),
+    "canopen-slave-emu": ("--eds nowhere.eds --node-id 5 --scenario -", "nowhere.eds"),
+    "rtc-canopen-server": ("a.yaml", "pip install 'tickrig[rtc]'"),
+    "rtc-canopen-builder": ("a.toml", "pip install 'tickrig[rtc]'"),
+    "rtc-canopen-editor": ("a.yaml", "pip install 'tickrig[tui]'"),
+}
+"""A bad input for each, of those that want an extra where there is one, and what is said."""
+
+GOOD = {
+    "canmon dump a.log": "185   [2]  01 02",
+    "canmon conv a.log b.csv": "",
+    "canmon stats a.log": "185",
+    "canmon top a.log": "185",
+    "canmon check a.log --no-emcy": "",
+    "canmon nodes a.log": "",
+    "rtc-canopen-builder --example": "[[port]]",
+    "canopen-slave-emu --model rtc-echo --write-eds -": "[DeviceInfo]",
+}
+"""What works without extras, and a part of what it says."""
+
+
+def plain_distributions() -> set[str]:
+    """Name what `pip install tickrig` brings along."""
+    found, todo = set(), ["tickrig"]
+    while todo:
+        name = todo.pop().lower().replace("_", "-")
+        if name not in found:
+            found.add(name)
+            for each in map(Requirement, requires(name) or ()):
+                if each.marker is None or each.marker.evaluate({"extra": ""}):
+                    todo.append(each.name)
+    return found
+
+
+def missing_packages() -> list[str]:
+    plain = plain_distributions()
+    return [
+        package
+        for package, owners in packages_distributions().items()
+        if plain.isdisjoint(owner.lower().replace("_", "-") for owner in owners)
+    ]
+
+
+def paths(command: click.Command, *above: str) -> Iterator[tuple[str, ...]]:
+    """Give the words that lead to each command."""
+    yield above
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from paths(found, *above, name)
+
+
+GROUPS = {"tickrig": tickrig, "rh3": rh3, "canmon": canmon}
+HELP = [
+    *(f"{script} --help" for script in SCRIPTS if script not in GROUPS),
+    *(" ".join([*path, "--help"]) for name, group in GROUPS.items() for path in paths(group, name)),
+]
+LINES = [
+    *(f"{script} --version" for script in SCRIPTS),
+    *(f"{script} {words}" for script, (words, _) in BAD.items()),
+    *GOOD,
+    *HELP,
+]
+Result = tuple[int, str, str]
+"""Exit status, standard output, standard error."""
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
+    """Return what each command line said where no extra is installed."""
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "a.log").write_text(LOG)
+    process = subprocess.run(
+        [sys.executable, ROOT / "tests" / "plain_install.py", ",".join(missing_packages())],
+        input="".join(f"{SCRIPTS[line.split()[0]]} {line}\n" for line in LINES),
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        check=True,
+    )
+    answers = map(json.loads, process.stdout.splitlines())
+    return {line: tuple(answer) for line, answer in zip(LINES, answers, strict=True)}
+
+
+def test_the_extras_are_what_a_plain_install_lacks() -> None:
+    extras = {"textual", "tomlkit", "matplotlib", "numpy", "cantools", "yaml", "evdev"}
+    assert extras <= {*missing_packages()}
+    assert {"click", "can", "canopen", "serial"}.isdisjoint(missing_packages())
+
+
+@pytest.mark.parametrize("line", HELP)
+def test_help_needs_no_extra(said: dict[str, Result], line: str) -> None:
+    code, out, err = said[line]
+    assert (code, out[:6], err) == (0, "Usage:", "")
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_version_has_one_form(said: dict[str, Result], script: str) -> None:
+    assert said[f"{script} --version"] == (0, f"{script} (tickrig) {__version__}\n", "")
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_bad_input_is_one_line(said: dict[str, Result], script: str) -> None:
+    words, what = BAD[script]
+    code, out, err = said[f"{script} {words}"]
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("Error: ")
+    assert what in err
+
+
+@pytest.mark.parametrize("line", GOOD)
+def test_what_needs_no_extra_works(said: dict[str, Result], line: str) -> None:
+    code, out, err = said[line]
+    assert (code, "Traceback" in err) == (0, False)
+    assert GOOD[line] in out
