@@ -5,11 +5,13 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Callable
+from typing import Any
 
 import can
 
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.errors import LinkClosed
+from tickrig.host.multicast_group import keep_to_group
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.can_error_class import CONTROLLER_BYTE, ControllerFlag, ErrorClass
@@ -102,9 +104,10 @@ class CanLink:
 
 
 def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
-    if bit_rate is None:
-        return can.Bus(channel=channel, interface=interface)
-    return can.Bus(channel=channel, interface=interface, bitrate=bit_rate)
+    given: dict[str, Any] = {} if bit_rate is None else {"bitrate": bit_rate}
+    bus = can.Bus(channel=channel, interface=interface, **given)
+    keep_to_group(bus, interface)
+    return bus
 
 
 def _is_full(error: Exception) -> bool:

@@ -1,20 +1,22 @@
 """A SocketCAN bus, read from its socket: with the frames that the kernel dropped.
 
 The kernel counts frames for which a socket's queue had no room, and tells the
-count with each frame that is read (socket(7), SO_RXQ_OVFL). python-can does not
-ask for it.
+count with each frame that is read (socket(7), SO_RXQ_OVFL). Frames of CAN FD and
+CAN XL it shows to sockets alone that want them (linux, networking/can). python-can
+asks for neither; here all is asked for, and what is not classic CAN is counted.
 """
 
 from __future__ import annotations
 
 import socket
 import struct
+from contextlib import suppress
 from select import select
 from typing import Any, Final
 
 from tickrig.host.errors import LinkClosed
 from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.log_line import CAN_FD
+from tickrig.host.monitor.logs.log_line import CAN_FD, CAN_XL
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
@@ -22,6 +24,9 @@ from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
 SO_RXQ_OVFL: Final = 40
 SO_TIMESTAMPNS: Final = 35
 SO_RCVBUFFORCE: Final = 33
+SOL_CAN_RAW: Final = 101
+CAN_RAW_FD_FRAMES: Final = 5
+CAN_RAW_XL_FRAMES: Final = 7
 RECEIVE_BYTES: Final = 4 << 20
 """Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
 
@@ -31,7 +36,9 @@ _EXTENDED: Final = 0x8000_0000
 _REMOTE: Final = 0x4000_0000
 _STANDARD_MASK: Final = 0x7FF
 _FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame, linux/can.h
-_FD_BYTES: Final = 72  # struct canfd_frame
+_FD_BYTES: Final = 72  # struct canfd_frame; a frame of CAN XL is cut to as many
+_FLAGS_AT: Final = 4  # flags of struct canxl_frame, where others have a length below
+_XL_FLAG: Final = 0x80
 _STAMP: Final = struct.Struct("@ll")
 _COUNT: Final = struct.Struct("@I")
 _ANCILLARY: Final = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_COUNT.size)
@@ -57,6 +64,9 @@ class SocketReader:
         self._socket: socket.socket = bus.socket
         self.lost, self.tally = 0, Tally()
         self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        for option in (CAN_RAW_FD_FRAMES, CAN_RAW_XL_FRAMES):
+            with suppress(OSError):  # older kernels have no such frames
+                self._socket.setsockopt(SOL_CAN_RAW, option, 1)
         _enlarge(self._socket)
         self._socket.setblocking(False)
 
@@ -89,7 +99,7 @@ class SocketReader:
             elif kind == SO_RXQ_OVFL:
                 self.lost = _COUNT.unpack(said)[0]
         if len(data) != _FRAME.size:
-            self.tally.passed_over[CAN_FD] += 1
+            self.tally.passed_over[CAN_XL if data[_FLAGS_AT] & _XL_FLAG else CAN_FD] += 1
             return ()
         sent = bool(flags & socket.MSG_CONFIRM)  # by this very socket (linux, networking/can)
         return (Heard(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)

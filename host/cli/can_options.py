@@ -139,6 +139,8 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     import can  # noqa: PLC0415 - slow
     from can.util import load_config  # noqa: PLC0415
 
+    from tickrig.host.multicast_group import keep_to_group  # noqa: PLC0415
+
     _check_interface(options.interface)
     given = _given(options)
     try:
@@ -153,6 +155,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     interface, channel = str(config["interface"]), config["channel"]
     try:
         bus = can.Bus(**{"single_handle": True, **given})
+        keep_to_group(bus, interface)
     except Exception as error:  # its drivers raise whatever they come across, NameError even
         name = interface if channel is None else f"{interface} {channel}"
         raise BusUnavailable(f"CAN bus {name}: {_reason(error)}") from None

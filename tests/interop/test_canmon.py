@@ -132,6 +132,21 @@ def test_a_reader_that_is_stopped_counts_what_the_kernel_dropped(vcan: Bus, tmp_
     assert sum(drops) > 0
 
 
+@pytest.mark.parametrize("arguments", [["-f"], ["-f", "-b"], ["-m", "-f"]])
+def test_can_fd_frames_are_counted_and_said(
+    vcan: Bus, arguments: list[str], tmp_path: Path
+) -> None:
+    with listening([*CANMON, "dump", vcan.channel, "-L"], tmp_path, "dump") as canmon:
+        run("cansend", vcan.channel, "123##1AA")
+        run("cangen", vcan.channel, "-n", "100", "-g", "1", *arguments)
+        run("cansend", vcan.channel, "7FF#")
+        wait(lambda: any(line.endswith("7FF#") for line in canmon.lines))
+        assert canmon.end() == 0
+        (count,) = re.findall(rf"{vcan.channel}: ([0-9]+) CAN FD frames passed over", canmon.said)
+    assert len(canmon.lines) + int(count) == 102
+    assert int(count) > 50
+
+
 def test_what_our_slave_says_is_decoded(vcan: Bus, tmp_path: Path) -> None:
     words = [*CANMON, "dump", vcan.channel, "--eds", f"5={EDS}", "-F", "sdo"]
     with (

@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 import time
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import can
 import pytest
@@ -12,6 +12,7 @@ from tests.interop.buses import MULTICAST, PORT
 from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig
+from tickrig.host.can_message import to_message
 from tickrig.host.canmon.bus_source import BusSource, merged
 from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.source import Source, open_source
@@ -22,6 +23,7 @@ from tickrig.host.errors import LinkClosed
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 PATIENCE_US = 10_000_000
 
@@ -139,6 +141,28 @@ def test_a_bus_over_udp_stays_on_this_machine() -> None:
     assert (one.channel, one.frame) == (group, CanFrame(5))
     assert merged(BusWord("udp_multicast", group), BusOptions()).bus_kwargs == ("hop_limit=0",)
     source.close()
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    "groups", [("239.74.163.65", "239.74.163.66"), ("ff11::7469:6370", "ff11::7469:6371")]
+)
+def test_groups_on_one_port_do_not_hear_each_other(groups: tuple[str, str]) -> None:
+    if why := MULTICAST.why_not():
+        pytest.skip(why)
+    options = BusOptions(bus_kwargs=(f"port={PORT}", "hop_limit=0"))
+    source = open_source([f"udp:{group}" for group in groups], options)
+    sent = [(group, CanFrame(can_id)) for can_id in (1, 2) for group in groups]
+    for group, frame in sent:
+        with can.Bus(interface="udp_multicast", channel=group, port=PORT, hop_limit=0) as bus:
+            bus.send(to_message(frame))
+    heard = wait(source, lambda came: all(one in named(came) for one in sent[2:]))
+    assert sorted(named(heard), key=str) == sorted(sent, key=str)
+    source.close()
+
+
+def named(heard: Sequence[Heard]) -> list[tuple[str, CanFrame | ErrorFrame]]:
+    return [(one.channel, one.frame) for one in heard]
 
 
 def test_a_rig_in_virtual_time_is_a_bus_whose_time_passes_while_it_is_polled() -> None:

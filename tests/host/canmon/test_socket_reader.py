@@ -84,12 +84,16 @@ def test_frames_of_every_kind_are_read_with_the_time_of_the_kernel(
 
 
 @pytest.mark.realtime
-def test_can_fd_frames_are_counted(bus: Bus, sender: Sender) -> None:
+def test_frames_of_can_fd_and_can_xl_are_counted(bus: Bus, sender: Sender) -> None:
     reader = SocketReader(bus, "can0")
-    sender.socket.send(bytes(72))
+    sender.socket.send(struct.pack("=IB67x", 0x123, 64))
+    sender.socket.send(struct.pack("=IBBHI", 0x123, 0x80, 0, 2_048, 0) + bytes(2_048))
     sender.frame(0x705)
     read(reader, 1)
-    assert reader.tally.words("can0") == ["can0: 1 CAN FD frames passed over"]
+    assert reader.tally.words("can0") == [
+        "can0: 1 CAN FD frames passed over",
+        "can0: 1 CAN XL frames passed over",
+    ]
 
 
 @pytest.mark.realtime
