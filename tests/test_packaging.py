@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -21,7 +22,7 @@ def copied(tmp_path: Path) -> Path:
     tree = tmp_path / "tree"
     for name in (*sorted(FOLDERS), "src"):
         shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=STALE)
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree / name)
     return tree
 
@@ -40,3 +41,25 @@ def test_wheel_holds_one_top_level_name_and_all_modules(tmp_path: Path) -> None:
         for path in (ROOT / folder).rglob("*.py")
     }
     assert packed == sources | {"tickrig/__init__.py", "tickrig/py.typed"}
+
+
+def test_a_checkout_without_links_is_refused_with_the_line_that_mends_it(tmp_path: Path) -> None:
+    tree = copied(tmp_path)
+    links = {
+        path: path.readlink() for path in (tree / "src" / "tickrig").iterdir() if path.is_symlink()
+    }
+    for path, target in links.items():  # as git writes them with core.symlinks=false
+        path.unlink()
+        path.write_text(str(target))
+    build = subprocess.run(  # what every build and installation begins with
+        [sys.executable, "setup.py", "--version"],
+        cwd=tree,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert build.returncode == 1
+    assert build.stderr.startswith("src/tickrig/device is no link to device/")
+    (line,) = re.findall(r"ln -sf .*", build.stderr)
+    subprocess.run(line, shell=True, cwd=tree, check=True)
+    assert {path: path.readlink() for path in links} == links
