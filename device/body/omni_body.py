@@ -7,7 +7,6 @@ from math import cos, pi, sin
 from typing import Final, NamedTuple
 
 from tickrig.device.body.pose import Pose
-from tickrig.device.core import NonCopyable
 
 STEP_S: Final = 1e-3
 
@@ -71,7 +70,7 @@ class OmniParameters:
 
 
 @dataclass(slots=True)
-class OmniBody(NonCopyable):
+class OmniBody:
     """Three wheels that follow their commands with a time constant, without slip.
 
     Not emulated: rollers, slip, mass, encoders, the driver.

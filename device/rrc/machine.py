@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NEVER
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
@@ -36,7 +36,7 @@ MOVES: Final[dict[type[cmd.Command], Move]] = {
 
 
 @dataclass(slots=True)
-class Rrc(NonCopyable):
+class Rrc:
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
     Not emulated: the traffic on the VR2 bus itself, how fast the vehicle drives
@@ -257,11 +257,11 @@ class Rrc(NonCopyable):
             self._power.enter(state, tick)
         if state is RrcState.STANDBY:
             self._renewed = tick
+        if RrcState.INITIALIZE in (self.state, state):  # what commands set in there goes, too
+            self._wipe()
         self.state, self._moved = state, tick
         if state is RrcState.POWER_OFF_FINISHED:
             self._move(Move.RESTART, tick)
-        if state is RrcState.INITIALIZE:
-            self._wipe()
         return True
 
     def _wipe(self) -> None:

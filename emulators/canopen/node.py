@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NEVER
 from tickrig.device.physical import Output
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.node_inputs import Emergency, Quantity, Switch
@@ -40,7 +40,7 @@ NODE_OUTPUTS: Final = (
 )
 
 
-class Node(NonCopyable):
+class Node:
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
     Without power it neither sends nor hears, and begins anew when power is back.

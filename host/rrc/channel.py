@@ -96,14 +96,15 @@ class Channel:
 
     def restart(self) -> None:
         """Forget all that was known of the RRC and the commands."""
-        self.ledger.wiped()
+        self.ledger.clear()
         self._alarm = None
 
     @property
     def _renewal_us(self) -> int:
         if self.ledger.refusals.stopped is not None:
             return NEVER
-        return self._keep_alive.due_us(self.ledger.mirror.watchdog_10ms)
+        due_us = self._keep_alive.due_us(self.ledger.mirror.watchdog_10ms)
+        return max(due_us, self.ledger.doubt_ends_us)  # VR2 is off meanwhile
 
     def _renew_in_time(self) -> None:
         if self._renewal_us <= self._link.now_us:
@@ -117,15 +118,18 @@ class Channel:
         return data
 
     def _wait_turn(self, command: Command) -> None:
-        """Wait until the RRC has time; `poweroff` never waits, and always may be sent."""
+        """Wait until the RRC has time and each OK has one owner.
+
+        `poweroff` never waits, and always may be sent.
+        """
         if isinstance(command, PowerOff):
             return
         stopped = self.ledger.refusals.stopped
         if stopped is not None:
             name, limit = command.name.decode(), self.ledger.refusals.limit
             raise RrcStopped(f"{name} not sent after {limit} refusals in a row", stopped)
-        while self._link.now_us < self._free_us:
-            self.step(self._free_us)
+        while self._link.now_us < (turn_us := max(self._free_us, self.ledger.doubt_ends_us)):
+            self.step(turn_us)
 
     def _put_unawaited(self, command: Command) -> None:
         stable = self.ledger.mirror.stable

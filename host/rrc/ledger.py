@@ -26,7 +26,7 @@ class Ledger:
 
     def sent(self, now_us: int, command: Command) -> None:
         """Note a command that nobody waits for."""
-        self._outbox.add(now_us, command.name.decode())
+        self._outbox.add(now_us, command)
         self.mirror.sent(command)
 
     def take(self, reply: Answer, exchange: Exchange | None) -> bool:
@@ -35,8 +35,7 @@ class Ledger:
             case Refusal(reason):
                 self.refusals.refused(self._refused_name(reply, exchange), reason)
                 return True
-            case Ok(name) if self._outbox.claim(name) is not None:
-                self.refusals.accepted(name)
+            case Ok(name) if self._take_unawaited(name, exchange):
                 return True
             case Ok() | Text():
                 return exchange is not None and self._take_answer(reply, exchange)
@@ -47,10 +46,23 @@ class Ledger:
             if self.mirror.stable:
                 self.refusals.accepted(name)
 
+    @property
+    def doubt_ends_us(self) -> int:
+        """Until when an OK may belong to a command from before `wiped`; 0 if none may."""
+        return self._outbox.doubt_ends_us
+
     def wiped(self) -> None:
-        """The RRC was initialized: nothing that was known holds any more."""
+        """The RRC was initialized: nothing that was known holds any more.
+
+        But a command that waited in its receive buffer meanwhile is carried out after that.
+        """
         self.mirror.wiped()
         self.refusals.clear()
+        self._outbox.doubt()
+
+    def clear(self) -> None:
+        """Forget all: the talk begins again."""
+        self.wiped()
         self._outbox.clear()
 
     def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
@@ -63,9 +75,20 @@ class Ledger:
         """
         if exchange is not None and exchange.has_barrier and exchange.take(refusal):
             return exchange.name
-        if (name := self._outbox.claim(refusal.reason)) is not None:
+        if (name := self._outbox.refused(refusal.reason)) is not None:
             return name
         return exchange.name if exchange is not None and exchange.take(refusal) else ""
+
+    def _take_unawaited(self, name: str, exchange: Exchange | None) -> bool:
+        """Account for an OK to a command that nobody waits for; False if it is not one."""
+        in_doubt = self._outbox.doubt_ends_us > 0
+        command = self._outbox.carried_out(name)
+        if command is None:
+            return False
+        awaited_too = in_doubt and exchange is not None and exchange.name == name
+        self.refusals.accepted(name)
+        self.mirror.sent(exchange.command if exchange and awaited_too else command)
+        return True
 
     def _take_answer(self, answer: Ok | Text, exchange: Exchange) -> bool:
         was_done = exchange.done

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.host.rrc.exchange import NAMELESS
+from tickrig.wire.rrc.commands import Command
 
 SETTLED_US: Final = 100_000
 """An ER would have come by then: 10 periods of the RRC."""
 
 MOTION: Final = ("output", "limit")
+
+
+class _Entry(NamedTuple):
+    sent_us: int
+    command: Command
+
+    @property
+    def name(self) -> str:
+        return self.command.name.decode()
 
 
 class Outbox:
@@ -22,29 +32,53 @@ class Outbox:
     """
 
     def __init__(self) -> None:
-        self._sent: deque[tuple[int, str]] = deque()
+        self._sent: deque[_Entry] = deque()
+        self._doubted_us = -1  # what was sent up to then may be carried out, or lost
 
-    def add(self, now_us: int, name: str) -> None:
+    @property
+    def doubt_ends_us(self) -> int:
+        """When the fate of all that was sent before a restart will be known; 0 if it is."""
+        in_doubt = self._sent and self._sent[0].sent_us <= self._doubted_us
+        return self._doubted_us + SETTLED_US if in_doubt else 0
+
+    def doubt(self) -> None:
+        """Note that the RRC was initialized: what waits in its buffer is still to come."""
+        if self._sent:
+            self._doubted_us = self._sent[-1].sent_us
+
+    def add(self, now_us: int, command: Command) -> None:
         """Note a command that was just sent."""
-        self._sent.append((now_us, name))
+        self._sent.append(_Entry(now_us, command))
 
-    def claim(self, reason: str) -> str | None:
-        """Take out the command that an OK or ER belongs to; return its name."""
+    def carried_out(self, name: str) -> Command | None:
+        """Take out the command that an OK belongs to; return the newest of its name.
+
+        That one counts: it was carried out or will be, if the older ones were not lost with
+        the RRC's power, and this OK is its own.
+        """
+        same = [entry for entry in self._sent if entry.name == name]
+        if not same:
+            return None
+        self._sent.remove(same[0])
+        return same[-1].command
+
+    def refused(self, reason: str) -> str | None:
+        """Take out the command that an ER belongs to, and return its name."""
         wanted = (*MOTION, None) if reason in NAMELESS else (reason,)
         for name in wanted:
             for entry in self._sent:
-                if name in (None, entry[1]):
+                if name in (None, entry.name):
                     self._sent.remove(entry)
-                    return entry[1]
+                    return entry.name
         return None
 
     def settle(self, now_us: int) -> list[str]:
         """Take out those that no reply came for in time; return their names."""
         settled = []
-        while self._sent and self._sent[0][0] + SETTLED_US <= now_us:
-            settled.append(self._sent.popleft()[1])
+        while self._sent and self._sent[0].sent_us + SETTLED_US <= now_us:
+            settled.append(self._sent.popleft().name)
         return settled
 
     def clear(self) -> None:
-        """Forget all: the RRC was restarted."""
+        """Forget all."""
         self._sent.clear()

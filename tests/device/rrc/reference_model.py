@@ -3,9 +3,9 @@
 It shares no code with the device: no table, no codec, no type. It is slow and plain on purpose,
 counts in exact numbers where the digest gives real ones, and visits every tick of 10 ms.
 
-Two readings are not forced by the digest; the model reads them as the device does: Initialize does
-not look at the power button, so that a press in its tick is seen one tick later; while the bus is
-unplugged, a power-on test sees no other fault.
+Three readings are not forced by the digest; the model reads them as the device does: Initialize
+does not look at the power button, so that a press in its tick is seen one tick later; what commands
+set in its tick is wiped at its end; while the bus is unplugged, a power-on test sees no other fault.
 """
 
 import math
@@ -234,6 +234,7 @@ class ReferenceRrc:
 
     def power_events(self) -> None:
         if self.state == "Initialize":
+            self.wipe()
             self.state = "WaitPowerOn"
             self.sent.append("EV:Initialized")
             return

@@ -100,6 +100,20 @@ def test_the_buttons_drive_is_gone_after_vr2_was_off() -> None:
     assert out(bench) == (0, 0)
 
 
+@pytest.mark.parametrize(("again", "gear"), [("speed_up_button", "R"), ("speed_down_button", "N")])
+def test_a_second_press_of_alarm_begins_anew_only_with_another_choice(
+    again: str, gear: str
+) -> None:
+    bench = RrcBench().power_on()
+    bench.set(speed_up_button=1, stick_v_pct=-50)
+    bench.tap("alarm_button")
+    assert bench.rrc.read("gear") == "R"
+    bench.set(speed_up_button=0, stick_v_pct=50)
+    bench.set(**{again: 1})
+    bench.tap("alarm_button")
+    assert bench.rrc.read("gear") == gear
+
+
 def test_alarm_in_limit_mode_does_not_change_the_drive() -> None:
     bench = RrcBench().enter("Limit")
     bench.set(stick_v_pct=-60, speed_down_button=1)

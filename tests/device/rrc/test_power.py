@@ -6,6 +6,8 @@ import pytest
 
 from tests.device.rrc.bench import RrcBench
 from tickrig.device.core import NEVER
+from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.rrc.settings import Settings
 
 CAUSES = {
     "bus_noise": "CommunicationError",
@@ -180,3 +182,24 @@ def test_an_unknown_output_is_a_key_error() -> None:
 def test_every_declared_output_can_be_read() -> None:
     rrc = RrcBench().rrc
     assert all(isinstance(rrc.read(name), int | str) for name in rrc.outputs)
+
+
+@pytest.mark.parametrize("line", ["stablemode1", "watchdog03", "speedmode41", "statusA1"])
+def test_what_commands_set_during_initialize_is_wiped_at_its_end(line: str) -> None:
+    bench = RrcBench().enter("PowerOffByButton")
+    bench.run(48)
+    bench.align()
+    assert bench.step(line) == ["EV:PowerOffFinished", f"OK:{line.rstrip('A0123456789')}"]
+    assert bench.step() == ["EV:Initialized"]
+    assert bench.rrc._settings == Settings()
+    assert bench.step("version") == ["OK:version", "Version 1.0"]
+
+
+def test_a_beep_of_initialize_ends_with_it() -> None:
+    bench = RrcBench(RrcConfig(initialize_ticks=20))
+    bench.step()
+    bench.step("beepff000000000000000000")
+    bench.step()
+    assert bench.rrc.read("buzzer") == 1
+    assert bench.run(17) == ["EV:Initialized"]
+    assert bench.rrc.read("buzzer") == 0
