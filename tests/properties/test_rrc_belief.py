@@ -123,11 +123,7 @@ class Stage:
     def receive(self, timeout_us: int, /) -> bytes:
         until_us = self.now_us + timeout_us
         while True:
-            while self._acts and self._acts[0][0] <= self.now_us:
-                _, act = self._acts.pop(0)
-                self.rrc.inputs.set(act.name, act.value)
-            next_us = min(until_us, self._acts[0][0]) if self._acts else until_us
-            data = self._link.receive(next_us - self.now_us)
+            data = self._link.receive(self._act(until_us) - self.now_us)
             if data or self.now_us >= until_us:
                 return data
 
@@ -154,23 +150,26 @@ class Stage:
     def sleep(self, until_us: int) -> None:
         """Let time pass while the client does not listen."""
         while self.now_us < until_us:
-            next_us = min([until_us, *[at_us for at_us, _ in self._acts[:1]]])
-            self.rig.run_to(next_us)
-            while self._acts and self._acts[0][0] <= self.now_us:
-                _, act = self._acts.pop(0)
-                self.rrc.inputs.set(act.name, act.value)
+            self.rig.run_to(self._act(until_us))
+
+    def _act(self, until_us: int) -> int:
+        """Do what is due; return when the next act is, at most `until_us`."""
+        while self._acts and self._acts[0][0] <= self.now_us:
+            _, act = self._acts.pop(0)
+            self.rrc.inputs.set(act.name, act.value)
+        return min(until_us, self._acts[0][0]) if self._acts else until_us
 
     @property
     def quiet(self) -> bool:
         """Whether all that was sent was worked on, and all that was answered was read."""
-        waiting = self.rrc._buffer  # noqa: SLF001 - the truth is in there
+        waiting = self.rrc._buffer
         return not waiting and self.line.a.idle_us == self.line.b.idle_us == NEVER
 
     def check_belief(self) -> None:
         """Compare; not before EV:Initialized, which tells that the RRC was off or starts again."""
         if not self.quiet or self.rrc.state in (RrcState.OFF, RrcState.INITIALIZE):
             return
-        truth, belief = self.rrc._settings, self.client._ledger.mirror  # noqa: SLF001
+        truth, belief = self.rrc._settings, self.client._ledger.mirror
         assert belief.stable == truth.stable, "stablemode"
         assert belief.watchdog_10ms == truth.watchdog_ticks, "watchdog"
         assert belief.locked == truth.speed_locked, "lock"
@@ -234,7 +233,7 @@ def failures(chosen: Iterable[tuple[str, cmd.Command, Talk, int]]) -> Iterator[s
     for name, command, talk, at_ms in chosen:
         try:
             play(STORIES[name], command, talk, at_ms)
-        except Exception as error:  # noqa: BLE001 - told with what led to it
+        except Exception as error:
             kind = f"{type(error).__name__} {str(error).splitlines()[0] if str(error) else ''}"
             yield f"{name}; {command}; {talk}; at {at_ms} ms: {kind}"
 
