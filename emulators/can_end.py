@@ -23,11 +23,26 @@ Accepted = frozenset[int] | None
 
 @runtime_checkable
 class Filtering(Protocol):
-    """A device that says which CAN-IDs it listens to; it may change in any tick."""
+    """A device that says which CAN-IDs it listens to.
+
+    A filter may pass more than the device wants, never less: the device itself
+    decides, frame by frame. So a frame that could change what it listens to lets
+    all that follow it pass, until the device has handled it.
+    """
 
     @property
     def accepts(self) -> Accepted:
-        """The CAN-IDs, as a new object whenever they change."""
+        """The CAN-IDs; None, for all, from power-on or a reset to the first tick."""
+        ...
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts` when they are handled."""
+        ...
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when `accepts` or `reconfigured_by` has changed, in a tick or between."""
         ...
 
 
@@ -53,12 +68,14 @@ class CanEnd:
         room: how many may be there; none while the node is bus-off.
         held: no frame of it starts before this, in units of the segment.
         lost: frames that found a queue or inbox full, or the node bus-off.
+        unfiltered: its filter is out of use until it is polled.
         on_error_state: told the time and the new state when the error state changes.
     """
 
     __slots__ = (
-        *("_accepts", "_device", "_error_aware", "controller", "held", "inbox", "lost", "number"),
-        *("on_error_state", "queue", "room", "segment", "stamps", "wake", "wire"),
+        *("_accepts", "_device", "_error_aware", "_reconfigured_by", "controller", "held", "inbox"),
+        *("unfiltered", "lost", "number", "on_error_state", "queue", "room", "segment", "stamps"),
+        *("wake", "wire"),
     )
 
     def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
@@ -68,7 +85,8 @@ class CanEnd:
         self.queue: deque[CanFrame] = deque()
         self.inbox: list[CanFrame] = []
         self.stamps: list[int] = []  # when the frames of `inbox` had arrived
-        self.room, self.held, self.lost = QUEUE_FRAMES, 0, 0
+        self.room, self.held, self.lost, self.unfiltered = QUEUE_FRAMES, 0, 0, False
+        self._reconfigured_by: frozenset[int] = frozenset()
         self.wake: Callable[[int], None] = _ignore
         self.on_error_state: Callable[[int, ErrorState], None] | None = None
         self._device: Filtering | None = None
@@ -98,7 +116,9 @@ class CanEnd:
         """Take the filter from a device, tell it the error state, say when a frame has arrived."""
         self.wake = wake
         if isinstance(device, Filtering):
-            self._device, self.accepts = device, device.accepts
+            self._device = device
+            device.on_accepts.append(self._refilter)
+            self._refilter()
         if isinstance(device, ErrorAware):
             self._error_aware = device
 
@@ -106,6 +126,9 @@ class CanEnd:
         """Take the frames that had ended by `now_us`."""
         if self.segment.now_us < now_us:
             self.wire.advance(now_us)
+        if self.unfiltered:
+            self.unfiltered = False
+            self.segment.routes.unfiltered.remove(self)
         if not self.inbox:
             return ()
         frames = tuple(self.inbox)
@@ -121,9 +144,6 @@ class CanEnd:
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
         """Queue frames behind those that have not left."""
-        device = self._device
-        if device is not None and device.accepts is not self._accepts:
-            self.accepts = device.accepts
         if traffic:
             self.segment.send(self, now_us, traffic)
 
@@ -141,6 +161,26 @@ class CanEnd:
             return
         self.inbox.append(frame)
         self.stamps.append(at_us)
+        if frame[0] in self._reconfigured_by:
+            self.pass_all()
+
+    def pass_all(self) -> None:
+        """Open the filter until the next poll: the device will listen to nobody knows what."""
+        if not self.unfiltered:
+            self.unfiltered = True
+            self.segment.routes.unfiltered.append(self)
+
+    def _refilter(self) -> None:
+        """Follow what the device listens to."""
+        if self._device is not None:
+            self.accepts = self._device.accepts
+            self._reconfigured_by = self._device.reconfigured_by
+
+    def forget(self) -> None:
+        """Lose what waits to be sent and to be polled, as a node without power does."""
+        self.queue.clear()
+        self.inbox.clear()
+        self.stamps.clear()
 
     def open(self, *, on_bus: bool) -> None:
         """Let it send, or not; then what waits is lost."""

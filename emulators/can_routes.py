@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 from tickrig.wire.can import CanFrame
@@ -20,10 +21,12 @@ class CanRoutes:
 
     Attributes:
         ends: all ends, in the order in which they joined.
+        unfiltered: those of them whose filter is out of use until they are polled.
     """
 
     def __init__(self) -> None:
         self.ends: list[CanEnd] = []
+        self.unfiltered: list[CanEnd] = []
         self._table: dict[int, tuple[CanEnd, ...]] = {}
 
     def forget(self) -> None:
@@ -36,7 +39,13 @@ class CanRoutes:
         found = self._table.get(key)
         if found is None:
             found = self._table[key] = self._look_up(key)
-        return found
+        return (*found, *self._passing(key)) if self.unfiltered else found
+
+    def _passing(self, key: int) -> Iterator[CanEnd]:
+        """Give the unfiltered ends that a CAN-ID would not reach by the filters."""
+        for end in self.unfiltered:
+            if end.accepts is not None and key not in end.accepts:
+                yield end
 
     def _look_up(self, key: int) -> tuple[CanEnd, ...]:
         if len(self._table) >= CACHED_ROUTES:

@@ -129,6 +129,8 @@ class CanSegment:
     def join(self, end: CanEnd, now_us: int) -> None:
         """Let an end take part from now on."""
         self.routes.ends.append(end)
+        if end.unfiltered:
+            self.routes.unfiltered.append(end)
         end.segment = self
         self._confinement.join(end)
         self.disturb(now_us)
@@ -144,6 +146,8 @@ class CanSegment:
             self._arbiter.free = now_us * self.unit + (ECHO_BITS + ERROR_BITS) * self.bit
         self._arbiter.remove(end)
         self.routes.ends.remove(end)
+        if end.unfiltered:
+            self.routes.unfiltered.remove(end)
         self._confinement.leave(end)
         self._recovery.leave(end)
         self._recount(now_us)

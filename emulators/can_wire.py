@@ -118,11 +118,11 @@ class CanWire:
             self.bus.join(end, self.bus.now_us)
 
     def cut_power(self, end: CanEnd) -> None:
-        """Take a node off the bus: what it had to send is lost, its controller begins anew."""
+        """Take a node off the bus: what it had to send or had received is lost, all begins anew."""
         self.disconnect(end)
         apart, now_us = self._apart[end.number], self.bus.now_us
         apart.leave(end, now_us)
-        end.queue.clear()
+        end.forget()
         end.controller.restart()
         end.open(on_bus=True)
         apart.join(end, now_us)

@@ -74,6 +74,10 @@ class LssSlave(Service):
         if len(self._identity) == len(LssAddress._fields):
             yield LSS_MASTER_COB_ID, self._receive
 
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the LSS master: a slave that gets its node-ID boots."""
+        return (can_id for can_id, _ in self.handlers(state))
+
     def tick(self, now_us: int) -> None:
         """Switch the bit rate."""
         self._switch_us = NEVER

@@ -47,6 +47,10 @@ class NmtSlave(Service):
         if self.node.node_id != UNCONFIGURED:
             yield NMT_COB_ID, self._receive
 
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the NMT master: what is heard follows the state."""
+        return (can_id for can_id, _ in self.handlers(state))
+
     def _receive(self, frame: CanFrame) -> None:
         """Obey; what is not a command for this node is ignored."""
         if len(frame.data) != 2 or frame.data[1] not in (ALL_NODES, self.node.node_id):

@@ -9,7 +9,9 @@ from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.rpdo import RPDO_PARAMETERS, Rpdo
 from tickrig.device.canopen.service import Handler, Service
 from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.sync import COB_ID_SYNC
 from tickrig.device.core import NEVER
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.nmt import NmtState
 
 SYNCHRONOUS_WINDOW_LENGTH: Final = 0x1007
@@ -63,6 +65,16 @@ class PdoConsumer(Service):
         for rpdo, handler in listening:
             if handler is not None:
                 yield rpdo.parameters.can_id, handler
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the RPDOs that may write communication objects, and the SYNC that makes them act."""
+        if state is not NmtState.OPERATIONAL:
+            return
+        rpdos = [rpdo for rpdo in self.rpdos if rpdo.parameters.valid and rpdo.reconfigures]
+        yield from (rpdo.parameters.can_id for rpdo in rpdos)
+        sync = self.node.dictionary.find(COB_ID_SYNC)
+        if sync is not None and any(rpdo.synchronous for rpdo in rpdos):
+            yield sync.number & CAN_ID_MASK
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Forget what has come if the node is not Operational any more."""

@@ -15,6 +15,7 @@ from tickrig.device.canopen.pdo_parameters import (
     PdoParameters,
 )
 from tickrig.device.canopen.service import Handler
+from tickrig.device.canopen.slave import COMMUNICATION_AREA
 from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
@@ -61,6 +62,14 @@ class Rpdo:
         self._unpack: Unpack
         self._pending: bytes | None
         self._length, self._event_us, self._supervised = 0, 0, False
+
+    @property
+    def reconfigures(self) -> bool:
+        """Whether it may write a communication object: an MPDO, or one is mapped."""
+        entries = (slot.entry for slot in self.mapping.slots())
+        return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(
+            entry is not None and entry.index in COMMUNICATION_AREA for entry in entries
+        )
 
     @property
     def synchronous(self) -> bool:

@@ -100,6 +100,10 @@ class SdoServers(Service):
                 if additional.exists:
                     yield additional.server.request_id, additional.server.receive
 
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the clients: they write COB-IDs, heartbeat consumers, mappings."""
+        return (can_id for can_id, _ in self.handlers(state))
+
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Drop transfers with the state that served them."""
         if new not in ALIVE:

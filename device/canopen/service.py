@@ -55,6 +55,13 @@ class Service:
         """The same for remote frames."""
         return iter(())
 
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Give those of the CAN-IDs whose frames may, when handled, change what the node hears.
+
+        An acceptance filter lets everything pass behind such a frame.
+        """
+        return iter(())
+
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Hear of each change of the NMT state, after it was made."""
 

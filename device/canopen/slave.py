@@ -50,7 +50,10 @@ class CanopenSlave:
         pending_id: the node-ID that counts from the next reset on (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
-        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire.
+        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire; None,
+            for all, from power-on or a reset to the first tick.
+        reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
+        on_accepts: called when these two have changed.
         time_of_day: the latest TIME stamp that was received, None before the first.
         silent_until_us: nothing is sent before; LSS switches the bit rate.
         on_state: told of each change of the NMT state, old and new.
@@ -83,7 +86,9 @@ class CanopenSlave:
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler] = {}
         self._remote_handlers: dict[int, Handler] = {}
-        self.accepts: frozenset[int] = frozenset()
+        self.accepts: frozenset[int] | None = None
+        self.reconfigured_by: frozenset[int] = frozenset()
+        self.on_accepts: list[Callable[[], None]] = []
         self._dues = [NEVER] * len(services)
         self._due_us = 0
         self.services = [make(self, slot) for slot, make in enumerate(services)]
@@ -102,6 +107,7 @@ class CanopenSlave:
         """Lose power; the next tick is the first one after power-on."""
         self._powered = False
         self._due_us = 0
+        self._listen_to(None)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Run one tick."""
@@ -174,12 +180,20 @@ class CanopenSlave:
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
         self._handlers, self._remote_handlers = {}, {}
+        reconfigured_by: list[int] = []
         for service in self.services:
+            reconfigured_by += service.reconfigured_by(self.state)
             for can_id, handler in service.handlers(self.state):
                 self._handlers[can_id] = _both(self._handlers.get(can_id), handler)
             for can_id, handler in service.remote_handlers(self.state):
                 self._remote_handlers[can_id] = handler
-        self.accepts = frozenset((*self._handlers, *self._remote_handlers))
+        self.reconfigured_by = frozenset(reconfigured_by)
+        self._listen_to(frozenset((*self._handlers, *self._remote_handlers)))
+
+    def _listen_to(self, accepts: frozenset[int] | None) -> None:
+        self.accepts = accepts
+        for told in self.on_accepts:
+            told()
 
     def enter(self, state: NmtState) -> None:
         """Change the NMT state; services and application hear of it."""

@@ -9,6 +9,7 @@ from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.core import NEVER
 from tickrig.device.physical import Output
+from tickrig.emulators.can_end import Accepted
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.node_inputs import Emergency, Quantity, Switch
 from tickrig.emulators.canopen.touch import ObjectTouch, Touch, find_object, object_name
@@ -74,7 +75,7 @@ class Node:
         self.physical: Mapping[str, Touch] = {
             "power_off": Switch("power_off", "its supply is cut", self._switch),
             "unplugged": Switch("unplugged", "its CAN plug is pulled", self._plug),
-            "emergency": Emergency(slave, self._pending.append),
+            "emergency": Emergency(slave, self._defer),
             **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
         }
         self.groups = bank.groups
@@ -96,9 +97,19 @@ class Node:
         return self.slave.due_us if self._on else self._coasts_us
 
     @property
-    def accepts(self) -> frozenset[int]:
+    def accepts(self) -> Accepted:
         """CAN-IDs that it listens to."""
         return self.slave.accepts
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts` when handled."""
+        return self.slave.reconfigured_by
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when these two have changed."""
+        return self.slave.on_accepts
 
     def reset(self) -> None:
         """Power-on reset."""
@@ -123,7 +134,7 @@ class Node:
         entry = find_object(self.slave.dictionary, name)
         if entry is None:
             return None
-        return ObjectTouch(object_name(self.slave.dictionary, entry), entry, self._pending.append)
+        return ObjectTouch(object_name(self.slave.dictionary, entry), entry, self._defer)
 
     def touchable(self) -> list[str]:
         """Return all names."""
@@ -140,6 +151,11 @@ class Node:
             case "can_state":
                 return ERROR_STATE_NAMES[self.port.controller.state]
         return self.application.read(name)
+
+    def _defer(self, action: Callable[[], None]) -> None:
+        """Act at the beginning of the next tick: what is heard in it may then be another."""
+        self._pending.append(action)
+        self.port.pass_all()
 
     def _catch_up(self, now_us: int) -> None:
         """Let what was done since the last tick take effect."""
@@ -167,6 +183,6 @@ class Node:
             self._wire.reconnect(self.port)
 
     def _error_state_changed(self, now_us: int, state: ErrorState) -> None:
-        self._pending.append(lambda: self.slave.bus_state(state))
+        self._defer(lambda: self.slave.bus_state(state))
         if state is ErrorState.BUS_OFF:
             self.port.recover(now_us)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import pytest
@@ -16,16 +17,24 @@ from tickrig.emulators.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 
+SWITCH = 0x101
+BURST = ("100#0102", "101#", "102#", "203#", "202#")
+
 
 @dataclass
 class Node:
-    """Answers what it accepts after a while, each time with more; sends by itself each period."""
+    """Answers what it accepts after a while, each time with more; sends by itself each period.
+
+    The frame `SWITCH` changes what it accepts, from the next frame on.
+    """
 
     number: int
     tick_us: int = 1_000
     period_us: int = NEVER
     delay_us: int = 3_000
     accepts: Accepted = frozenset()
+    reconfigured_by: frozenset[int] = frozenset({SWITCH})
+    on_accepts: list[Callable[[], None]] = field(default_factory=list)
     ticks: list[int] = field(default_factory=list)
     heard: list[str] = field(default_factory=list)
     count: int = 0
@@ -49,19 +58,31 @@ class Node:
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         self.ticks.append(now_us)
         out: Frames = ()
-        wanted = [f for f in rx if self.accepts is None or f.can_id in self.accepts]
-        self.heard += map(str, wanted)
+        wanted = [frame for frame in rx if self.hears(frame)]
         if wanted and self.answer_us == NEVER:
             self.answer_us = now_us + self.delay_us
         if now_us >= self.answer_us:
             self.answer_us, self.count = NEVER, self.count + 1
             out += (CanFrame(0x200 + self.number, self.count.to_bytes(2, "little")),)
             if self.count % 3 == 0 and self.accepts:
-                self.accepts = frozenset({max(self.accepts) ^ 1, 0x100})
+                self.accept(frozenset({max(self.accepts) ^ 1, 0x100}))
         if now_us >= self.beat_us:
             self.beat_us += self.period_us
             out = (CanFrame(0x100 + self.number % 3, bytes([self.number])), *out)
         return out
+
+    def hears(self, frame: CanFrame) -> bool:
+        if self.accepts is not None and frame.can_id not in self.accepts:
+            return False
+        self.heard.append(str(frame))
+        if frame.can_id == SWITCH:
+            self.accept(frozenset(can_id ^ 3 for can_id in self.accepts or ()) | {SWITCH})
+        return True
+
+    def accept(self, accepts: Accepted) -> None:
+        self.accepts = accepts
+        for told in self.on_accepts:
+            told()
 
 
 class Unfiltered:
@@ -105,7 +126,7 @@ def play(
     for wait_us, who in poked:
         rig.run_for(wait_us)
         devices[who % len(devices)].answer_us = rig.now_us
-        host.send(rig.now_us, frames("100#0102"))
+        host.send(rig.now_us, frames(" ".join(BURST[: 1 + who])))
     rig.run_for(60_000)
     wire.advance(rig.now_us)
     return log.lines, [device.heard for device in devices]

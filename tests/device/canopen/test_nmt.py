@@ -88,6 +88,19 @@ def test_changes_of_state_are_told() -> None:
     assert told == [pre_operational, (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)]
 
 
+def test_a_slave_accepts_all_from_power_on_and_a_reset_to_the_first_tick() -> None:
+    bus, told = make_bus(), list[bool]()
+    slave = bus.slave
+    assert slave.accepts is None
+    slave.on_accepts.append(lambda: told.append(slave.accepts is None))
+    bus.step()
+    assert told.pop() is False
+    slave.reset()
+    assert told.pop() is True
+    bus.step()
+    assert told.pop() is False
+
+
 def test_reset_communication_keeps_the_application() -> None:
     bus = make_bus()
     bus.step()

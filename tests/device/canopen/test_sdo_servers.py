@@ -78,7 +78,7 @@ def test_an_additional_server_serves_once_both_cob_ids_are_valid() -> None:
     assert bus.step("605#23011201A0060000") == ["585#6001120100000000"]
     assert bus.step(f"6A0#{READ_TYPE}") == []
     assert bus.step("605#23011202A1060000") == ["585#6001120200000000"]
-    assert 0x6A0 in bus.slave.accepts
+    assert 0x6A0 in (bus.slave.accepts or ())
     assert bus.step(f"6A0#{READ_TYPE}") == [f"6A1#{TYPE}"]
 
 
@@ -153,7 +153,7 @@ def test_a_can_id_changes_only_while_it_is_invalid() -> None:
 def test_a_server_with_one_cob_id_in_the_dictionary_is_left_out() -> None:
     bus = make_bus([Entry(0x1201, 1, "half", DataType.UNSIGNED32, RW, default=0x6A0)])
     bus.step()
-    assert 0x6A0 not in bus.slave.accepts
+    assert 0x6A0 not in (bus.slave.accepts or (0x6A0,))
 
 
 def test_an_additional_server_of_the_eds_serves_from_the_start() -> None:
