@@ -5,7 +5,8 @@ counts in exact numbers where the digest gives real ones, and visits every tick 
 
 Three readings are not forced by the digest; the model reads them as the device does: Initialize
 does not look at the power button, so that a press in its tick is seen one tick later; what commands
-set in its tick is wiped at its end; while the bus is unplugged, a power-on test sees no other fault.
+set in its tick is wiped at its end; while the bus is unplugged, a power-on test sees no other
+fault.
 """
 
 import math
