@@ -85,10 +85,11 @@ class NoSdoAbort(FrameRule):
         if len(data) != FRAME_BYTES or data[0] != ClientCommand.ABORT:
             return None
         index, sub = index_sub(data)
+        which = f"{index:04X}h:{sub:02X}" if index or sub else "its transfer"
         side = "server" if frame.can_id in ANSWER_IDS else "client"
         reason = describe_abort(int.from_bytes(data[4:], "little"))
         node = frame.can_id & NODE_MASK
-        return f"node {node}: {side} aborts {index:04X}h:{sub:02X}, {reason}"
+        return f"node {node}: {side} aborts {which}, {reason}"
 
 
 class NoErrorFrames(FrameRule):

@@ -109,8 +109,10 @@ class SdoChannel:
             self._end(running.close(at_us, Outcome.DONE))
         ended, self._ended = tuple(self._ended), []
         entry = _named(message)
-        if entry is None:
-            entry = running.entry if running else None
+        if entry is None and ended:
+            entry = ended[-1].entry
+        elif entry is None and running:
+            entry = running.entry
         return Step(text, entry, ended)
 
     def _end(self, transfer: Transfer) -> None:
@@ -190,18 +192,27 @@ class SdoChannel:
         return opened
 
     def _abort(self, at_us: int, message: Abort, *, by_client: bool) -> str:
-        running, entry = self._running, (message.index, message.sub)
-        if running is None or running.entry not in (None, entry):
-            running = OpenTransfer(at_us, self.node, Direction.UPLOAD, Mode.EXPEDITED, *entry)
-            running.partial = True
-        running.index, running.sub = entry
-        code = message.code
-        self._end(running.close(at_us, Outcome.ABORTED, code=code, by_client=by_client))
+        """End the transfer that runs; an abort of another object ends one that was not heard."""
+        running, entry, code = self._running, _named(message), message.code
+        if running and (entry is None or running.entry in (None, entry)):
+            if entry is not None:
+                running.index, running.sub = entry
+            self._end(running.close(at_us, Outcome.ABORTED, code=code, by_client=by_client))
+            return "aborted"
+        other = OpenTransfer(at_us, self.node, Direction.UNKNOWN, Mode.EXPEDITED)
+        other.index, other.sub = entry or (None, None)
+        other.partial = True
+        self._ended.append(other.close(at_us, Outcome.ABORTED, code=code, by_client=by_client))
         return "aborted"
 
 
 def _named(message: Request | Response) -> tuple[int, int] | None:
-    """Return the index and sub-index that a frame names itself."""
+    """Return the index and sub-index that a frame names itself.
+
+    Some clients name none with an abort: 0000h:00 is no object.
+    """
+    if isinstance(message, Abort) and not (message.index or message.sub):
+        return None
     index, sub = getattr(message, "index", None), getattr(message, "sub", None)
     return None if index is None or sub is None else (index, sub)
 

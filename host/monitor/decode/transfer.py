@@ -14,6 +14,7 @@ class Direction(StrEnum):
 
     UPLOAD = "upload"
     DOWNLOAD = "download"
+    UNKNOWN = "transfer of"  # an abort alone was heard
 
 
 class Mode(StrEnum):

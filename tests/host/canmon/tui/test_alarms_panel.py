@@ -36,7 +36,7 @@ def test_findings_are_shown_acknowledged_and_cleared() -> None:
         await desk.press("space")
         assert all(alarm.acknowledged for alarm in desk.panel.held.alarms.rows())
         await desk.press("c")
-        assert desk.lines()[1].split()[1:] == ["holds", "0"]
+        assert desk.lines()[1].split()[1:] == ["no", "frame", "0"]
         await desk.press("f5")
 
     panel = at_desk(AlarmsPanel, act, settings={"rules": {"no_sdo_abort": True}})
@@ -56,7 +56,7 @@ def test_rules_are_written_and_held() -> None:
         assert "needs the bit rate" in desk.static("#wrong")
         area.text = "no_emcy = true"
         await desk.press("f5")
-        assert desk.lines()[1].split()[:2] == ["no-emcy", "holds"]
+        assert desk.lines()[1].split()[:3] == ["no-emcy", "no", "frame"]
         await desk.press("e", "x", "escape")
         assert not area.display
 

@@ -40,6 +40,12 @@ def test_aborts_of_both_sides_are_found() -> None:
     ]
 
 
+def test_an_abort_that_names_no_object_is_found() -> None:
+    assert broken(Rules(no_sdo_abort=True), "1 603#8000000000000405") == [
+        "1 node 3: client aborts its transfer, SDO protocol timed out (05040000h)"
+    ]
+
+
 def test_other_sdo_frames_are_not_found() -> None:
     assert broken(Rules(no_sdo_abort=True), "1 583#6040600000000000\n2 583#80") == []
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
-from canopen.sdo.exceptions import SdoAbortedError
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from tests.emulators.sim_bench import SimBench
 from tests.host.monitor.decode.traces import decode, last, transfers
@@ -111,6 +113,44 @@ def test_a_refusal_carries_its_abort_code(listener: Listener) -> None:
 def test_an_abort_of_the_client_is_told_as_such() -> None:
     (found,) = transfers("605#4000100000000000 605#8000100000000405")
     assert (found.outcome, found.by_client) == (Outcome.ABORTED, True)
+
+
+@pytest.mark.parametrize(
+    ("begun", "mode"),
+    [
+        ("605#2B171000C8000000", Mode.EXPEDITED),
+        ("605#2117100014000000 585#6017100000000000 605#0001020304050607", Mode.SEGMENTED),
+        ("605#C217100014000000 585#A01710000A000000 605#0101020304050607", Mode.BLOCK),
+    ],
+)
+def test_an_abort_that_names_no_object_ends_the_transfer_that_runs(begun: str, mode: Mode) -> None:
+    (found,) = transfers(f"{begun} 605#8000000000000405")
+    assert (found.direction, found.entry, found.mode) == (Direction.DOWNLOAD, (0x1017, 0), mode)
+    assert (found.outcome, found.by_client, found.partial) == (Outcome.ABORTED, True, False)
+    assert last(f"{begun} 605#8000000000000405").entry == (0x1017, 0)
+
+
+def test_a_time_out_of_the_canopen_library_ends_its_transfer(listener: Listener) -> None:
+    silent: Any = listener.bench.network.add_node(9, listener.node.object_dictionary)
+    with pytest.raises(SdoCommunicationError):
+        silent.sdo.download(0x2002, 0, bytes(4))
+    listener.bench.network.run_for(1_000)
+    (found,) = listener.found
+    assert (found.direction, found.entry) == (Direction.DOWNLOAD, (0x2002, 0))
+    assert "aborted by client: SDO protocol timed out" in str(found)
+
+
+def test_an_abort_of_nothing_that_was_heard_is_of_an_unknown_object() -> None:
+    (found,) = transfers("605#8000000000000405")
+    assert found.entry is None
+    assert str(found).startswith("transfer of an unknown object (aborted by client: ")
+
+
+def test_an_abort_of_another_object_leaves_the_transfer_that_runs() -> None:
+    other, done = transfers("605#4000100000000000 585#8001100000000206 585#4300100092010200")
+    assert (other.entry, other.outcome, other.partial) == ((0x1001, 0), Outcome.ABORTED, True)
+    assert str(other).startswith("transfer of 1001h:00 ")
+    assert (done.entry, done.outcome, done.partial) == ((0x1000, 0), Outcome.DONE, False)
 
 
 def test_a_request_that_is_sent_again_is_one_transfer() -> None:
