@@ -12,6 +12,10 @@ from tickrig.emulators.requests import Object
 Answers = Future[list[Object]]
 
 
+class EmulatorEnded(Exception):  # noqa: N818 - no error
+    """Nobody is there to answer any more."""
+
+
 class Inbox:
     """Takes requests from any thread; the emulator's own thread answers them.
 
@@ -27,7 +31,8 @@ class Inbox:
     def post(self, requests: Sequence[Object]) -> Answers:
         """Hand in requests; they are answered together, between two steps.
 
-        The future is cancelled if the emulator ends first.
+        The future raises EmulatorEnded if the emulator ends first. It is not cancelled: an event
+        loop would take that for the end of the task that waits.
         """
         answers: Answers = Future()
         self._posted.put((requests, answers))
@@ -36,15 +41,17 @@ class Inbox:
         return answers
 
     def serve(self) -> None:
-        """Answer what was handed in, or cancel it after the end."""
+        """Answer what was handed in, or refuse it after the end."""
         while True:
             try:
                 requests, answers = self._posted.get_nowait()
             except Empty:
                 return
+            if not answers.set_running_or_notify_cancel():
+                continue
             if self._closed:
-                answers.cancel()
-            elif answers.set_running_or_notify_cancel():
+                answers.set_exception(EmulatorEnded())
+            else:
                 answers.set_result([self._control.answer(request) for request in requests])
 
     def close(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from asyncio import CancelledError
 from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar, Final
 
@@ -12,6 +11,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer, Static
 
+from tickrig.emulators.inbox import EmulatorEnded
 from tickrig.emulators.requests import VERSION, Object
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
@@ -133,7 +133,7 @@ class RrcPanel(App[None]):
     async def _request(self, *requests: Object) -> list[Object]:
         try:
             return await self._ask(requests)
-        except CancelledError:  # the emulator has ended
+        except EmulatorEnded:
             self.exit()
             return []
 

@@ -9,7 +9,7 @@ import pytest
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
-from tickrig.emulators.inbox import Inbox
+from tickrig.emulators.inbox import EmulatorEnded, Inbox
 from tickrig.emulators.requests import Object
 from tickrig.emulators.rrc import panel_text
 from tickrig.emulators.rrc.panel import RrcPanel
@@ -136,9 +136,28 @@ def test_it_can_be_left(key: str) -> None:
     on_panel(act)
 
 
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
+def test_it_can_be_left_while_the_emulator_does_not_answer(key: str) -> None:
+    async def main() -> None:
+        asked = asyncio.Event()
+
+        async def ask(requests: Sequence[Object]) -> list[Object]:
+            asked.set()
+            return await asyncio.Future()
+
+        panel = RrcPanel(ask)
+        async with panel.run_test() as pilot:
+            await asked.wait()
+            await pilot.press(key)
+            await pilot.pause()
+            assert not panel.is_running
+
+    asyncio.run(asyncio.wait_for(main(), 20))
+
+
 def test_it_ends_with_its_emulator() -> None:
     async def ask(requests: Sequence[Object]) -> list[Object]:
-        raise asyncio.CancelledError
+        raise EmulatorEnded
 
     async def main() -> None:
         panel = RrcPanel(ask)
@@ -204,7 +223,7 @@ def test_what_goes_wrong_in_the_rig_is_not_lost(monkeypatch: pytest.MonkeyPatch)
         run_panel(Emulator("rrc", Rrc()))
 
 
-def test_an_inbox_answers_together_and_cancels_after_the_end() -> None:
+def test_an_inbox_answers_together_and_refuses_after_the_end() -> None:
     inbox = Inbox(Control(Emulator("rrc", Rrc())))
     asked = inbox.post([{"v": 1, "do": "get", "names": ["gauge"]}, {"v": 1, "do": "nope"}])
     assert not asked.done()
@@ -215,5 +234,5 @@ def test_an_inbox_answers_together_and_cancels_after_the_end() -> None:
     inbox.serve()
     waiting = inbox.post([{"v": 1, "do": "get"}])
     inbox.close()
-    assert waiting.cancelled()
-    assert inbox.post([]).cancelled()
+    assert isinstance(waiting.exception(0), EmulatorEnded)
+    assert isinstance(inbox.post([]).exception(0), EmulatorEnded)
