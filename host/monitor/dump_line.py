@@ -95,8 +95,11 @@ def seconds_text(span_us: int, digits: int) -> str:
 
 
 def date_text(at_us: int) -> str:
-    """Write a time since the epoch as the local date and time."""
+    """Write a time since the epoch as the local date and time; without a date after 9999."""
     from datetime import datetime  # noqa: PLC0415 - seldom wanted
 
     seconds, micros = divmod(at_us, 1_000_000)
-    return f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}.{micros:06d}"
+    try:
+        return f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}.{micros:06d}"
+    except (ValueError, OverflowError, OSError):
+        return seconds_text(at_us, 10)

@@ -46,13 +46,14 @@ class DbcFile:
             (message.frame_id, message.is_extended_frame): message for message in database.messages
         }
         self._units = {
-            message.name: {signal.name: signal.unit or "" for signal in message.signals}
-            for message in self._messages.values()
+            ident: {signal.name: signal.unit or "" for signal in message.signals}
+            for ident, message in self._messages.items()
         }
 
     def decode(self, frame: CanFrame) -> Decoded | None:
         """Return the signals of a frame; None where the file does not name its CAN-ID."""
-        message = self._messages.get((frame.can_id, frame.extended))
+        ident = frame.can_id, frame.extended
+        message = self._messages.get(ident)
         if message is None:
             return None
         if frame.remote:
@@ -61,7 +62,7 @@ class DbcFile:
             found = message.decode_simple(frame.data, allow_truncated=True)
         except self._failures as error:
             return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
-        units = self._units[message.name]
+        units = self._units[ident]  # DBCs made from EDS have several messages of one name
         signals = tuple(_signal(name, value, units[name]) for name, value in found.items())
         return Decoded("dbc", None, " ".join([message.name, *map(str, signals)]), signals, DBC)
 

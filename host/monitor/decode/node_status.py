@@ -133,7 +133,8 @@ class NodeStatus:
         """Take a heartbeat, or the answer to a guarding request."""
         if self.told_us is not None:
             self.late += self.is_late(at_us)
-            self._gaps.append(at_us - self.told_us)
+            if at_us > self.told_us:  # logs may have several frames of one time
+                self._gaps.append(at_us - self.told_us)
         self._tell(at_us, state)
 
     def _tell(self, at_us: int, state: int) -> None:

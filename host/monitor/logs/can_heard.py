@@ -7,16 +7,22 @@ import can
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_line import CAN_FD
+from tickrig.host.monitor.logs.log_time import to_us
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 from tickrig.wire.errors import WireError
 
 BAD_FRAMES = "frames that CAN cannot have"
+NO_TIME = "frames with what is no time"
 
 
 def to_heard(message: can.Message, channel: str, tally: Tally) -> Heard | None:
-    """Return what was heard; None for CAN FD and for impossible frames, which are counted."""
-    at_us = round(message.timestamp * 1e6)
+    """Return what was heard; None for CAN FD, impossible frames and times, which are counted."""
+    try:
+        at_us = to_us(message.timestamp)
+    except ValueError:
+        tally.passed_over[NO_TIME] += 1
+        return None
     if message.is_error_frame:
         data = bytes(message.data)[:8].ljust(8, b"\0")
         error = ErrorFrame(message.arbitration_id & ERROR_CLASS_MASK, data)

@@ -12,20 +12,21 @@ import can
 
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.can_heard import to_can
+from tickrig.host.monitor.logs.can_writers import AscWriter, BlfWriter, TrcWriter
 from tickrig.host.monitor.logs.log_format import COMPRESSED, LogFormat
 from tickrig.host.monitor.logs.log_reader import LogError
 from tickrig.host.monitor.logs.log_writer import create
 from tickrig.wire.can_error import ErrorFrame
 
 TEXT: Final[dict[LogFormat, Any]] = {
-    LogFormat.ASC: can.ASCWriter,
-    LogFormat.TRC: can.TRCWriter,
+    LogFormat.ASC: AscWriter,
+    LogFormat.TRC: TrcWriter,
     LogFormat.CSV: can.CSVWriter,
 }
-BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: can.BLFWriter, LogFormat.MF4: can.MF4Writer}
+BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: BlfWriter, LogFormat.MF4: can.MF4Writer}
 
-FIRST_BLF_US: Final = 631_152_000_000_000
-"""1990-01-01; python-can takes a time before it for one that counts from zero."""
+END_US: Final = 16_725_225_600_000_000
+"""The year 2500: dates of ASC and TRC go on to 9999, nanoseconds of BLF to 2554."""
 
 _NUMBER: Final = re.compile(r"can([0-9]{1,3})")
 
@@ -61,10 +62,8 @@ class CanLogWriter:
         """Add a frame."""
         if what := _not_held(heard, self._kind):
             self._passed_over[what] += 1
-            if self._kind is LogFormat.TRC:
+            if self._kind is LogFormat.TRC or heard.at_us >= END_US:
                 return
-        if not self._numbers:
-            self._begin(heard.at_us)
         self._writer.on_message_received(to_can(heard, self._number(heard.channel)))
 
     def flush(self) -> None:
@@ -87,6 +86,10 @@ class CanLogWriter:
             for name, number in self._numbers.items()
             if name != f"can{number}" and self._kind is not LogFormat.CSV
         ]
+        if isinstance(self._writer, BlfWriter) and self._writer.early:
+            said.append(
+                f"{named}: {self._writer.early} frames from before its beginning moved there"
+            )
         if self._kind is LogFormat.CSV and len(self._numbers) > 1:
             said.append(f"{named}: csv does not tell buses apart: {', '.join(self._numbers)}")
         return said
@@ -99,13 +102,6 @@ class CanLogWriter:
                 number += 1
             self._numbers[channel] = number
         return self._numbers[channel]
-
-    def _begin(self, at_us: int) -> None:
-        """Keep the times: ASC begins at whole milliseconds, BLF not before 1990."""
-        if self._kind is LogFormat.ASC:
-            self._writer.log_event("// begins", at_us // 1_000 / 1e3)
-        elif self._kind is LogFormat.BLF and at_us < FIRST_BLF_US:
-            self._writer.start_timestamp = 0.0
 
 
 class _Text(io.TextIOWrapper):
@@ -122,6 +118,8 @@ class _Text(io.TextIOWrapper):
 
 def _not_held(heard: Heard, kind: LogFormat) -> str:
     """Return what a format cannot hold; empty if it can."""
+    if heard.at_us >= END_US:
+        return "frames of the year 2500 and later"
     if isinstance(heard.frame, ErrorFrame):
         return {LogFormat.TRC: "error frames", LogFormat.ASC: "classes of error frames"}.get(
             kind, ""

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.log_time import to_us
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -56,7 +57,7 @@ def parse_json_line(text: str, tally: Tally) -> Heard | str | None:
         said = json.loads(text)
         if "ev" in said:
             return _event(said, tally)
-        return Heard(_at_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
+        return Heard(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, WireError):
         return None
 
@@ -68,10 +69,6 @@ def _event(said: dict[str, Any], tally: Tally) -> str:
     elif said["ev"] == LINE_EVENT:
         tally.passed_over[SERIAL_LINES] += 1
     return str(said["ev"])
-
-
-def _at_us(seconds: float) -> int:
-    return round(seconds * 1e6)
 
 
 def _name(channel: object) -> str:

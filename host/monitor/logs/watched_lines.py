@@ -77,8 +77,11 @@ class WatchedLines(Iterator[str]):
         self._line = ""
 
     def refused(self, error: Exception) -> None:
-        """Note that the latest line is none of the log; raise what is wrong with the file."""
-        if self.ended or isinstance(error, (EOFError, zlib.error)):
+        """Note that the latest line is none of the log; raise what is wrong with the file.
+
+        A reader that refuses the empty line it was started with lacks something before it.
+        """
+        if self.ended or not self._line or isinstance(error, (EOFError, zlib.error)):
             raise error
         self._tally.bad_lines.add(self._number, self._line.rstrip("\r\n"))
         self._line, self._again = "", True

@@ -7,12 +7,18 @@ import pytest
 from tests.host.monitor.logs.test_log_lines import read
 from tickrig.host.monitor.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.heard import Heard
+from tickrig.wire.can import CanFrame
 
 
 def heard(line: str) -> Heard:
     found, _ = read(line)
     assert found is not None
     return found
+
+
+def test_what_has_no_date_is_shown_in_seconds() -> None:
+    line = DumpLines(Stamp.DATE).line(Heard(999_999_999_999_000_000, "can0", CanFrame(1)))
+    assert line.startswith(" (999999999999.000000)  can0")
 
 
 def test_a_date_is_in_local_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -64,6 +64,11 @@ def test_the_period_of_a_heartbeat_is_learnt() -> None:
     assert "##... 80/~100 ms" in render_board(board, 380_000, WIDE, 10)[1]
 
 
+def test_heartbeats_of_one_time_are_no_period() -> None:
+    assert "0 ms ago" in render_board(beats(100, 100), 100_000, WIDE, 10)[1]
+    assert "0/~100 ms" in render_board(beats(0, 0, 100, 100, 50), 50_000, WIDE, 10)[1]
+
+
 def test_the_period_of_a_heartbeat_is_known_by_1017h() -> None:
     row = status("605#2B171000C8000000 585#6017100000000000 705#05 705#05")
     assert (row.period_us, row.learnt) == (200_000, False)

@@ -36,6 +36,18 @@ def test_a_dbc_file_names_signals(frame: str, text: str) -> None:
     assert (decoded.kind, decoded.source, decoded.text) == ("dbc", "dbc", text)
 
 
+def test_messages_of_one_name_keep_their_own_signals(tmp_path: Path) -> None:
+    path = tmp_path / "made_from.dbc"
+    path.write_text(
+        'VERSION ""\nBU_: A B\n'
+        'BO_ 385 TPDO1: 1 A\n SG_ speed : 0|8@1+ (1,0) [0|0] "rpm" B\n'
+        'BO_ 386 TPDO1: 1 B\n SG_ level : 0|8@1+ (1,0) [0|0] "%" A\n'
+    )
+    decoder = Decoder(dbc=[path])
+    texts = [decoder.take(heard).text for heard in trace("181#05 182#06")]
+    assert texts == ["TPDO1 speed=5rpm", "TPDO1 level=6%"]
+
+
 def test_what_a_dbc_file_does_not_name_is_decoded_as_ever() -> None:
     assert said("705#05").kind == "heartbeat"
     assert said("00000123#05").kind == "raw"

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -98,9 +100,86 @@ def test_text_formats_hold_data_frames(name: str, tmp_path: Path) -> None:
     writer.close()
     read = list(read_log(path))
     assert [heard.frame for heard in read] == [heard.frame for heard in frames]
-    assert all(abs(a.at_us - b.at_us) <= 1 for a, b in zip(read, frames, strict=True))
+    assert [heard.at_us for heard in read] == [heard.at_us for heard in frames]
     channels = ["can0"] * 3 if name == "run.csv" else ["can0", "can1", "can0"]
     assert [heard.channel for heard in read] == channels
+
+
+TIMES = st.one_of(
+    st.integers(0, 4_000_000_000_000_000),
+    st.integers(1_700_000_000_000_000, 1_700_000_000_200_000),
+    st.integers(0, 2_000_000),
+)
+
+
+def through(folder: Path, name: str, times: list[int]) -> list[int]:
+    writer = write_log(path := folder / name)
+    for at_us in times:
+        writer.write(Heard(at_us, "can0", CanFrame.parse("705#7F")))
+    writer.close()
+    return [heard.at_us for heard in read_log(path)]
+
+
+@given(times=st.lists(TIMES, min_size=1, max_size=6))
+def test_each_format_keeps_each_microsecond(times: list[int]) -> None:
+    with TemporaryDirectory() as folder:
+        for suffix in ("asc", "trc", "csv", "log", "jsonl"):
+            assert through(Path(folder), f"run.{suffix}", times) == times
+        times.sort()
+        assert through(Path(folder), "run.blf", times) == times
+
+
+@pytest.mark.parametrize("start_us", [1_700_000_000_005_000, 1_700_000_000_099_999, 5_000])
+def test_a_log_that_starts_early_in_a_second_is_not_shifted(start_us: int, tmp_path: Path) -> None:
+    times = [start_us, start_us + 1_234_567]
+    assert through(tmp_path, "run.asc", times) == times
+    with can.ASCReader(tmp_path / "run.asc", relative_timestamp=False) as reader:
+        assert [round(message.timestamp * 1e6) for message in reader] == times
+
+
+@pytest.fixture
+def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with monkeypatch.context() as patched:
+        patched.setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3")
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures("berlin")
+def test_an_hour_that_the_clock_shows_twice_is_kept_in_asc(tmp_path: Path) -> None:
+    end_of_summer_us = 1_761_440_400_000_000  # 2025-10-26, 01:00 UTC
+    times = [end_of_summer_us + minutes * 60_000_000 for minutes in (30, 70, -30)]
+    assert through(tmp_path, "run.asc", times) == times
+
+
+def test_frames_before_a_blf_log_begins_are_said(tmp_path: Path) -> None:
+    writer = write_log(tmp_path / "run.blf")
+    for at_us in (START_US, START_US - 100_000, START_US - 2_000_000):
+        writer.write(Heard(at_us, "can0", CanFrame.parse("705#7F")))
+    writer.close()
+    assert writer.words() == ["run.blf: 1 frames from before its start moved"]
+    begin_us = START_US // 1_000_000 * 1_000_000
+    read = [heard.at_us for heard in read_log(tmp_path / "run.blf")]
+    assert read == [START_US, START_US - 100_000, begin_us]
+
+
+@pytest.mark.parametrize("name", ["run.asc", "run.blf", "run.trc"])
+def test_frames_of_no_date_are_left_out_and_said(name: str, tmp_path: Path) -> None:
+    writer = write_log(tmp_path / name)
+    writer.write(Heard(999_999_999_999_000_000, "can0", CanFrame.parse("705#7F")))
+    writer.close()
+    assert writer.words() == [f"{name}: 1 frames of the year 2500 and later left out"]
+
+
+@pytest.mark.parametrize("stamp", ["inf", "nan", "-1.0", "1e12"])
+@pytest.mark.parametrize("name", ["run.csv", "run.trc"])
+def test_what_is_no_time_is_no_frame(name: str, stamp: str, tmp_path: Path) -> None:
+    text = CSV.replace("1.5", stamp) if name == "run.csv" else TRC.replace("1841.0", stamp)
+    text = text.replace(";$STARTTIME=43474.9876543210", ";$STARTTIME=25569").replace("1e12", "1e15")
+    reader = read_log(log(tmp_path, name, text))
+    assert [str(heard.frame) for heard in reader] == ["00000605#0102"]
+    assert reader.tally.unread == 2
 
 
 def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
@@ -138,6 +217,13 @@ def test_bad_lines_of_trc_are_counted_and_reading_goes_on(tmp_path: Path) -> Non
     assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
     assert [number for number, _ in reader.bad_lines.first] == [6]
     assert reader.tally.passed_over == {"lines with other events": 1}
+
+
+def test_a_trc_log_whose_head_does_not_tell_the_columns_is_none(tmp_path: Path) -> None:
+    head = ";$FILEVERSION=2.1\n;$STARTTIME=43474.5\n"
+    path = log(tmp_path, "run.trc", f"{head}     1)      1841.0  Rx         0705  1  7F\n")
+    with pytest.raises(LogError, match=r"run\.trc is no trc log: File has no column"):
+        list(read_log(path))
 
 
 def test_bad_lines_of_csv_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
