@@ -18,7 +18,7 @@ from tickrig.host.canmon.listening import listen, patience_us, span_option
 from tickrig.host.canmon.painting import paint
 from tickrig.host.canmon.source import Source, explain_sources, open_source
 from tickrig.host.canmon.whole_log import WholeLog, whole_log
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.collector import Collector
@@ -34,7 +34,7 @@ SIZE: Final = (100, 28)
 """Columns and lines where there is no terminal."""
 
 
-@click.command(cls=BusCommand)
+@click.command()
 @click.argument("source")
 @click.argument("signals", nargs=-1, required=True, metavar="SIGNAL...")
 @decode_options

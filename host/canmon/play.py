@@ -14,7 +14,7 @@ from tickrig.host.canmon.failure import SourceFailed
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.source import log_path
 from tickrig.host.canmon.unread import until_unread
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.log_reader import LogError, LogReader, read_log
@@ -30,7 +30,7 @@ POLL_US: Final = 100_000
 _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 
 
-@click.command(cls=BusCommand)
+@click.command()
 @click.argument("log")
 @click.argument("buses", nargs=-1, required=True, metavar="BUS|BUS=RECORDED...")
 @click.option("--speed", default="1", metavar="FACTOR", help="2 is twice as fast; max.")

@@ -12,7 +12,7 @@ from tickrig.host.canmon.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.ending import until_interrupted
 from tickrig.host.canmon.pace import Pace
 from tickrig.host.canmon.unread import until_unread
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.transmitter import Transmitter
 
 
-@click.command(cls=BusCommand)
+@click.command()
 @click.argument("bus")
 @click.argument("frames", nargs=-1, required=True, metavar="FRAME...")
 @click.option("--every", metavar="TIME", help="Send again each 10ms, 1s, until Ctrl-C.")

@@ -60,7 +60,10 @@ class BusOptions:
 
 
 class BusCommand(click.Command):
-    """A command whose `--timing` and `--bus-kwargs` take all words up to the next option."""
+    """A command whose `--timing` and `--bus-kwargs` take all words KEY=VALUE that follow.
+
+    It is none for a command that has such words of its own.
+    """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Repeat such an option before each of its values."""
@@ -68,20 +71,22 @@ class BusCommand(click.Command):
 
 
 def spread(args: Sequence[str]) -> list[str]:
-    """Repeat greedy options.
+    """Repeat greedy options before each KEY=VALUE behind their first value.
 
-    >>> spread(["--bus-kwargs", "a=1", "b=2", "-v"])
-    ['--bus-kwargs', 'a=1', '--bus-kwargs', 'b=2', '-v']
+    >>> spread(["--bus-kwargs", "a=1", "b=2", "can0", "c=3"])
+    ['--bus-kwargs', 'a=1', '--bus-kwargs', 'b=2', 'can0', 'c=3']
     """
     out: list[str] = []
     greedy, given = "", False
     for word in args:
         if word.startswith("-"):
             greedy, given = (word if word in GREEDY else ""), False
-        elif greedy and given:
+        elif given and _KEY_VALUE.fullmatch(word):
             out.append(greedy)
+        else:
+            given = bool(greedy) and not given
+            greedy = greedy if given else ""
         out.append(word)
-        given = bool(greedy) and not word.startswith("-")
     return out
 
 

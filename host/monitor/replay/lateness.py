@@ -1,13 +1,15 @@
-"""How late frames went out: exact to a microsecond up to 100 ms, in little memory."""
+"""How late frames went out, in little memory: exact up to 100 ms, to a hundredth above."""
 
 from __future__ import annotations
 
 from array import array
-from itertools import accumulate
+from collections import Counter
+from collections.abc import Iterator
 from typing import Final
 
-MOST_US: Final = 100_000
-"""What is later counts as this, but for the maximum."""
+from tickrig.host.monitor.buckets import bucket_of, middle_us
+
+EXACT_US: Final = 100_000
 
 
 class Lateness:
@@ -20,7 +22,8 @@ class Lateness:
     """
 
     def __init__(self) -> None:
-        self._counts = array("q", bytes(8 * (MOST_US + 1)))
+        self._exact = array("q", bytes(8 * (EXACT_US + 1)))
+        self._above: Counter[int] = Counter()
         self.count = self.max_us = self.last_us = 0
 
     def add(self, late_us: int) -> None:
@@ -28,13 +31,25 @@ class Lateness:
         self.last_us = late_us = max(0, late_us)
         self.count += 1
         self.max_us = max(self.max_us, late_us)
-        self._counts[min(late_us, MOST_US)] += 1
+        if late_us <= EXACT_US:
+            self._exact[late_us] += 1
+        else:
+            self._above[bucket_of(late_us)] += 1
 
     def percentile_us(self, percent: float) -> int:
         """Return what so many percent, 0 to 100, are not later than; 0 if none were counted."""
-        wanted = self.count * percent / 100
-        sums = enumerate(accumulate(self._counts))
-        return min(next(late_us for late_us, seen in sums if seen >= wanted), self.max_us)
+        left = self.count * percent / 100
+        for late_us, count in self._counts():
+            left -= count
+            if left <= 0:
+                return min(late_us, self.max_us)
+        return self.max_us
+
+    def _counts(self) -> Iterator[tuple[int, int]]:
+        """Give each lateness, the least first, and how many there are."""
+        yield from enumerate(self._exact)
+        for bucket in sorted(self._above):
+            yield middle_us(bucket), self._above[bucket]
 
     def __str__(self) -> str:
         """Say it to people."""

@@ -60,6 +60,15 @@ def test_a_pdo_is_sent_by_the_names_of_its_objects(wire: Wire) -> None:
 
 
 @pytest.mark.realtime
+def test_words_with_an_equals_sign_are_the_verbs_own(wire: Wire, log: str) -> None:
+    kwargs = ("--bus-kwargs", "receive_own_messages=false")
+    canmon("send", wire.word, "5.rpdo1", *kwargs, "target=-1", "--eds", f"5={EDS}", "-q")
+    canmon("play", log, *kwargs, f"{wire.word}=can1")
+    assert wire.all() == ["205#0000FFFFFFFF", "705#05"]
+    drawn = canmon("graph", *kwargs, log, "way=181[0]")
+    assert "way 1" in drawn.stdout
+
+
 def test_a_frame_is_sent_again_with_counter_and_checksum(wire: Wire) -> None:
     fields = ("--counter", "0:7..8", "--checksum", "1:sum8")
     result = canmon("send", wire.word, "100#000001", "--every", "1ms", "--count", "3", *fields)

@@ -5,10 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import can
+import click
 import pytest
+from click.testing import CliRunner
 
 from tickrig.emulators.outside_bus import open_bus
-from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.can_options import GREEDY, BusCommand, BusOptions, bus_options, open_raw
 from tickrig.host.cli.refused import Refused
 
 
@@ -68,6 +70,34 @@ def test_the_driver_gets_what_is_meant_for_it(monkeypatch: pytest.MonkeyPatch) -
         **{"single_handle": True, "interface": "virtual", "channel": "c", "bitrate": 500_000},
         **{"app_name": "x", "port": 16, "rate": 1.5},
     }
+
+
+@pytest.mark.parametrize("option", GREEDY)
+@pytest.mark.parametrize(
+    ("words", "taken", "left"),
+    [
+        (["a=1", "b=2", "-q"], ("a=1", "b=2"), ()),
+        (["a=1", "b=2", "can0", "c=3"], ("a=1", "b=2"), ("can0", "c=3")),
+        (["a=1", "can0"], ("a=1",), ("can0",)),
+        (["a=1", "-q", "can0"], ("a=1",), ("can0",)),
+        (["a=1", "--", "b=2"], ("a=1",), ("b=2",)),
+        (["no value", "a=1"], ("no value", "a=1"), ()),
+    ],
+)
+def test_greedy_options_leave_words_that_are_no_values(
+    option: str, words: list[str], taken: tuple[str, ...], left: tuple[str, ...]
+) -> None:
+    found: dict[str, Any] = {}
+
+    @click.command(cls=BusCommand)
+    @click.argument("source", nargs=-1)
+    @click.option("-q", is_flag=True)
+    @bus_options
+    def command(**options: Any) -> None:
+        found.update(options)
+
+    CliRunner().invoke(command, [option, *words], catch_exceptions=False, standalone_mode=False)
+    assert (found[option[2:].replace("-", "_")], found["source"]) == (taken, left)
 
 
 def test_without_a_name_it_says_what_to_do() -> None:
