@@ -87,9 +87,7 @@ class CanLogWriter:
             if name != f"can{number}" and self._kind is not LogFormat.CSV
         ]
         if isinstance(self._writer, BlfWriter) and self._writer.early:
-            said.append(
-                f"{named}: {self._writer.early} frames from before its beginning moved there"
-            )
+            said.append(f"{named}: {self._writer.early} frames from before its start moved there")
         if self._kind is LogFormat.CSV and len(self._numbers) > 1:
             said.append(f"{named}: csv does not tell buses apart: {', '.join(self._numbers)}")
         return said

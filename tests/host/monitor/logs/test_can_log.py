@@ -158,7 +158,7 @@ def test_frames_before_a_blf_log_begins_are_said(tmp_path: Path) -> None:
     for at_us in (START_US, START_US - 100_000, START_US - 2_000_000):
         writer.write(Heard(at_us, "can0", CanFrame.parse("705#7F")))
     writer.close()
-    assert writer.words() == ["run.blf: 1 frames from before its start moved"]
+    assert writer.words() == ["run.blf: 1 frames from before its start moved there"]
     begin_us = START_US // 1_000_000 * 1_000_000
     read = [heard.at_us for heard in read_log(tmp_path / "run.blf")]
     assert read == [START_US, START_US - 100_000, begin_us]
