@@ -11,14 +11,15 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds_cache import EdsCache
-from tickrig.emulators.canopen.eds_file import EdsError
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.profiles import AUTO, application_of
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.wire.canopen.eds_finding import EdsError
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,8 @@ class Described:
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
     """Read the files; Refused if one cannot be used, or a node-ID is missing or there twice.
 
+    What is not by the standard in a file is told on standard error.
+
     Args:
         specs: the nodes.
         profile: of `profiles.CHOICES`, for nodes of files that name none.
@@ -58,6 +61,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
                 f"node {name} is there twice: {found[name].description.file}, {spec.device}"
             )
         found[name] = Described(name, node_id, description)
+    tell_findings(odd for item in found.values() for odd in item.description.warnings)
     return list(found.values())
 
 

@@ -8,6 +8,7 @@ from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.wire.canopen.device_info import DeviceInfo
+from tickrig.wire.canopen.eds_finding import Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,7 @@ class DeviceDescription:
         node_id: of a DCF or model, None if it gives none.
         bit_rate: of a DCF in bit/s, None if it gives none.
         application: what the device does with its objects.
+        warnings: what is not by the standard in its file.
     """
 
     file: str
@@ -29,6 +31,7 @@ class DeviceDescription:
     node_id: int | None = None
     bit_rate: int | None = None
     application: ServiceMaker = Application
+    warnings: tuple[Finding, ...] = ()
 
     def make_dictionary(self) -> Dictionary:
         """Make the dictionary of one more slave."""

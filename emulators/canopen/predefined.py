@@ -21,9 +21,6 @@ COB_IDS: Final = (
 )
 """Objects that are not valid until somebody gives them a COB-ID, and its sub-indices."""
 
-COUNTS: Final = (0x1003, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
-"""Objects whose sub-index 0 counts what is in use, not what is there."""
-
 
 def predefined(index: int, sub: int) -> tuple[int, bool] | None:
     """Return a default, and whether the node-ID is added to it; None if there is none.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 
@@ -52,8 +53,13 @@ def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
 
 
 def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
-    """Read files by node-ID; Refused if one cannot be read, or is no EDS."""
-    return {node: _read(node, path) for node, path in paths.items()}
+    """Read files by node-ID; Refused if one cannot be read, or is no EDS.
+
+    What is wrong in a file, and not used, is told on standard error.
+    """
+    found = {node: _read(node, path) for node, path in paths.items()}
+    tell_findings(odd for objects in found.values() for odd in objects.findings)
+    return found
 
 
 def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
@@ -104,7 +110,8 @@ def _split(word: str) -> tuple[int, Path]:
 
 
 def _read(node: int, path: Path) -> EdsObjects:
-    from tickrig.host.monitor.decode.eds_objects import EdsError, read_eds  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.eds_objects import read_eds  # noqa: PLC0415 - slow
+    from tickrig.wire.canopen.eds_finding import EdsError  # noqa: PLC0415
 
     try:
         return read_eds(path, node)

@@ -1,18 +1,16 @@
-"""What the server takes from an EDS, which the canopen library reads."""
+"""What the server takes from an EDS."""
 
 from __future__ import annotations
 
-import configparser
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import canopen
-from canopen.objectdictionary import ODVariable
-
+from tickrig.host.canopen.eds import read_sound
 from tickrig.host.rtc_canopen.errors import DefinitionError
+from tickrig.wire.canopen.eds_device import EdsDevice
+from tickrig.wire.canopen.eds_finding import EdsError, Finding
 
 IDENTITY: Final = ((0x1000, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3))
 """Device type, vendor-ID, product code, revision number; the serial number is of one device."""
@@ -29,11 +27,13 @@ class DeviceFile:
         identity: values of `IDENTITY` that the file gives.
         data_types: data type by index and sub-index.
         pdos: communication parameters that it has.
+        findings: what is wrong in the file, whose objects are then not used.
     """
 
     identity: Mapping[tuple[int, int], int]
     data_types: Mapping[tuple[int, int], int]
     pdos: tuple[int, ...]
+    findings: tuple[Finding, ...] = ()
 
 
 def read_device_file(path: Path) -> DeviceFile:
@@ -42,35 +42,26 @@ def read_device_file(path: Path) -> DeviceFile:
     Raises:
         DefinitionError: it cannot be read.
     """
-    dictionary = _import(path)
-    variables = {(var.index, var.subindex): var for var in _variables(dictionary)}
+    device, findings = _read(path)
+    defaults = {
+        (row.index, row.sub): int.from_bytes(row.default, "little")
+        for row in device.entries
+        if row.default is not None and row.data_type.is_integer
+    }
     return DeviceFile(
-        {
-            key: value
-            for key in IDENTITY
-            if key in variables and isinstance(value := variables[key].default, int)
-        },
-        {key: var.data_type for key, var in variables.items() if var.data_type is not None},
-        tuple(index for index in dictionary if index in RPDOS or index in TPDOS),
+        {key: defaults[key] for key in IDENTITY if key in defaults},
+        {(row.index, row.sub): row.data_type for row in device.entries},
+        tuple(index for index in device.objects if index in RPDOS or index in TPDOS),
+        findings,
     )
 
 
-def _import(path: Path) -> canopen.ObjectDictionary:
+def _read(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
     if path.suffix.lower() not in (".eds", ".dcf"):
         raise DefinitionError(f"{path}: the name does not end in .eds or .dcf")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # its own
-            return canopen.import_od(str(path))
+        return read_sound(path)
     except OSError as error:
         raise DefinitionError(f"{path}: {error.strerror}") from error
-    except (configparser.Error, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DefinitionError(f"{path} is no EDS: {' '.join(str(error).split())}") from error
-
-
-def _variables(dictionary: canopen.ObjectDictionary) -> Iterator[ODVariable]:
-    for item in dictionary.values():
-        if isinstance(item, ODVariable):
-            yield item
-        else:
-            yield from item.values()
+    except EdsError as error:
+        raise DefinitionError(str(error)) from error

@@ -52,6 +52,7 @@ class Server:
         log: what happened.
         connections: connectors through the PC.
         links: PDO links.
+        findings: what is wrong in the EDS files.
         now_us: the time it was told last.
         due_us: when `tick` has something to do.
     """
@@ -63,6 +64,7 @@ class Server:
         manager: Manager | None = None,
     ) -> None:
         self.definition, self.manager = definition, manager or Manager()
+        self.findings = tuple(odd for file in files.values() for odd in file.findings)
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
         self._started = False

@@ -15,6 +15,8 @@ BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
 FLOATS: Final = {DataType.REAL32: "f", DataType.REAL64: "d"}
 TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 
+_C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECASE | re.ASCII)
+_NO_OCTAL: Final = re.compile(r"\b0+([0-9]*[89][0-9]*)\b", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
 
 
@@ -61,6 +63,15 @@ def parse_number(text: str) -> int:
     (31, 31, 31, -1)
     """
     return int(text, 8) if re.fullmatch(r"0[0-7]+", text) else int(text, 0)
+
+
+def plain_numbers(text: str) -> str:
+    """Return numbers without what C adds to them, and no octal number that is none.
+
+    >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
+    ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
+    """
+    return _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
 
 
 def parse_limit(kind: DataType, text: str) -> float | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.user_file import find_class, told
@@ -47,7 +48,10 @@ class BusFailed(click.ClickException):
 
 
 def read_server(file: Path, components: Sequence[str]) -> Server:
-    """Make the server of a System Definition, with components; Refused if one cannot be used."""
+    """Make the server of a System Definition, with components; Refused if one cannot be used.
+
+    What is wrong in its EDS files, and not used, is told on standard error.
+    """
     try:
         from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - canopen is slow
     except ModuleNotFoundError:
@@ -59,6 +63,7 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
         refuse_path("file", error)
     except ValueError as error:
         raise Refused(str(error)) from None
+    tell_findings(server.findings)
     return server
 
 

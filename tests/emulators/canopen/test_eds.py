@@ -10,12 +10,14 @@ from tickrig.device.canopen.entry import Access
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds import describe, read_eds
-from tickrig.emulators.canopen.eds_file import EdsFile
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.device_info import DeviceInfo
+from tickrig.wire.canopen.eds_file import EdsFile
+from tickrig.wire.canopen.eds_finding import EdsError
 
 SAMPLE = Path(__file__).parent / "sample.dcf"
 NODE_ID = 5
+TYPE = "[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\n"
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +31,26 @@ def test_a_dcf_says_node_id_bit_rates_and_names(sample: DeviceDescription) -> No
 
 
 def test_an_eds_without_commissioning_leaves_the_node_id_open() -> None:
-    description = describe(EdsFile("empty.eds", ""))
+    description = describe(EdsFile("short.eds", TYPE))
     assert (description.node_id, description.bit_rate) == (None, None)
-    assert len(description.make_dictionary()) == 0
+    assert len(description.make_dictionary()) == 1
+
+
+def test_an_eds_that_cannot_be_used_says_all_that_is_wrong() -> None:
+    text = "[1000]\nParameterName=a\nDataType=7\n[1001]\nParameterName=b\nAccessType=ro\n"
+    with pytest.raises(EdsError) as error:
+        describe(EdsFile("a.eds", text))
+    assert str(error.value).splitlines() == [
+        "a.eds: [1000] AccessType is missing",
+        "a.eds: [1001] DataType is missing",
+    ]
+    assert [one.section for one in error.value.findings] == ["1000", "1001"]
+
+
+def test_a_cob_id_of_an_odd_type_has_no_usual_default() -> None:
+    text = "[1014]\nParameterName=EMCY\nDataType=5\nAccessType=rw\n[1005]\nParameterName=SYNC\n"
+    description = describe(EdsFile("odd.eds", f"{text}DataType=2\nAccessType=rw\n"))
+    assert description.template[0x1005, 0].value == 0
 
 
 @pytest.mark.parametrize(
@@ -156,11 +175,11 @@ def test_each_slave_has_a_dictionary_of_its_own(sample: DeviceDescription) -> No
 
 def test_older_editors_write_windows_1252(tmp_path: Path) -> None:
     path = tmp_path / "old.eds"
-    path.write_bytes("[DeviceInfo]\r\nVendorName=Müller\r\n".encode("cp1252"))
+    path.write_bytes(f"[DeviceInfo]\r\nVendorName=Müller\r\n{TYPE}".encode("cp1252"))
     assert read_eds(path).info.vendor_name == "Müller"
 
 
 def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     path = tmp_path / "bom.eds"
-    path.write_bytes(b"\xef\xbb\xbf[DeviceInfo]\nVendorName=Me\n")
+    path.write_bytes(b"\xef\xbb\xbf[DeviceInfo]\nVendorName=Me\n" + TYPE.encode())
     assert read_eds(path).info.vendor_name == "Me"

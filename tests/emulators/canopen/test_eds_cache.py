@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.canopen.eds_cache import EdsCache
-from tickrig.emulators.canopen.eds_file import EdsError
+from tickrig.wire.canopen.eds_finding import EdsError
+
+TYPE = "[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\n"
 
 
 def write(path: Path, text: str, time_ns: int) -> None:
@@ -16,10 +18,10 @@ def write(path: Path, text: str, time_ns: int) -> None:
 
 def test_a_file_is_read_once_until_it_changes(tmp_path: Path) -> None:
     cache, path = EdsCache(), tmp_path / "a.eds"
-    write(path, "[DeviceInfo]\nVendorName=A\n", 1_000_000_000)
+    write(path, "[DeviceInfo]\nVendorName=A\n" + TYPE, 1_000_000_000)
     first = cache.read(path)
     assert cache.read(path) is first
-    write(path, "[DeviceInfo]\nVendorName=B\n", 2_000_000_000)
+    write(path, "[DeviceInfo]\nVendorName=B\n" + TYPE, 2_000_000_000)
     assert cache.read(path).info.vendor_name == "B"
 
 

@@ -11,9 +11,9 @@ from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.dictionary import Dictionary, ObjectCode, ObjectInfo
 from tickrig.device.canopen.entry import Access, Entry
 from tickrig.emulators.canopen.eds import describe, read_eds
-from tickrig.emulators.canopen.eds_file import EdsFile
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.device_info import DeviceInfo
+from tickrig.wire.canopen.eds_file import EdsFile
 from tickrig.wire.canopen.eds_writer import write_dcf, write_eds
 
 R1_EDS = Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds"
@@ -83,7 +83,7 @@ def entries(draw: st.DrawFn, index: int, sub: int) -> Entry:
 @st.composite
 def dictionaries(draw: st.DrawFn) -> Dictionary:
     found, infos = [], {}
-    for index in draw(st.sets(st.integers(0x1000, 0xFFFF), max_size=4)):
+    for index in draw(st.sets(st.integers(0x1000, 0xFFFF), min_size=1, max_size=4)):
         code = draw(st.sampled_from([ObjectCode.VAR, ObjectCode.ARRAY, ObjectCode.RECORD]))
         subs = (
             {0}

@@ -179,8 +179,9 @@ def test_on_the_servers_stop_its_nodes_are_reset_and_stopped_if_it_says_so() -> 
     [
         ("a.txt", "", "the name does not end in .eds or .dcf"),
         ("none.eds", None, "No such file or directory"),
-        ("a.eds", "x", "is no EDS: File contains no section headers."),
-        ("b.eds", "[1000]\nParameterName=a\n", "is no EDS: "),
+        ("a.eds", "x", "line 1 is no keyword with a value: 'x'"),
+        ("b.eds", "[1000]\nDataType=5\nAccessType=ro\n", "[1000] ParameterName is missing"),
+        ("c.eds", "", "has no objects"),
     ],
 )
 def test_a_file_that_is_no_eds_is_refused_in_one_line(

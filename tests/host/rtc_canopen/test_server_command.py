@@ -34,6 +34,19 @@ def test_a_file_is_checked_without_a_bus(file: Path) -> None:
     assert (result.exit_code, result.output) == (0, f"{file}: 1 nodes, no mistake found\n")
 
 
+def test_what_is_wrong_in_an_eds_and_not_used_is_said(tmp_path: Path) -> None:
+    file, eds = tmp_path / "robot.yaml", tmp_path / "odd.eds"
+    text = (EDS / "f-palette.eds").read_text("utf-8")
+    eds.write_text(f"{text}[5000]\nParameterName=x\n", "utf-8")
+    file.write_text("nodes: [{id: 16, name: A, eds: odd.eds, role: device}]\n", "utf-8")
+    result = run(file, "--check")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == [
+        f"{eds}: [5000] DataType is missing",
+        f"{eds}: [5000] AccessType is missing",
+    ]
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [

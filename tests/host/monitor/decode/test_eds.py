@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from tests.host.monitor.decode.traces import last
-from tickrig.host.monitor.decode.eds_objects import EdsError, read_eds
+from tickrig.host.monitor.decode.eds_objects import read_eds
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds_finding import EdsError
 
 EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
 
@@ -67,17 +68,30 @@ def test_what_a_file_says_wrongly_of_an_object_is_not_used(tmp_path: Path) -> No
     )
     eds = read_eds(path, 5)
     assert eds.values == {}
+    assert [str(one) for one in eds.findings] == [
+        f"{path}: [2002] DefaultValue=300 is no UNSIGNED8",
+        f"{path}: [2001] DataType=0x7777 is unknown: DOMAIN is taken",
+    ]
     assert last("585#4F01200007000000", {5: eds}).text.startswith("upload 2001h:00 type = 07")
 
 
 @pytest.mark.parametrize(
-    "text", ["no EDS at all", "[DeviceInfo]\n", "[DeviceInfo]\n[2001]\nObjectType=0x7\n"]
+    ("text", "findings"),
+    [
+        ("no EDS at all", [": line 1 is no keyword with a value: 'no EDS at all'"]),
+        ("[DeviceInfo]\n", [": has no objects"]),
+        (
+            "[DeviceInfo]\n[2001]\nObjectType=0x7\nDataType=5\n",
+            [": [2001] ParameterName is missing", ": [2001] AccessType is missing"],
+        ),
+    ],
 )
-def test_a_file_that_is_no_eds_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_no_eds_is_refused(tmp_path: Path, text: str, findings: list[str]) -> None:
     path = tmp_path / "bad.eds"
     path.write_text(text)
-    with pytest.raises(EdsError, match=r"bad\.eds is no EDS: "):
+    with pytest.raises(EdsError) as error:
         read_eds(path, 5)
+    assert str(error.value).splitlines() == [f"{path}{finding}" for finding in findings]
 
 
 def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:

@@ -1,0 +1,211 @@
+"""One entry of an EDS or DCF: a variable, or an element of an array or record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds_file import EdsFile
+from tickrig.wire.canopen.eds_finding import shorten
+from tickrig.wire.canopen.eds_value import parse_limit, parse_value
+from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode
+
+SIMPLE_TYPES: Final = range(0x1C)
+ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
+LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
+
+
+@dataclass(frozen=True, slots=True)
+class EdsEntry:
+    """What a file says of one entry.
+
+    Attributes:
+        index: 0x0000..0xFFFF.
+        sub: 0..255.
+        name: as in the file.
+        data_type: DOMAIN where the file names one that we do not know.
+        access: what the bus may do.
+        default: bytes of the power-on value, None if the file gives none.
+        relative: the node-ID is added to the default.
+        low: smallest value, None for that of the data type.
+        high: largest value.
+        max_bytes: what a string or domain holds.
+        unit: empty if the file gives none.
+        factor: by which its number is multiplied to be in that unit.
+    """
+
+    index: int
+    sub: int
+    name: str
+    data_type: DataType
+    access: Access
+    default: bytes | None = None
+    relative: bool = False
+    low: float | None = None
+    high: float | None = None
+    max_bytes: int = MAX_VARIABLE_BYTES
+    unit: str = ""
+    factor: float = 1
+
+
+def read_entry(
+    file: EdsFile, section: str, index: int, sub: int, name: str | None = None
+) -> EdsEntry | None:
+    """Read an entry; None if it has no name, type or access, which the file notes.
+
+    Args:
+        file: takes what is wrong.
+        section: where the entry is described, its array's for a compact one.
+        index: of its object.
+        sub: sub-index.
+        name: that of the file's `ParameterName` if left out.
+    """
+    if name is None:
+        name = required(file, section, "ParameterName")
+    kind, access = _data_type(file, section), _access(file, section)
+    if name is None or kind is None or access is None:
+        return None
+    default, relative = _default(file, section, index, sub, kind)
+    low, high = _limits(file, section, kind)
+    return EdsEntry(
+        *(index, sub, name, kind, access, default, relative, low, high),
+        max_bytes=file.number(section, "MaxBytes", MAX_VARIABLE_BYTES),
+        unit=file.value(section, "Unit"),
+        factor=_factor(file, section),
+    )
+
+
+def required(file: EdsFile, section: str, key: str) -> str | None:
+    """Return the text of a keyword that every entry has; None, and an error, without it."""
+    if file.has(section, key):
+        return file.value(section, key)
+    file.refuse(section, f"{key} is missing")
+    return None
+
+
+def is_visible_char(file: EdsFile, number: int) -> bool:
+    """Say whether 00A0h is the data type of RTC-CANopen here, not one that the file derives."""
+    return number == DataType.VISIBLE_CHAR and f"{number:X}sub1" not in file.sections
+
+
+def _data_type(file: EdsFile, section: str) -> DataType | None:
+    if file.number(section, "ObjectType", ObjectCode.VAR) == ObjectCode.DOMAIN:
+        return DataType.DOMAIN
+    if required(file, section, "DataType") is None:
+        return None
+    number = file.number(section, "DataType", DataType.DOMAIN)
+    if number not in SIMPLE_TYPES and not is_visible_char(file, number):
+        number = _derived(file, section, number)
+    try:
+        return DataType(number)
+    except ValueError:
+        file.refuse(section, f"DataType=0x{number:04X} is unknown")
+        return None
+
+
+def _derived(file: EdsFile, section: str, number: int) -> int:
+    """Return the type behind one of the file's own, as CanFestival writes them."""
+    own = f"{number:X}sub1"
+    if own in file.sections:
+        return file.number(own, "DefaultValue", DataType.DOMAIN)
+    file.warn(section, f"DataType=0x{number:04X} is unknown: DOMAIN is taken")
+    return DataType.DOMAIN
+
+
+def _access(file: EdsFile, section: str) -> Access | None:
+    text = required(file, section, "AccessType")
+    if text is None:
+        return None
+    known = LONE_LETTERS.get(text.lower(), text or "rw")
+    if known != text:
+        what = f"AccessType={text} is none of CiA 306" if text else "AccessType is empty"
+        file.warn(section, f"{what}: {known} is taken")
+    try:
+        return Access.from_eds(known, mappable=bool(file.number(section, "PDOMapping")))
+    except ValueError as error:
+        file.refuse(section, str(error))
+        return None
+
+
+def _default(
+    file: EdsFile, section: str, index: int, sub: int, kind: DataType
+) -> tuple[bytes | None, bool]:
+    """Return the power-on value of the file, and whether it is relative to the node-ID."""
+    if file.value(section, "DefaultBytes"):
+        return _exact(file, section, kind), False
+    for place, key in (
+        (section, "ParameterValue"),
+        (f"{index:04X}Value", str(sub)),
+        (section, "DefaultValue"),
+    ):
+        if file.value(place, key):
+            return _value(file, place, key, kind)
+    return None, False
+
+
+def _exact(file: EdsFile, section: str, kind: DataType) -> bytes | None:
+    text = file.value(section, "DefaultBytes")
+    try:
+        data = bytes.fromhex(text)
+        kind.decode(data)
+    except ValueError:
+        what = f"{kind.size} hexadecimal bytes" if kind.size else "hexadecimal bytes"
+        file.refuse(section, f"DefaultBytes={shorten(text)} is no {what}")
+        return None
+    return data
+
+
+def _value(file: EdsFile, section: str, key: str, kind: DataType) -> tuple[bytes | None, bool]:
+    text = file.numeric(section, key) if kind.is_integer else file.value(section, key)
+    try:
+        if kind in ASCII_TEXTS and not text.isascii():
+            return _foreign_text(file, section, key, kind), False
+        value, relative = parse_value(kind, text)
+        return kind.encode(value), relative
+    except (ValueError, OverflowError):
+        file.refuse(section, f"{key}={shorten(text)} is no {kind.name}")
+        return None, False
+
+
+def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> bytes:
+    """Return the bytes of a text beyond ASCII: of ISO 8859-1 if it has them, else of UTF-8."""
+    text = file.value(section, key)
+    try:
+        data, coding = kind.encode(text), "ISO 8859-1"
+    except ValueError:
+        data, coding = kind.encode(text.encode()), "UTF-8"
+    file.warn(section, f"{key}={shorten(text)} is not ASCII: its bytes in {coding} are taken")
+    return data
+
+
+def _limits(file: EdsFile, section: str, kind: DataType) -> tuple[float | None, float | None]:
+    """Return the limits of a number; other types have none."""
+    low, high = _limit(file, section, "LowLimit", kind), _limit(file, section, "HighLimit", kind)
+    if low is not None and high is not None and low > high:
+        file.refuse(section, f"LowLimit {low} is above HighLimit {high}")
+        return None, None
+    return low, high
+
+
+def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> float | None:
+    text = file.numeric(section, key) if kind.is_integer else file.value(section, key)
+    try:
+        return parse_limit(kind, text) if text else None
+    except (ValueError, OverflowError):
+        file.refuse(section, f"{key}={shorten(text)} is no {kind.name}")
+        return None
+
+
+def _factor(file: EdsFile, section: str) -> float:
+    """Return the factor, which the canopen library reads too; it is of no standard."""
+    text = file.value(section, "Factor")
+    try:
+        factor = float(text or 1)
+    except ValueError:
+        factor = 0
+    if factor and math.isfinite(factor):
+        return factor
+    file.warn(section, f"Factor={shorten(text)} is no factor: 1 is taken")
+    return 1
