@@ -12,7 +12,7 @@ from tickrig.emulators.rrc.build import NAME as RRC
 from tickrig.emulators.rrc.build import build_rrc
 from tickrig.emulators.rtc_lite.build import NAME as RTC_LITE
 from tickrig.emulators.rtc_lite.build import build_rtc_lite
-from tickrig.emulators.trace import Config
+from tickrig.emulators.trace import Config, Header
 from tickrig.emulators.urg.build import NAME as URG
 from tickrig.emulators.urg.build import build_urg
 
@@ -22,3 +22,15 @@ DEVICES: Final[Mapping[str, Callable[[Config], Emulated[bytes]]]] = {
     RH3: build_rh3,
     URG: build_urg,
 }
+
+
+def build(header: Header) -> Emulated[bytes]:
+    """Build the device that a trace was recorded on.
+
+    Raises:
+        ValueError: there is none of this name, or its configuration cannot be.
+    """
+    if header.device not in DEVICES:
+        known = ", ".join(DEVICES)
+        raise ValueError(f"recorded on {header.device!r}; this program knows {known}")
+    return DEVICES[header.device](header.config)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import click
 
-from tickrig.emulators.ctl_cli import ctl
-from tickrig.emulators.demo_cli import demo
-from tickrig.emulators.replay_cli import replay_command
-from tickrig.emulators.rtc.cli import rtc
+from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import version_option
 
+HERE: Final = "tickrig.emulators"
+COMMANDS: Final = {
+    "ctl": (f"{HERE}.ctl_cli:ctl", "Touch and watch the emulator whose control socket is SOCKET."),
+    "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
+    "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
+    "rtc": (f"{HERE}.rtc.cli:rtc", "Run RT components, and work with them while they run."),
+}
 
-@click.group()
+
+@click.group(cls=LazyGroup, commands=COMMANDS)
 @version_option()
 def main() -> None:
     """Work with emulated devices.
@@ -28,9 +35,3 @@ def main() -> None:
     eval "$(_TICKRIG_COMPLETE=zsh_source tickrig)"       in ~/.zshrc
     _TICKRIG_COMPLETE=fish_source tickrig | source       in fish's configuration
     """  # noqa: D301 - click wants the backspace
-
-
-main.add_command(ctl)
-main.add_command(demo)
-main.add_command(replay_command)
-main.add_command(rtc)

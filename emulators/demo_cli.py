@@ -1,27 +1,21 @@
-"""The command `tickrig demo`."""
+"""The command `tickrig demo`; what a demonstration needs is imported when it is played."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import canopen
 import click
 
-from tickrig.emulators.fig120 import demo as fig120_demo
-from tickrig.emulators.fig120.plot import write_plot
-from tickrig.emulators.fig120.samples import Sample
-from tickrig.emulators.fig120.stage import VirtualStage, bus_stage
 from tickrig.emulators.picture import check_plot
-from tickrig.emulators.rrc.demo import run_demo
-from tickrig.emulators.rtc_lite.demo import play as rtc_lite_demo
-from tickrig.emulators.rtc_lite.demo.stage import VirtualStage as VirtualLines
-from tickrig.emulators.rtc_lite.demo.stage import pty_stage
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import refuse_path
+from tickrig.host.cli.start import loading
 from tickrig.host.errors import DeviceRefused, LinkError
-from tickrig.host.rtc.errors import RtcRefused
+
+if TYPE_CHECKING:
+    from tickrig.emulators.fig120.samples import Sample
 
 
 @click.group()
@@ -32,6 +26,9 @@ def demo() -> None:
 @demo.command()
 def rrc() -> None:
     """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip."""
+    with loading():
+        from tickrig.emulators.rrc.demo import run_demo  # noqa: PLC0415
+
     try:
         run_demo(click.echo)
     except (RuntimeError, OSError, LinkError, DeviceRefused) as error:
@@ -46,12 +43,17 @@ def rtc_lite(virtual: bool) -> None:
     ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
     RTComponent-Lite. The devices are processes on two ptys, in real time.
     """
+    with loading():
+        from tickrig.emulators.rtc_lite.demo.play import run_demo  # noqa: PLC0415
+        from tickrig.emulators.rtc_lite.demo.stage import VirtualStage, pty_stage  # noqa: PLC0415
+        from tickrig.host.rtc.errors import RtcRefused  # noqa: PLC0415
+
     try:
         if virtual:
-            rtc_lite_demo.run_demo(VirtualLines(), click.echo)
+            run_demo(VirtualStage(), click.echo)
             return
         with pty_stage() as stage:
-            rtc_lite_demo.run_demo(stage, click.echo)
+            run_demo(stage, click.echo)
     except (RuntimeError, OSError, LinkError, RtcRefused) as error:
         raise click.ClickException(str(error)) from error
 
@@ -73,21 +75,32 @@ def fig120(plot: Path | None, **options: Any) -> None:
     """  # noqa: D301 - click wants the backspace
     if plot is not None:
         check_plot(plot)
-    bus = BusOptions(**options)
-    try:
-        samples = _play_fig120(bus)
-    except (RuntimeError, OSError, canopen.SdoCommunicationError) as error:
-        raise click.ClickException(str(error)) from error
+    samples = _play_fig120(BusOptions(**options))
     if plot is not None:
-        try:
-            write_plot(samples, plot)
-        except OSError as error:
-            refuse_path("plot", error)
+        _draw_fig120(samples, plot)
         click.echo(f"\nThe curves are in {plot}.")
 
 
 def _play_fig120(bus: BusOptions) -> list[Sample]:
-    if not bus:
-        return fig120_demo.run_demo(VirtualStage(), click.echo)
-    with bus_stage(bus) as stage:
-        return fig120_demo.run_demo(stage, click.echo)
+    with loading():
+        from canopen import SdoCommunicationError  # noqa: PLC0415
+
+        from tickrig.emulators.fig120.demo import run_demo  # noqa: PLC0415
+        from tickrig.emulators.fig120.stage import VirtualStage, bus_stage  # noqa: PLC0415
+
+    try:
+        if not bus:
+            return run_demo(VirtualStage(), click.echo)
+        with bus_stage(bus) as stage:
+            return run_demo(stage, click.echo)
+    except (RuntimeError, OSError, SdoCommunicationError) as error:
+        raise click.ClickException(str(error)) from error
+
+
+def _draw_fig120(samples: list[Sample], plot: Path) -> None:
+    from tickrig.emulators.fig120.plot import write_plot  # noqa: PLC0415
+
+    try:
+        write_plot(samples, plot)
+    except OSError as error:
+        refuse_path("plot", error)

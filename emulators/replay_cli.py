@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tickrig.emulators.byte_text import escape
-from tickrig.emulators.catalog import DEVICES
-from tickrig.emulators.emulated import Emulated
-from tickrig.emulators.replay import Difference, read_recording, replay
-from tickrig.emulators.trace import Header
 from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from tickrig.emulators.replay import Difference
 
 
 @click.command("replay")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.pass_context
 def replay_command(context: click.Context, /, file: Path) -> None:
     """Replay the trace FILE on a fresh device; exit status 1 if it says anything else.
@@ -25,9 +27,13 @@ def replay_command(context: click.Context, /, file: Path) -> None:
     rrc-emu --link /tmp/rrc --trace run.trace
     tickrig replay run.trace
     """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.catalog import build  # noqa: PLC0415 - slow
+        from tickrig.emulators.replay import read_recording, replay  # noqa: PLC0415
+
     try:
         recording = read_recording(file.read_bytes())
-        difference = replay(recording, _build(recording.header))
+        difference = replay(recording, build(recording.header))
     except OSError as error:
         refuse_path("trace", error)
     except ValueError as error:
@@ -39,13 +45,6 @@ def replay_command(context: click.Context, /, file: Path) -> None:
     else:
         click.echo(_describe(difference, file))
         context.exit(1)
-
-
-def _build(header: Header) -> Emulated[bytes]:
-    if header.device not in DEVICES:
-        known = ", ".join(DEVICES)
-        raise ValueError(f"recorded on {header.device!r}; this program knows {known}")
-    return DEVICES[header.device](header.config)
 
 
 def _describe(difference: Difference, file: Path) -> str:

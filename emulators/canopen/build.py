@@ -9,12 +9,13 @@ from pathlib import Path
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds_cache import EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
-from tickrig.emulators.canopen.profiles import AUTO, application_of
+from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.host.cli.eds_warnings import tell_findings
@@ -44,7 +45,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
 
     Args:
         specs: the nodes.
-        profile: of `profiles.CHOICES`, for nodes of files that name none.
+        profile: of `choices.PROFILES`, for nodes of files that name none.
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.choices import MODELS
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.user_file import SUFFIX
 
@@ -26,7 +26,7 @@ class NodeSpec:
     Attributes:
         device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
-        profile: of `profiles.CHOICES`, None for what holds for all nodes.
+        profile: of `choices.PROFILES`, None for what holds for all nodes.
     """
 
     device: Path | str

@@ -9,18 +9,16 @@ from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.slave import ServiceMaker
+from tickrig.emulators.canopen.choices import AUTO
 
 DEVICE_TYPE: Final = 0x1000
-AUTO: Final = "auto"
 
 PROFILES: Final[dict[str, ServiceMaker]] = {"none": Application, "401": Ds401, "402": Ds402}
 """Device profiles by the number that the low word of 1000h holds."""
 
-CHOICES: Final = (AUTO, *PROFILES)
-
 
 def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
-    """Return a profile of `CHOICES`; `auto` takes that of the device type, if it is there.
+    """Return a profile of `choices.PROFILES`; `auto` takes that of the device type, if it is there.
 
     >>> application_of(Dictionary([])).__name__
     'Application'

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.canopen.body_spec import BodySpec, read_body
-from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.choices import MODELS, PROFILES
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
-from tickrig.emulators.canopen.profiles import CHOICES
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.user_file import SUFFIX
 
@@ -63,8 +62,8 @@ def _read_node(path: Path, place: str, table: object) -> Iterator[NodeSpec]:
     if unknown := [key for key in table if key not in NODE_KEYS]:
         raise Refused(f"{place}: no key {unknown[0]}; known: {', '.join(NODE_KEYS)}")
     device, profile = _device(path, place, table), table.get("profile")
-    if profile is not None and profile not in CHOICES:
-        raise Refused(f"{place}: profile {profile!r} is not one of {', '.join(CHOICES)}")
+    if profile is not None and profile not in PROFILES:
+        raise Refused(f"{place}: profile {profile!r} is not one of {', '.join(PROFILES)}")
     node_id = table.get("id")
     if node_id is None:
         yield NodeSpec(device, None, profile)

@@ -15,8 +15,8 @@ from tickrig.emulators.candump_file import CandumpFile
 from tickrig.emulators.canopen.bench import make_bench, store_keeper
 from tickrig.emulators.canopen.body_spec import BodySpec
 from tickrig.emulators.canopen.build import Described, describe_nodes, make_nodes
+from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.node_spec import NodeSpec
-from tickrig.emulators.canopen.profiles import AUTO
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.frame_transcript import FrameTranscript
 from tickrig.emulators.outside_bus import open_bus
@@ -42,7 +42,7 @@ class CanopenOptions(RunOptions):
     Attributes:
         specs: the nodes.
         body: what they move, None if nothing.
-        profile: of nodes of files; see `profiles.CHOICES`.
+        profile: of nodes of files; see `choices.PROFILES`.
         bus: the bus outside.
         store: file in which nodes keep what 1010h and LSS store.
     """

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.build import parameters_of
 from tickrig.host.cli.options import Decorator, add_options
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from tickrig.device.rh3.parameters import BaseParameters
 
 NAMES: Final = (
     "radius_left_m",
@@ -41,6 +43,9 @@ base_options: Final = add_options(
 
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
     """Return a base of options, those left out as they are; Refused for one that cannot be."""
+    with loading():
+        from tickrig.emulators.rh3.build import parameters_of  # noqa: PLC0415 - slow
+
     try:
         return parameters_of({name: v for name, v in options.items() if v is not None})
     except ValueError as error:

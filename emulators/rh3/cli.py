@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import click
 
-from tickrig.device.rh3.base import Rh3Base
-from tickrig.emulators.emulator import LineKind
-from tickrig.emulators.rh3.base_options import NAMES, base_options, read_parameters
-from tickrig.emulators.rh3.build import NAME, config_to_trace
-from tickrig.emulators.rh3.frame_log import frame_splitter
-from tickrig.emulators.rh3.verbs import verbs
-from tickrig.emulators.rs485_line import Rs485Line
+from tickrig.emulators.rh3.base_options import base_options
 from tickrig.emulators.serial_options import line_options
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.wire_log import WireLine
-
-CYCLE: Final = b"01 17 "
-"""What -v leaves out: the traffic of each period."""
+from tickrig.host.cli.start import loading
 
 
 @click.command()
@@ -51,21 +41,7 @@ def main(context: click.Context, /, baud: int, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_RH3_EMU_COMPLETE=bash_source rh3-emu)"
     """  # noqa: D301 - click wants the backspace
-    settings = {name: options.pop(name) for name in ("address", *NAMES)}
-    parameters = read_parameters({**settings, "seed": options["seed"]})
-    kind = Kind(
-        NAME,
-        "RH3 base",
-        is_event=_is_event,
-        senders=verbs(parameters.address),
-        line=LineKind(baud, splitter=frame_splitter, wire=Rs485Line),
-        talk=lambda link: (
-            f" Any Modbus RTU master can open this path, as address {parameters.address}."
-        ),
-    )
-    run = SerialRun(kind, Rh3Base(parameters), config_to_trace(parameters), Options(**options))
-    context.exit(run.run())
+    with loading():
+        from tickrig.emulators.rh3.emulate import emulate  # noqa: PLC0415 - slow
 
-
-def _is_event(line: WireLine) -> bool:
-    return not line.data.startswith(CYCLE)
+    context.exit(emulate(baud, options))

@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import click
 
-from tickrig.emulators.rh3.base_options import NAMES, base_options, read_parameters
-from tickrig.emulators.rh3.journey_table import limits_of, table
-from tickrig.emulators.rh3.outing import Outing, demand_arrival, stopped_at_the_end, watched
-from tickrig.emulators.rh3.path_file import read_path
-from tickrig.emulators.rh3.squares import Size, play_squares
-from tickrig.emulators.rh3.track_plot import write_track
+from tickrig.emulators.rh3.base_options import base_options
 from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
-from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.motion.drive import drive
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import sound
-from tickrig.host.motion.umbmark import SIDE_M
+from tickrig.host.cli.start import loading
 
 COORDINATES: Final = {"ignore_unknown_options": True}
 """So that `-1` is a number and no option."""
@@ -91,9 +80,10 @@ def goto(x: float, y: float, theta: float, **options: Any) -> None:
     rh3 goto 1 0.5 1.57
     rh3 goto -1 0 0 --set tuned
     """  # noqa: D301
-    if not sound(x, y, theta):
-        raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
-    _drive(_outing(options), [Pose(x, y, theta)], f"rh3 goto {x:g} {y:g} {theta:g}")
+    with loading():
+        from tickrig.emulators.rh3.motion_verbs import go_to  # noqa: PLC0415 - slow
+
+    go_to(x, y, theta, options)
 
 
 @main.command("path")
@@ -109,13 +99,10 @@ def along_path(file: Path, **options: Any) -> None:
     printf '2 0\\n2 2\\n0 2\\n0 0 0\\n' > corners.txt
     rh3 path corners.txt
     """  # noqa: D301
-    try:
-        points = read_path(file)
-    except OSError as error:
-        refuse_path("path", error)
-    except ValueError as error:
-        raise Refused(str(error)) from None
-    _drive(_outing(options), points, f"rh3 path {file.name}")
+    with loading():
+        from tickrig.emulators.rh3.motion_verbs import go_along  # noqa: PLC0415 - slow
+
+    go_along(file, options)
 
 
 @main.command()
@@ -124,13 +111,11 @@ def along_path(file: Path, **options: Any) -> None:
     "--side",
     type=click.FloatRange(0.2, 100),
     metavar="M",
-    default=SIDE_M,
-    show_default=True,
-    help="Of the squares.",
+    help="Of the squares.  [4]",
 )
 @click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
 @_SHARED
-def square(runs: int | None, side: float, save: Path | None, **options: Any) -> None:
+def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
     """Drive squares both ways (UMBmark), and calibrate the odometry by them.
 
     After each square the true place of the cart is measured: of an emulated base
@@ -140,32 +125,7 @@ def square(runs: int | None, side: float, save: Path | None, **options: Any) -> 
     rh3 square --tread-m 0.459 --save Odometry.conf
     rh3 square --tread-m 0.459 --odometry-conf Odometry.conf
     """  # noqa: D301
-    outing = _outing(options)
-    by_chance = outing.device is not None or outing.base.noise
-    play_squares(outing, Size(runs or (5 if by_chance else 1), side), save)
+    with loading():
+        from tickrig.emulators.rh3.motion_verbs import go_round  # noqa: PLC0415 - slow
 
-
-def _outing(options: dict[str, Any]) -> Outing:
-    given = {name: options.pop(name) for name in (*NAMES, "seed")}
-    if options["device"] is not None and options["pace"] is not None:
-        raise Refused("--pace is for the emulated base; a --device has real time")
-    if options["show_map"] is None:
-        options["show_map"] = sys.stdout.isatty()
-    outing = Outing(**options, base=read_parameters(given))
-    outing.check()
-    return outing
-
-
-def _drive(outing: Outing, points: Sequence[Pose], title: str) -> None:
-    ride = outing.begin()
-    began = ride.chain.odometry.pose
-    with watched(outing, [began, *points]) as watcher, stopped_at_the_end(ride):
-        journey = drive(ride, points, watcher.watch)
-        demand_arrival(ride, journey)
-    for line in table(journey, began, points, limits_of(ride.chain)):
-        click.echo(line)
-    if outing.plot is not None:
-        try:
-            write_track(journey, points, title, outing.plot)
-        except OSError as error:
-            refuse_path("plot", error)
+    go_round(runs, side, save, options)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +24,8 @@ def default_path() -> Path:
     folder = os.environ.get("XDG_RUNTIME_DIR")
     if folder:
         return Path(folder, "tickrig-rtc")
+    import tempfile  # noqa: PLC0415 - slow
+
     return Path(tempfile.gettempdir(), f"tickrig-rtc-{os.getuid()}")
 
 

@@ -9,9 +9,9 @@ import click
 from tickrig.emulators.rtc.at import VARIABLE, default_path, time_us
 from tickrig.emulators.rtc.conf_cli import conf
 from tickrig.emulators.rtc.print_cli import print_
-from tickrig.emulators.rtc.run import SystemOptions, run_system
 from tickrig.emulators.rtc.verbs_cli import VERBS
 from tickrig.host.cli.options import PATH
+from tickrig.host.cli.start import loading
 
 
 @click.group()
@@ -78,6 +78,9 @@ def run(lite_boot: str, **options: Any) -> None:
     seq 1 5 | tickrig rtc run chain.toml --console
     tickrig rtc run lite.toml --lite LiteA=/dev/ttyUSB0@57600 --lite LiteB=/tmp/lite-b
     """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.rtc.run import SystemOptions, run_system  # noqa: PLC0415 - slow
+
     run_system(SystemOptions(lite_boot_us=time_us(lite_boot), **options))
 
 

@@ -11,11 +11,10 @@ import click
 from tickrig.emulators.rtc.at import ask_system, at, components, time_us
 from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
 from tickrig.emulators.rtc.settle import settle
-from tickrig.emulators.rtc.system_file import file_format, write_system
 from tickrig.emulators.rtc.texts import component_lines, component_row
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.rtc.manager import DEFAULT_RATE_HZ
+from tickrig.host.cli.start import loading
 
 DATAPORT: Final = "dataport."
 
@@ -66,11 +65,12 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
 @click.command()
 @click.argument("type_name", metavar="TYPE", shell_complete=complete_type)
 @click.argument("name", default="")
-@click.option("--rate", "rate_hz", type=float, default=DEFAULT_RATE_HZ, help="In Hz.  [1000]")
+@click.option("--rate", "rate_hz", type=float, help="In Hz.  [1000]")
 @at
-def create(at: Path, type_name: str, name: str, rate_hz: float) -> None:
+def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
     """Create a component of TYPE, and print its name, such as ConsoleIn0."""
-    click.echo(ask_system(at, "create", type=type_name, name=name, rate_hz=rate_hz)["name"])
+    rate = {} if rate_hz is None else {"rate_hz": rate_hz}
+    click.echo(ask_system(at, "create", type=type_name, name=name, **rate)["name"])
 
 
 @click.command()
@@ -158,6 +158,9 @@ def inject(at: Path, port: str, value: str) -> None:
 @at
 def save(at: Path, file: Path | None) -> None:
     """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
+    with loading():
+        from tickrig.emulators.rtc.system_file import file_format, write_system  # noqa: PLC0415
+
     text = ask_system(at, "save", format="toml" if file is None else file_format(file))["text"]
     if file is None:
         click.echo(text)

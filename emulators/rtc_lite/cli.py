@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import click
 
-from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
-from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.emulator import LineKind
-from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
-from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
-from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
-from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.rtc_lite.verbs import verbs
 from tickrig.emulators.serial_options import line_options
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.wire_log import WireLine
-from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.user_file import told
-from tickrig.wire.rtc_lite.codes import Command, ContextType
+from tickrig.host.cli.start import loading
 from tickrig.wire.rtc_lite.frame import Checksum
 from tickrig.wire.rtc_lite.framing import Framing
 
-ROUTINE: Final = tuple(
-    command.value
-    for command in (Command.PING, Command.EXECUTE, Command.ERROR, Command.WRITE, Command.DATA)
-)
-"""What -v leaves out: the traffic of each period."""
-
 
 def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:
+    from tickrig.emulators.rtc_lite.components import COMPONENTS  # noqa: PLC0415 - slow
+
     return [name for name in COMPONENTS if name.startswith(word)]
 
 
@@ -100,36 +84,7 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     Completion of options and nodes in the shell:
     eval "$(_RTC_LITE_EMU_COMPLETE=bash_source rtc-lite-emu)"
     """  # noqa: D301 - click wants the backspace
-    ec = ContextType.TIMER if timer_hz else ContextType.PROXY
-    try:
-        config = NodeConfig(Framing(framing), Checksum(checksum), ec, timer_hz or DEFAULT_RATE_HZ)
-        device = RtcLiteNode(find_component(node), config)
-    except ValueError as error:
-        raise Refused(str(error)) from None
-    kind = Kind(
-        NAME,
-        f"RTC-Lite node {device.component.type_name}",
-        is_event=_is_event,
-        senders=verbs(device.component, config),
-        line=LineKind(baud, LINE_FAULTS, frame_splitter(config)),
-        talk=lambda link: " Its proxy opens this path.",
-    )
-    run = SerialRun(kind, device, config_to_trace(node, config), Options(**options))
-    context.exit(_run(run, node))
+    with loading():
+        from tickrig.emulators.rtc_lite.emulate import emulate  # noqa: PLC0415 - slow
 
-
-def _run(run: SerialRun, node: str) -> int:
-    """Run, and say in a line what a user's callback raised."""
-    if node in COMPONENTS:
-        return run.run()
-    file = node.rpartition(":")[0]
-    try:
-        return run.run()
-    except click.ClickException:
-        raise
-    except Exception as error:  # a user's callback may raise anything
-        raise Refused(f"{node}: {told(error, file)}") from error
-
-
-def _is_event(line: WireLine) -> bool:
-    return line.data[:2] not in ROUTINE
+    context.exit(emulate(node, baud, timer_hz, framing, checksum, options))

@@ -2,36 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
 from typing import Any, Final
 
 import click
 
-from tickrig.device.urg.parameters import UrgParameters
-from tickrig.device.urg.sensor import Urg
-from tickrig.device.urg.world import World, room
-from tickrig.emulators.emulator import LineKind
-from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.serial_options import line_options
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.trace import Mark
-from tickrig.emulators.urg.build import (
-    NAME,
-    config_to_trace,
-    parse_numbers,
-    parse_post,
-    parse_wall,
-)
-from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.options import add_options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
 
 USB_BAUD: Final = 12_000_000
 """As fast as USB at full speed."""
-
-BUFFER_BYTES: Final = 16_384
-"""Room for several whole scans at once."""
 
 _WORLD: Final = add_options(
     click.option("--room", "size", metavar="WIDTH,DEPTH", help="Four walls around the origin, m."),
@@ -75,30 +55,7 @@ def main(context: click.Context, /, serial: str, noise: float, baud: int, **opti
     Completion of options in the shell:
     eval "$(_URG_EMU_COMPLETE=bash_source urg-emu)"
     """  # noqa: D301 - click wants the backspace
-    try:
-        parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"])
-        world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
-    except ValueError as error:
-        raise Refused(str(error)) from None
-    line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
-    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=_talk)
-    config = config_to_trace(parameters, world)
-    run = SerialRun(kind, Urg(parameters, world), config, Options(**options))
-    context.exit(run.run())
+    with loading():
+        from tickrig.emulators.urg.emulate import emulate  # noqa: PLC0415 - slow
 
-
-def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
-    around = World()
-    if size is not None:
-        width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
-        around = room(width_m, depth_m)
-    more = tuple(parse_wall(text) for text in walls)
-    return World(around.walls + more, tuple(parse_post(text) for text in posts))
-
-
-def _talk(link: str) -> str:
-    return " Any program that speaks SCIP 2.0 can open this path."
-
-
-def _is_event(line: WireLine) -> bool:
-    return line.mark is Mark.TO_DEVICE
+    context.exit(emulate(serial, noise, baud, options))

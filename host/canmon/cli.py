@@ -1,47 +1,34 @@
-"""The command `canmon`; a verb is imported when it is asked for, so that each starts fast."""
+"""The command `canmon`."""
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any, Final
 
 import click
 
 from tickrig.host.canmon.unread import until_unread
+from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import version_option
 
-VERBS: Final[dict[str, str]] = {
-    "dump": "dump",
-    "conv": "conv",
-    "info": "info",
-    "top": "top",
-    "stats": "stats",
-    "check": "check",
-    "graph": "graph",
-    "nodes": "nodes",
-    "send": "send",
-    "seq": "seq",
-    "play": "play",
-    "tui": "tui_verb",
+HERE: Final = "tickrig.host.canmon"
+VERBS: Final = {
+    "dump": (f"{HERE}.dump:command", "Show frames as they come, and what they mean."),
+    "conv": (f"{HERE}.conv:command", "Write what SOURCE holds into the file LOG."),
+    "info": (f"{HERE}.info:command", "Say what log files are."),
+    "top": (f"{HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
+    "stats": (f"{HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
+    "check": (f"{HERE}.check:command", "Hold traffic against rules."),
+    "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
+    "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
+    "send": (f"{HERE}.send:command", "Send frames on BUS."),
+    "seq": (f"{HERE}.seq:command", "Carry out the sequence FILE on BUS."),
+    "play": (f"{HERE}.play:command", "Send the frames of LOG again."),
+    "tui": (f"{HERE}.tui_verb:command", "Show all there is in tabs."),
 }
-"""Verbs and the modules under `tickrig.host.canmon` that hold them, each as `command`."""
 
 
-class LazyGroup(click.Group):
-    """A group whose commands live in modules of their own."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which people meet them."""
-        return list(VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a verb."""
-        if cmd_name not in VERBS:
-            return None
-        module = import_module(f"tickrig.host.canmon.{VERBS[cmd_name]}")
-        command = module.command
-        assert isinstance(command, click.Command)
-        return command
+class Verbs(LazyGroup):
+    """The verbs of canmon."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; it ends when nobody reads what it prints."""
@@ -49,7 +36,7 @@ class LazyGroup(click.Group):
             return super().invoke(ctx)
 
 
-@click.group(cls=LazyGroup)
+@click.group(cls=Verbs, commands=VERBS)
 @version_option()
 def main() -> None:
     """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.

@@ -1,0 +1,57 @@
+"""What `urg-emu` runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Final
+
+from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.sensor import Urg
+from tickrig.device.urg.world import World, room
+from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.trace import Mark
+from tickrig.emulators.urg.build import (
+    NAME,
+    config_to_trace,
+    parse_numbers,
+    parse_post,
+    parse_wall,
+)
+from tickrig.emulators.wire_log import WireLine
+from tickrig.host.cli.refused import Refused
+
+BUFFER_BYTES: Final = 16_384
+"""Room for several whole scans at once."""
+
+
+def emulate(serial: str, noise: float, baud: int, options: dict[str, Any]) -> int:
+    """Run a range finder as the command line says, and return the exit status."""
+    try:
+        parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"])
+        world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
+    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=_talk)
+    config = config_to_trace(parameters, world)
+    return SerialRun(kind, Urg(parameters, world), config, Options(**options)).run()
+
+
+def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
+    around = World()
+    if size is not None:
+        width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
+        around = room(width_m, depth_m)
+    more = tuple(parse_wall(text) for text in walls)
+    return World(around.walls + more, tuple(parse_post(text) for text in posts))
+
+
+def _talk(link: str) -> str:
+    return " Any program that speaks SCIP 2.0 can open this path."
+
+
+def _is_event(line: WireLine) -> bool:
+    return line.mark is Mark.TO_DEVICE

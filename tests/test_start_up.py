@@ -1,0 +1,83 @@
+"""What commands import before they know what is asked of them: it is most of what they cost."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+
+from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
+from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
+from tickrig.emulators.canopen.profiles import PROFILES as CANOPEN_PROFILES
+from tickrig.emulators.cli import main as tickrig
+from tickrig.host.canmon.cli import main as canmon
+from tickrig.host.cli.lazy_group import Awaited
+from tickrig.host.cli.start import load
+
+ROOT = Path(__file__).parents[1]
+SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["scripts"]
+SLOW = {"asyncio", "email", "http", "multiprocessing", "sqlite3", "subprocess", "tempfile", "xml"}
+
+MOST = {
+    "tickrig ctl /nowhere status": 18,
+    "tickrig ctl /nowhere press power_button": 18,
+    "tickrig TAB": 12,
+    "tickrig ctl /nowhere TAB": 18,
+    "tickrig demo fig120 -- TAB": 18,
+    "tickrig replay TAB": 18,
+    "tickrig rtc ls": 26,
+    "tickrig rtc con TAB": 26,
+    "rrc-emu TAB": 14,
+    "rtc-lite-emu --framing TAB": 20,
+    "rh3 goto TAB": 14,
+    "rh3-emu TAB": 16,
+    "urg-emu TAB": 14,
+    "canopen-slave-emu --model TAB": 16,
+    "canmon TAB": 14,
+    "canmon --help": 14,
+    "rtc-canopen-builder TAB": 24,
+}
+"""Command lines, and how many modules of ours each may import."""
+
+
+@pytest.fixture(scope="module")
+def imported() -> dict[str, list[str]]:
+    """Return the modules that each command line imports beyond click."""
+    process = subprocess.run(
+        [sys.executable, ROOT / "tests" / "imported.py"],
+        input="".join(f"{SCRIPTS[line.split()[0]]} {line}\n" for line in MOST),
+        env={"XDG_RUNTIME_DIR": "/nowhere"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return dict(zip(MOST, map(json.loads, process.stdout.splitlines()), strict=True))
+
+
+@pytest.mark.parametrize("line", MOST)
+def test_a_command_imports_what_it_needs(imported: dict[str, list[str]], line: str) -> None:
+    names = imported[line]
+    packages = {name.partition(".")[0] for name in names}
+    assert packages - sys.stdlib_module_names <= {"tickrig", "click"}
+    assert not packages & SLOW
+    ours = [name for name in names if name.startswith("tickrig")]
+    assert len(ours) <= MOST[line], ours
+
+
+@pytest.mark.parametrize("group", [tickrig, canmon], ids=["tickrig", "canmon"])
+def test_a_list_of_commands_says_what_their_help_says(group: click.Group) -> None:
+    for awaited in group.commands.values():
+        assert isinstance(awaited, Awaited)
+        assert awaited.short_help is not None
+        told = " ".join(load(awaited.path).help.split())
+        assert told.startswith(awaited.short_help.removesuffix("."))
+
+
+def test_what_can_be_named_is_what_there_is() -> None:
+    assert tuple(CANOPEN_MODELS) == MODELS
+    assert (AUTO, *CANOPEN_PROFILES) == PROFILES
