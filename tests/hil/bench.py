@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 
-from tests.hil.emulator_operator import ControlHands, DirectHands, EmulatorOperator
+from tests.hil.emulator_operator import EmulatorOperator
+from tests.hil.lateness import EmulatorPace, Lateness, PacedLink, too_slow
 from tests.hil.operator import Operator
 from tests.hil.rig_file import RigFile
 from tests.hil.terminal_operator import Terminal, TerminalOperator
@@ -16,8 +17,10 @@ from tests.host.live import live_rrc, pty
 from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.control import Control
+from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.requests import VERSION
 from tickrig.emulators.sim_link import SimLink
 from tickrig.host.rrc import RrcClient
 from tickrig.host.serial_link import SerialLink
@@ -25,6 +28,9 @@ from tickrig.wire.rrc.replies import EventKind, StatusA
 
 QUICK = RrcConfig(power_on_ticks=5, button_off_ticks=5)
 """An RRC that does not keep the real-time tests waiting."""
+
+TIME_US = 100_000
+"""How far a time may be off in real time."""
 
 PATIENCE_US = 5_000_000
 """For what takes VR2 its time, 10 times what is expected."""
@@ -35,12 +41,15 @@ class Bench:
     """What a test body sees: the same on an emulator and on real hardware.
 
     Attributes:
-        client: the client, started.
+        client: the client; `begin` starts it.
         link: what went over the line; lines can be spoilt here.
         operator: hands and eyes.
         stick_pct: how far a stick may be off.
         time_us: how far a time may be off.
+        fresh: the RRC has just got its power.
+        parts: what may be late in real time.
         stable: whether stablemode is on.
+        late: why no failure of the RRC counts, empty if it does; `look` looks.
     """
 
     client: RrcClient
@@ -48,7 +57,30 @@ class Bench:
     operator: Operator
     stick_pct: int = 0
     time_us: int = 0
+    fresh: bool = True
+    parts: Mapping[str, Lateness] = field(default_factory=dict)
     stable: bool = False
+    late: str = ""
+
+    def begin(self) -> None:
+        """Start the client; VR2 is off then."""
+        self.client.start()
+        if self.fresh:
+            return
+        self.operator.switch_off()
+        self.client.start()
+        if self.client.stable:
+            self.client.stablemode(on=False)
+
+    def look(self) -> str:
+        """Return whether the machine was too slow, in words; after `close` what it was then."""
+        self.late = too_slow(self.parts) if self.parts else self.late
+        return self.late
+
+    def close(self) -> None:
+        """Look for the last time."""
+        self.look()
+        self.parts = {}
 
     def switch_on(self) -> None:
         """Bring VR2 on."""
@@ -85,42 +117,44 @@ class Bench:
 @contextmanager
 def sim_bench() -> Iterator[Bench]:
     """Put an emulated RRC into virtual time."""
-    line, rrc = SerialLine(), Rrc()
-    link = SpyLink(SimLink(Rig(Station(rrc, line.a)), line.b))
+    emulator = Emulator("rrc", Rrc())
+    control = Control(emulator)
+    link = SpyLink(SimLink(emulator.rig, emulator.host_end))
     with RrcClient(link) as client:
-        client.start()
-        yield Bench(client, link, EmulatorOperator(DirectHands(rrc), client))
+        operator = EmulatorOperator(
+            lambda do, **fields: control.answer({"v": VERSION, "do": do, **fields}), client
+        )
+        yield Bench(client, link, operator)
 
 
 @contextmanager
 def pty_bench() -> Iterator[Bench]:
     """Put an emulated RRC into real time, on a pseudo-terminal."""
     with pty() as port, live_rrc(port, QUICK) as rrc:
-        link = SpyLink(SerialLink(port.path))
+        host = PacedLink(SerialLink(port.path))
+        link = SpyLink(host)
         with RrcClient(link) as client:
-            client.start()
-            yield Bench(client, link, EmulatorOperator(rrc, client), time_us=100_000)
+            ask = host.beside(rrc.ask)
+            operator = EmulatorOperator(ask, client, TIME_US)
+            parts: dict[str, Lateness] = {"host": host, "emulator": EmulatorPace(ask)}
+            yield Bench(client, link, operator, time_us=TIME_US, parts=parts)
 
 
 @contextmanager
 def real_bench(rig: RigFile, config: pytest.Config) -> Iterator[Bench]:
     """Take the RRC that a rig file names; it is off before and after each test."""
     with ExitStack() as stack:
-        link = SpyLink(SerialLink(rig.port))
+        host = PacedLink(SerialLink(rig.port))
+        link = SpyLink(host)
         client = stack.enter_context(RrcClient(link))
-        client.start()
-        operator = _operator(rig, config, client, stack)
-        operator.switch_off()
-        client.start()
-        if client.stable:
-            client.stablemode(on=False)
+        parts: dict[str, Lateness] = {"host": host}
+        operator: Operator
+        if rig.control is None:
+            operator = TerminalOperator(Terminal(config, client), client, rig.stick_pct)
+        else:
+            ask = host.beside(stack.enter_context(closing(ControlClient(rig.control))).ask)
+            parts["emulator"] = EmulatorPace(ask)
+            operator = EmulatorOperator(ask, client, rig.time_us)
         stack.callback(operator.switch_off)
-        yield Bench(client, link, operator, rig.stick_pct, rig.time_us)
+        yield Bench(client, link, operator, rig.stick_pct, rig.time_us, False, parts)
         link.spoil = lambda line: line
-
-
-def _operator(rig: RigFile, config: pytest.Config, client: RrcClient, stack: ExitStack) -> Operator:
-    if rig.control is None:
-        return TerminalOperator(Terminal(config, client), client, rig.stick_pct)
-    hands = stack.enter_context(closing(ControlHands(rig.control)))
-    return EmulatorOperator(hands, client)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import pytest
 
 from tests.hil.bench import Bench, pty_bench, real_bench, sim_bench
 from tests.hil.rig_file import RIG
+from tests.hil.verdict import BENCH, judge
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -20,6 +21,16 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     elif "bench" in metafunc.fixturenames:
         kinds = ["real"] if real else ["sim", "pty"]
         metafunc.parametrize("bench", [_timed(kind) for kind in kinds], indirect=True)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Call nothing a failure of the device that the machine is to blame for."""
+    report = yield
+    judge(report, item.stash.get(BENCH, None))
+    return report
 
 
 def _timed(kind: str, *others: str) -> object:
@@ -40,7 +51,12 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
         case kind:
             raise ValueError(f"no bench {kind!r}")
     with chosen as bench:
-        yield bench
+        request.node.stash[BENCH] = bench
+        try:
+            bench.begin()
+            yield bench
+        finally:
+            bench.close()
 
 
 @pytest.fixture

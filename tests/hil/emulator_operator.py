@@ -2,113 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from pathlib import Path
-from typing import Protocol
 
+from tests.hil.lateness import Ask
 from tests.hil.operator import PRESS_US
-from tests.host.live import LiveRrc
-from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.control_client import ControlClient
 from tickrig.host.rrc import RrcClient
 
 OFF_STATE = "WaitPowerOn"
+ON_STATES = ("Standby", "Limit", "Output", "PowerOffByOthers")
+"""Where one press leads to off; another might come so late that it leads to on again."""
+
 SAMPLE_US = 10_000
 EDGE_US = 50_000  # how far a sampled edge may be off
 
 
-class Hands(Protocol):
-    """Reach into an emulator, wherever it runs."""
-
-    def set(self, name: str, value: int) -> None:
-        """Set a physical input."""
-
-    def move_stick(self, v_pct: int, w_pct: int) -> None:
-        """Set both axes of the stick, at once."""
-
-    def read(self, name: str) -> int | str:
-        """Read a physical output."""
-        ...
-
-
-class DirectHands:
-    """Hands at a device in this thread."""
-
-    def __init__(self, rrc: Rrc) -> None:
-        self._rrc = rrc
-
-    def set(self, name: str, value: int) -> None:
-        self._rrc.inputs.set(name, value)
-
-    def move_stick(self, v_pct: int, w_pct: int) -> None:
-        self.set("stick_v_pct", v_pct)
-        self.set("stick_w_pct", w_pct)
-
-    def read(self, name: str) -> int | str:
-        return self._rrc.read(name)
-
-
-class ControlHands:
-    """Hands at an emulator in another process, by its control socket."""
-
-    def __init__(self, path: Path) -> None:
-        self._control = ControlClient(path)
-
-    def set(self, name: str, value: int) -> None:
-        self._control.ask("set", name=name, value=value)
-
-    def move_stick(self, v_pct: int, w_pct: int) -> None:
-        self._control.ask("set", name="stick", value=[v_pct, w_pct])
-
-    def read(self, name: str) -> int | str:
-        values = self._control.ask("get", names=[name])["values"]
-        assert isinstance(values, dict)
-        value = values[name]
-        assert isinstance(value, int | str)
-        return value
-
-    def close(self) -> None:
-        self._control.close()
-
-
 class EmulatorOperator:
-    """Does and looks itself; while it takes its time the client goes on listening."""
+    """Does and looks itself; while it takes its time the client goes on listening.
 
-    def __init__(self, hands: Hands | LiveRrc, client: RrcClient) -> None:
-        self._hands, self._client = hands, client
+    Args:
+        ask: asks the emulator, wherever it runs.
+        client: the client.
+        time_us: how long what it looks for may be late.
+    """
+
+    def __init__(self, ask: Ask, client: RrcClient, time_us: int = 0) -> None:
+        self._ask, self._client, self._time_us = ask, client, time_us
 
     def press(self, button: str) -> None:
-        self._hands.set(button, 1)
+        self._do("press", name=button, duration_us=PRESS_US)
         self._client.run_for(PRESS_US)
-        self._hands.set(button, 0)
+        self._wait_until(lambda: self._read(button) == 0)
         self._client.run_for(PRESS_US)
 
     def hold_stick(self, v_pct: int, w_pct: int) -> None:
-        self._hands.move_stick(v_pct, w_pct)
+        self._do("set", name="stick", value=[v_pct, w_pct])
         self._client.run_for(PRESS_US)
 
     def cut_power(self) -> None:
-        self._hands.set("rrc_power", 0)
+        self._do("set", name="rrc_power", value=0)
         self._client.run_for(PRESS_US)
-        self._hands.set("rrc_power", 1)
+        self._wait_until(lambda: self._read("state") == "Off")
+        self._do("set", name="rrc_power", value=1)
         self._client.run_for(PRESS_US)
 
     def make_fault(self, name: str, value: int = 1) -> None:
-        self._hands.set(name, value)
+        self._do("set", name=name, value=value)
 
     def switch_off(self) -> None:
-        self._hands.move_stick(0, 0)
-        while (state := self._hands.read("state")) != OFF_STATE:
-            if state != "PowerOffByButton":
+        self._do("set", name="stick", value=[0, 0])
+        while (state := self._read("state")) != OFF_STATE:
+            if state in ON_STATES:
                 self.press("power_button")
-            self._client.run_for(PRESS_US)
+            while self._read("state") == state:
+                self._client.run_for(SAMPLE_US)
 
     def sees_motion(self, v_pct: int, w_pct: int) -> bool:
         self._client.run_for(PRESS_US)
-        return (self._hands.read("out_v_pct"), self._hands.read("out_w_pct")) == (v_pct, w_pct)
+        return self._wait_until(
+            lambda: (self._read("out_v_pct"), self._read("out_w_pct")) == (v_pct, w_pct)
+        )
 
     def sees_error(self) -> bool:
-        return self._hands.read("error_led") == 1
+        return self._wait_until(lambda: self._read("error_led") == 1)
 
     def hears_tones(self, times_us: tuple[int, ...]) -> bool:
         tones_us = self._listen(sum(times_us) + EDGE_US)[:-1]
@@ -123,9 +79,28 @@ class EmulatorOperator:
         edges: list[tuple[int, bool]] = []
         until_us = self._client.now_us + duration_us
         while self._client.now_us < until_us:
-            sounding = self._hands.read("buzzer") == 1
+            sounding = self._read("buzzer") == 1
             if sounding != (bool(edges) and edges[-1][1]):
                 edges.append((self._client.now_us, sounding))
             self._client.run_for(SAMPLE_US)
         times_us = [until_us - duration_us, *(at_us for at_us, _ in edges), until_us]
         return [b - a for a, b in pairwise(times_us)][1:]
+
+    def _wait_until(self, seen: Callable[[], bool]) -> bool:
+        """Look again and again for as long as it may be late."""
+        until_us = self._client.now_us + self._time_us
+        while not seen():
+            if self._client.now_us >= until_us:
+                return False
+            self._client.run_for(SAMPLE_US)
+        return True
+
+    def _read(self, name: str) -> object:
+        values = self._do("get", names=[name])["values"]
+        assert isinstance(values, dict)
+        return values[name]
+
+    def _do(self, do: str, **fields: object) -> Mapping[str, object]:
+        answer = self._ask(do, **fields)
+        assert answer["ok"], answer
+        return answer

@@ -6,7 +6,7 @@ import contextlib
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 import serial
@@ -15,12 +15,11 @@ from serial.rfc2217 import PortManager
 from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.emulators.bridge import Bridge
 from tickrig.emulators.clock import RealClock
-from tickrig.emulators.port import Port
+from tickrig.emulators.control import Control
+from tickrig.emulators.emulator import Emulator, Outside
 from tickrig.emulators.pty_port import PtyPort
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.requests import VERSION, Object
 
 JOIN_S = 5.0
 T = TypeVar("T")
@@ -33,10 +32,10 @@ class LiveRrc:
     ticks: a button that is pressed and let go is seen.
     """
 
-    def __init__(self, outside: Port[bytes], config: RrcConfig) -> None:
-        line, self._rrc = SerialLine(), Rrc(config)
-        bridge = Bridge(line.b, outside)
-        self._rig = Rig(Station(self._rrc, line.a), bridges=[bridge], clock=RealClock())
+    def __init__(self, outside: Outside, config: RrcConfig) -> None:
+        self._rrc = Rrc(config)
+        self._emulator = Emulator("rrc", self._rrc, outside=outside, clock=RealClock())
+        self._control = Control(self._emulator)
         self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -58,6 +57,10 @@ class LiveRrc:
         """Read an output."""
         return self._ask(lambda: self._rrc.read(name))
 
+    def ask(self, do: str, **fields: object) -> Object:
+        """Make a request as to its control socket."""
+        return self._ask(lambda: self._control.answer({"v": VERSION, "do": do, **fields}))
+
     def await_output(self, name: str, value: int | str) -> None:
         """Wait until an output has a value; looks once a tick, for 10 s."""
         for _ in range(1_000):
@@ -76,17 +79,20 @@ class LiveRrc:
     def _ask(self, question: Callable[[], T]) -> T:
         answer: SimpleQueue[T] = SimpleQueue()
         self._calls.put(lambda: answer.put(question()))
-        return answer.get(timeout=JOIN_S)
+        try:
+            return answer.get(timeout=JOIN_S)
+        except Empty:
+            raise TimeoutError(f"no answer for {JOIN_S} s") from None
 
     def _run(self) -> None:
         while not self._stop.is_set():
             if not self._calls.empty():
                 self._calls.get()()
-            self._rig.run_for(TICK_US)
+            self._emulator.rig.run_for(TICK_US)
 
 
 @contextlib.contextmanager
-def live_rrc(outside: Port[bytes], config: RrcConfig | None = None) -> Iterator[LiveRrc]:
+def live_rrc(outside: Outside, config: RrcConfig | None = None) -> Iterator[LiveRrc]:
     """Run an emulator for the length of a `with`."""
     live = LiveRrc(outside, config or RrcConfig())
     live.start()
@@ -110,6 +116,7 @@ class TcpPort:
     """A `Port[bytes]` that takes one connection on the loopback interface."""
 
     due_us = NEVER
+    lost = 0
 
     def __init__(self) -> None:
         self._listener = socket.create_server(("127.0.0.1", 0))
