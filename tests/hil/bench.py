@@ -73,7 +73,9 @@ class Bench:
             self.client.stablemode(on=False)
 
     def look(self) -> str:
-        """Return whether the machine was too slow, in words; after `close` what it was then."""
+        """Return that the machine was too slow, if so; after `close` what was seen then."""
+        if self.operator.said_no:
+            return ""
         self.late = too_slow(self.parts) if self.parts else self.late
         return self.late
 

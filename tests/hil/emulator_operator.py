@@ -28,6 +28,7 @@ class EmulatorOperator:
 
     def __init__(self, ask: Ask, client: RrcClient, time_us: int = 0) -> None:
         self._ask, self._client, self._time_us = ask, client, time_us
+        self.said_no = False
 
     def press(self, button: str) -> None:
         self._do("press", name=button, duration_us=PRESS_US)

@@ -9,7 +9,13 @@ PRESS_US: Final = 30_000
 
 
 class Operator(Protocol):
-    """Whoever presses buttons, moves the stick and looks at the motors."""
+    """Whoever presses buttons, moves the stick and looks at the motors.
+
+    Attributes:
+        said_no: a human saw what should not be; that counts however late the machine was.
+    """
+
+    said_no: bool
 
     def press(self, button: str) -> None:
         """Press a button and let it go: `power_button`, `speed_up_button`, ..."""

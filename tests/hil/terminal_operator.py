@@ -45,6 +45,7 @@ class TerminalOperator:
 
     def __init__(self, terminal: Terminal, client: RrcClient, stick_pct: int) -> None:
         self._terminal, self._client, self._stick_pct = terminal, client, stick_pct
+        self.said_no = False
 
     def press(self, button: str) -> None:
         self._tell(f"Press and release the {button.replace('_', ' ')} of the controller.")
@@ -83,6 +84,7 @@ class TerminalOperator:
     def _sees(self, question: str) -> bool:
         while (answer := self._terminal.ask(f"{question} [y/n]")) not in ("y", "n"):
             continue
+        self.said_no |= answer == "n"
         return answer == "y"
 
     def _holds(self, v_pct: int, w_pct: int) -> bool:

@@ -114,6 +114,15 @@ def test_a_bench_that_is_closed_knows_how_late_it_was() -> None:
     assert bench.look() == "the machine was too slow: host up to 80 ms late"
 
 
+def test_what_a_human_has_denied_is_a_failure_on_any_machine() -> None:
+    with sim_bench() as bench:
+        bench.parts = {"host": Late(80_000)}
+        bench.operator.said_no = True
+        report = failed()
+        judge(report, bench)
+    assert report.when == "call"
+
+
 def test_virtual_time_is_never_late() -> None:
     with sim_bench() as bench:
         assert too_slow(bench.parts) == ""
