@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, Final, assert_never
+from typing import TYPE_CHECKING, assert_never
 
 from tickrig.host.monitor.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.heard import Heard
@@ -28,9 +28,6 @@ class Output(StrEnum):
     LOG = "log"
     JSONL = "jsonl"
     CSV = "csv"
-
-
-CSV_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
 
 
 def printer_of(
@@ -119,7 +116,7 @@ def _meaning_json(decoded: Decoded) -> str:
 
 
 def csv_printer(heard: Listened, decoded: Decoded | None) -> str:
-    """Write a row below `CSV_HEADER`; a line of a serial port has no identifier."""
+    """Write a row below `DUMP_HEADER`; a line of a serial port has no identifier."""
     at_us, channel, sent = heard.at_us, heard.channel, heard.sent
     if isinstance(heard, Heard):
         frame = heard.frame

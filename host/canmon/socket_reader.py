@@ -16,8 +16,7 @@ from typing import Any, Final
 
 from tickrig.host.errors import LinkClosed
 from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.log_line import CAN_FD, CAN_XL
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
 

@@ -25,7 +25,7 @@ SOURCE   can0                      a bus of SocketCAN, or of the interface that 
          slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
          serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
          run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
-         -                         standard input: candump -L, or canmon dump --jsonl"""
+         -                         standard input: what candump or canmon dump prints"""
 """For the help text of a verb that takes SOURCE words."""
 
 

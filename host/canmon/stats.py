@@ -68,7 +68,8 @@ def command(
         frames.close()
     snapshot = log.snapshot() if log else traffic.snapshot()
     with until_unread():
-        click.echo("\n".join((_jsonl if jsonl else _tables)(snapshot, by, bit_rate)))
+        for line in (_jsonl if jsonl else _tables)(snapshot, by, bit_rate):
+            click.echo(line)
     report(frames, strict)
 
 

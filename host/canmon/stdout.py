@@ -6,7 +6,8 @@ import sys
 from collections.abc import Sequence
 
 from tickrig.host.canmon.meaning import Meant
-from tickrig.host.canmon.printer import CSV_HEADER, Output, Printer
+from tickrig.host.canmon.printer import Output, Printer
+from tickrig.host.monitor.logs.csv_line import DUMP_HEADER
 from tickrig.host.monitor.logs.json_line import drop_line
 
 
@@ -19,7 +20,7 @@ class Printed:
 
     def take(self, meant: Sequence[Meant], lost: int) -> None:
         """Print frames, at once."""
-        lines = [CSV_HEADER] if self._header else []
+        lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in meant]
         if lost != self._lost and self._output is Output.JSONL:
             lines.append(drop_line(lost - self._lost))

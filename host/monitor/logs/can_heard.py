@@ -6,9 +6,8 @@ import can
 
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.log_line import CAN_FD
 from tickrig.host.monitor.logs.log_time import to_us
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.tally import CAN_FD, Tally
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 from tickrig.wire.errors import WireError
 

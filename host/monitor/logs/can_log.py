@@ -1,4 +1,4 @@
-"""Log files that python-can reads: ASC, BLF, TRC, CSV and, with asammdf, MF4.
+"""Log files that python-can reads: ASC, BLF, TRC and, with asammdf, MF4.
 
 Its readers of text end at the first line that they do not understand, and pass
 over others in silence. Here the lines are watched: such a line is counted, and
@@ -20,13 +20,11 @@ from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.can_heard import to_heard
+from tickrig.host.monitor.logs.csv_line import UNNAMED
 from tickrig.host.monitor.logs.log_format import LogFormat
 from tickrig.host.monitor.logs.log_reader import LogError, open_log
 from tickrig.host.monitor.logs.tally import OTHER_OBJECTS, BadLines, Tally
 from tickrig.host.monitor.logs.watched_lines import WatchedLines
-
-UNNAMED: Final = "can0"
-"""What a bus without a name or number is called."""
 
 BROKEN: Final = (
     *(ValueError, LookupError, TypeError, ArithmeticError, EOFError, NotImplementedError),
@@ -40,7 +38,6 @@ UNSAID: Final = logging.NullHandler()
 _TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),
     LogFormat.TRC: can.TRCReader,
-    LogFormat.CSV: can.CSVReader,
 }
 
 

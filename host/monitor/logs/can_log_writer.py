@@ -1,4 +1,4 @@
-"""Log files that python-can writes: ASC, BLF, TRC, CSV and, with asammdf, MF4."""
+"""Log files that python-can writes: ASC, BLF, TRC and, with asammdf, MF4."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from tickrig.wire.can_error import ErrorFrame
 TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: AscWriter,
     LogFormat.TRC: TrcWriter,
-    LogFormat.CSV: can.CSVWriter,
 }
 BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: BlfWriter, LogFormat.MF4: can.MF4Writer}
 
@@ -84,12 +83,10 @@ class CanLogWriter:
         said += [
             f"{named}: {name} became can{number}"
             for name, number in self._numbers.items()
-            if name != f"can{number}" and self._kind is not LogFormat.CSV
+            if name != f"can{number}"
         ]
         if isinstance(self._writer, BlfWriter) and self._writer.early:
             said.append(f"{named}: {self._writer.early} frames from before its start moved there")
-        if self._kind is LogFormat.CSV and len(self._numbers) > 1:
-            said.append(f"{named}: csv does not tell buses apart: {', '.join(self._numbers)}")
         return said
 
     def _number(self, channel: str) -> int:

@@ -18,6 +18,7 @@ from tickrig.host.monitor.logs.columns import ChannelNames, Columns, Rows, joine
 from tickrig.host.monitor.logs.log_format import LogFormat, log_format
 from tickrig.host.monitor.logs.log_line import parse_log_line
 from tickrig.host.monitor.logs.log_reader import LogError, LogReader, open_log, read_log
+from tickrig.host.monitor.logs.screen_line import HEAD, ScreenClock
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.host.monitor.logs.whole_lines import WholeLines
 
@@ -49,9 +50,10 @@ def _batches(reader: LogReader, channels: ChannelNames) -> Iterator[Rows]:
 
 
 def _blocks(file: BinaryIO, path: Path, channels: ChannelNames, tally: Tally) -> Iterator[Rows]:
-    number = 0
+    number, clock = 0, None
     for text in _whole_lines(file, path):
-        rows = _take_apart(text, number, channels, tally)
+        clock = clock or ScreenClock.of(text[:HEAD].decode("latin-1"))
+        rows = _take_apart(text, number, channels, tally, clock)
         number += len(rows.known)
         yield rows
 
@@ -69,13 +71,15 @@ def _whole_lines(file: BinaryIO, path: Path) -> Iterator[bytes]:
         yield rest + b"\n"
 
 
-def _take_apart(text: bytes, number: int, channels: ChannelNames, tally: Tally) -> Rows:
+def _take_apart(
+    text: bytes, number: int, channels: ChannelNames, tally: Tally, clock: ScreenClock
+) -> Rows:
     """Return a row for each line; `number` lines are before them."""
     block = CandumpBlock(text)
     rows = Rows(len(block.starts))
     block.take(rows, channels)
     for row in (~rows.known).nonzero()[0].tolist():
-        heard = parse_log_line(block.line(row), number + row + 1, tally)
+        heard = parse_log_line(block.line(row), number + row + 1, tally, clock)
         if heard is None:
             continue
         rows.put(row, heard, channels.place(heard.channel))

@@ -33,7 +33,7 @@ SUFFIXES: Final = {
 
 COMPRESSED: Final = ".gz"
 
-TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL)
+TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV)
 """Formats of lines that `LogLines` reads."""
 
 

@@ -83,4 +83,4 @@ def _last_us(path: Path) -> int | None:
         file.seek(-min(TAIL_BYTES, path.stat().st_size), os.SEEK_END)
         lines = LogLines()
         tail = lines.push(file.read()) + lines.finish()
-    return tail[-1].at_us if tail else None
+    return tail[-1].at_us if tail and not lines.deltas else None

@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.host.monitor.heard import Heard
 from tickrig.host.monitor.logs.log_line import parse_log_line
+from tickrig.host.monitor.logs.screen_line import ScreenClock
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.host.monitor.logs.whole_lines import WholeLines
 from tickrig.wire.can import CanFrame
@@ -31,6 +32,12 @@ class LogLines:
     def __init__(self) -> None:
         self.tally = Tally()
         self._whole, self._number = WholeLines(), 0
+        self._clock: ScreenClock | None = None
+
+    @property
+    def deltas(self) -> bool:
+        """Whether stamps count from frame to frame: only all of the log tells the time."""
+        return self._clock is not None and self._clock.deltas
 
     def push(self, data: bytes, /) -> list[Heard]:
         """Return the frames of the lines that end in these bytes."""
@@ -48,8 +55,9 @@ class LogLines:
         usual = _USUAL.findall(text)
         if len(usual) == count:
             return _usual_frames(usual)
+        clock = self._clock = self._clock or ScreenClock.of(text)
         lines = enumerate(text.split("\n"), begin + 1)
-        frames = (parse_log_line(line, number, self.tally) for number, line in lines)
+        frames = (parse_log_line(line, number, self.tally, clock) for number, line in lines)
         return [heard for heard in frames if heard]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, Protocol, cast
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.csv_line import LOG_HEADER, csv_row
 from tickrig.host.monitor.logs.json_line import json_line
 from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, LogFormat, log_format
 from tickrig.wire.candump import LogLine
@@ -43,7 +44,7 @@ def write_log(path: Path) -> LogWriter:
     """
     kind = log_format(path)
     if kind in TEXT:
-        return TextLogWriter(create(path), kind)
+        return CsvLogWriter(path) if kind is LogFormat.CSV else TextLogWriter(create(path), kind)
     from tickrig.host.monitor.logs.can_log_writer import (  # noqa: PLC0415 - python-can is slow
         CanLogWriter,
     )
@@ -66,12 +67,19 @@ def log_line(heard: Heard) -> str:
     return f"{line} T" if heard.sent else line
 
 
+_LINES: Final = {
+    LogFormat.CANDUMP: log_line,
+    LogFormat.JSONL: json_line,
+    LogFormat.CSV: csv_row,
+}
+
+
 class TextLogWriter:
-    """A log in lines: candump's, or JSON."""
+    """A log in lines: candump's, JSON or CSV."""
 
     def __init__(self, file: BinaryIO, kind: LogFormat) -> None:
         self._file, self._lines = file, list[str]()
-        self._text = json_line if kind is LogFormat.JSONL else log_line
+        self._text = _LINES[kind]
 
     def write(self, heard: Heard, /) -> None:
         """Add a line."""
@@ -97,3 +105,23 @@ class TextLogWriter:
     def _give(self) -> None:
         self._file.write("".join(f"{line}\n" for line in self._lines).encode())
         self._lines.clear()
+
+
+class CsvLogWriter(TextLogWriter):
+    """Rows below a header; they do not name their bus."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(create(path), LogFormat.CSV)
+        self._name, self._channels = path.name, dict[str, None]()
+        self._lines.append(LOG_HEADER)
+
+    def write(self, heard: Heard, /) -> None:
+        """Add a row."""
+        self._channels[heard.channel] = None
+        super().write(heard)
+
+    def words(self) -> list[str]:
+        """Say which buses became one."""
+        if len(self._channels) < 2:
+            return []
+        return [f"{self._name}: csv does not tell buses apart: {', '.join(self._channels)}"]

@@ -13,6 +13,8 @@ SHOWN: Final = 60
 """Characters of a bad line that are shown."""
 
 
+CAN_FD: Final = "CAN FD frames"
+CAN_XL: Final = "CAN XL frames"
 SERIAL_LINES: Final = "lines of a serial port"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
@@ -57,11 +59,13 @@ class Tally:
         passed_over: kinds of frames that classic CAN does not have, and of what is no
             frame at all (`NO_FRAMES`), and how many.
         lost: frames that the recorder says it lost.
+        untimed: frames that have no time in the log; they got that of the frame before.
     """
 
     bad_lines: BadLines = field(default_factory=BadLines)
     passed_over: Counter[str] = field(default_factory=Counter)
     lost: int = 0
+    untimed: int = 0
 
     @property
     def unread(self) -> int:
@@ -73,4 +77,5 @@ class Tally:
         """Say it to people, one line each; nothing if all was returned."""
         said = self.bad_lines.words(name)
         said += [f"{name}: {count} {what} passed over" for what, count in self.passed_over.items()]
+        said += [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
         return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])

@@ -17,7 +17,6 @@ _SILENT: Final = {
         re.IGNORECASE,
     ),
     LogFormat.TRC: re.compile(r"\s*(?:$|;)"),
-    LogFormat.CSV: re.compile(r"\s*(?:$|[^0-9])"),
 }
 """Headers, comments and empty lines."""
 
@@ -28,7 +27,6 @@ _EVENTS: Final = {
     LogFormat.TRC: re.compile(
         r"\s*[0-9]+\)?\s+[0-9.]+\s+(?:[0-9]+\s+)?(?:Warng|Error|ST|ER|EC|EV|F{8})\b"
     ),
-    LogFormat.CSV: re.compile(r"(?!)"),
 }
 """Lines with what is no data or remote frame. What is neither of these was meant as a frame."""
 

@@ -49,6 +49,13 @@ def test_rows_are_lines_of_json(log: str, by: str) -> None:
     assert [json.loads(line)["what"] for line in lines] == ["bus", by, by]
 
 
+def test_of_an_empty_log_no_line_of_json_is_printed(tmp_path: Path) -> None:
+    path = tmp_path / "empty.log"
+    path.touch()
+    result = stats(str(path), "--jsonl")
+    assert (result.exit_code, result.stdout) == (0, "")
+
+
 def test_a_large_log_has_the_same_statistics(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
     small = stats(log, "--jsonl")
     monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
