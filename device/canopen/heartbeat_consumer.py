@@ -100,7 +100,6 @@ class HeartbeatConsumer(Service):
 
     def start(self) -> None:
         """Watch the nodes of the power-on values."""
-        self.monitors.clear()
         for entry in self._entries:
             self._watch(entry)
 

@@ -4,6 +4,7 @@ import pytest
 
 from tests.device.canopen.objects import array, booted, errors, u16, write
 from tickrig.device.canopen.heartbeat_consumer import HeartbeatConsumer, Watch
+from tickrig.device.core import NEVER
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.nmt import NmtState
 
@@ -96,6 +97,27 @@ def test_an_entry_that_is_changed_ends_its_error() -> None:
     assert write(bus, 0x1016, 0, 1) is None
     assert bus.step("707#05") == [BACK]
     assert bus.run(300) == []
+
+
+@pytest.mark.parametrize(("node_id", "lost"), [(0, 0), (1, 1), (127, 1), (128, 0)])
+def test_the_first_and_the_last_node_id_are_watched(node_id: int, lost: int) -> None:
+    bus = booted(errors(), array(0x1016, node_id << 16 | 200))
+    bus.step(f"{0x700 + node_id:03X}#05")
+    assert bus.run(300) == [f"085#308111{node_id:02X}00000000"] * lost
+
+
+def test_a_reset_forgets_what_was_watched_since_power_on() -> None:
+    bus = booted(errors(), array(0x1016, 0))
+    write(bus, 0x1016, NODE_7_200_MS, 1)
+    bus.step("000#8205")
+    assert not HeartbeatConsumer.of(bus.slave).monitors
+
+
+def test_an_entry_that_is_switched_off_ends_the_wait() -> None:
+    bus = booted(errors(), array(0x1016, NODE_7_200_MS))
+    bus.step("707#05")
+    write(bus, 0x1016, 0, 1)
+    assert bus.slave.due_us == NEVER
 
 
 @pytest.mark.parametrize(
