@@ -3,37 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from heapq import heappop, heappush
+from itertools import count
+from typing import Final
 
 from tickrig.device.core import NEVER
 
 Action = Callable[[int], None]
 """Something to do; it is told the time in microseconds."""
 
+SPARE: Final = 64
+"""So many forgotten actions may stay, and as many as there are others."""
+
+_Entry = tuple[int, int, Hashable, Action]
+"""When, the number of its entering, its key, and what."""
+
 
 class Agenda:
     """Actions by time; those of the same time in the order they were entered."""
 
     def __init__(self) -> None:
-        self._entries: dict[Hashable, tuple[int, Action]] = {}
+        self._numbers = count()
+        self._heap: list[_Entry] = []
+        self._entered: dict[Hashable, int] = {}
+        """The number of what holds for each key; others in the heap were forgotten."""
         self.due_us = NEVER
 
     def put(self, key: Hashable, t_us: int, action: Action) -> None:
         """Enter an action; one entered before under the same key is forgotten."""
-        self._entries.pop(key, None)
-        self._entries[key] = (t_us, action)
+        self._entered[key] = number = next(self._numbers)
+        heappush(self._heap, (t_us, number, key, action))
         self._note_due()
 
     def drop(self, key: Hashable) -> None:
         """Forget an action; one that is not there is no error."""
-        self._entries.pop(key, None)
-        self._note_due()
+        if self._entered.pop(key, None) is not None:
+            self._note_due()
 
     def run(self, now_us: int) -> None:
         """Do what is due at `now_us`."""
         while self.due_us <= now_us:
-            key, (_, action) = min(self._entries.items(), key=lambda item: item[1][0])
+            _, _, key, action = self._heap[0]
             self.drop(key)
             action(now_us)
 
     def _note_due(self) -> None:
-        self.due_us = min((t_us for t_us, _ in self._entries.values()), default=NEVER)
+        if len(self._heap) > 2 * len(self._entered) + SPARE:
+            self._heap = sorted(entry for entry in self._heap if self._holds(entry))
+        while self._heap and not self._holds(self._heap[0]):
+            heappop(self._heap)
+        self.due_us = self._heap[0][0] if self._heap else NEVER
+
+    def _holds(self, entry: _Entry) -> bool:
+        return self._entered.get(entry[2]) == entry[1]
