@@ -12,7 +12,7 @@ import click
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.journey_table import limits_of, table
 from tickrig.emulators.rh3.outing import Outing, demand_arrival, stopped_at_the_end, watched
-from tickrig.emulators.rh3.path_file import read_path
+from tickrig.emulators.rh3.path_file import FARTHEST_M, read_path, within_reach
 from tickrig.emulators.rh3.squares import Size, play_squares
 from tickrig.emulators.rh3.track_plot import write_track
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -26,7 +26,9 @@ def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
     """Drive to a pose, in metres and radians."""
     if not sound(x, y, theta):
         raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
-    _drive(_outing(options), [Pose(x, y, theta)], f"rh3 goto {x:g} {y:g} {theta:g}")
+    if not within_reach(goal := Pose(x, y, theta)):
+        raise Refused(f"{x:g} {y:g} {theta:g} is beyond {FARTHEST_M} m")
+    _drive(_outing(options), [goal], f"rh3 goto {x:g} {y:g} {theta:g}")
 
 
 def go_along(file: Path, options: dict[str, Any]) -> None:

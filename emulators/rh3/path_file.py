@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.ports import sound
+
+FARTHEST_M: Final = 1_000
+"""A goal farther than this from the start is a slip of the pen: it takes an hour."""
+
+
+def within_reach(goal: Pose) -> bool:
+    """Return whether a goal is so near that somebody may mean it."""
+    return goal.distance(Pose()) <= FARTHEST_M
 
 
 def read_path(path: Path) -> list[Pose]:
@@ -32,4 +41,6 @@ def _point(place: str, words: list[str]) -> Pose:
     if len(numbers) not in (2, 3) or not sound(*numbers):
         text = " ".join(words)
         raise ValueError(f"{place}: {text!r} is not x y in metres, and a heading in radians")
-    return Pose(*numbers)
+    if not within_reach(point := Pose(*numbers)):
+        raise ValueError(f"{place}: {' '.join(words)!r} is beyond {FARTHEST_M} m")
+    return point

@@ -11,6 +11,7 @@ from typing import ClassVar, Final, Protocol
 from tickrig.host.errors import LinkError
 from tickrig.host.link import Link
 from tickrig.host.modbus.master import Answer, ModbusMaster
+from tickrig.host.motion.base_texts import fault_text, refusal_text
 from tickrig.host.motion.dead_reckoning import wheel_speeds
 from tickrig.host.motion.geometry import Twist
 from tickrig.host.motion.ports import newest, sound
@@ -220,7 +221,9 @@ class RefHardRh3(RtComponent):
         if answer.refusal is not None:
             self._refused += 1  # noise may have made another request of it
             if self._refused >= MISSES:
-                return self._failed(f"the base refuses {answer.request}: {answer.refusal!r}")
+                return self._failed(
+                    f"the base refuses {refusal_text(answer.request, answer.refusal)}"
+                )
             return ReturnCode.RTC_OK
         self._refused = 0
         if self._orders:
@@ -232,7 +235,8 @@ class RefHardRh3(RtComponent):
         now = Time.from_us(ec.now_us)
         self.angles.write(TimedDoubleSeq(now, tuple(self._angles)))
         if report.status & Status.FAULT:
-            return self._failed(f"fault of the base: {report.fault_left!r}, {report.fault_right!r}")
+            faults = fault_text(report.fault_left, report.fault_right)
+            return self._failed(f"fault of the base: {faults}")
         return ReturnCode.RTC_OK
 
     def _turn(self, report: Report) -> None:

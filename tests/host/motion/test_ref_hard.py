@@ -131,7 +131,7 @@ def test_a_fault_of_the_base_is_an_error(caplog: pytest.LogCaptureFixture) -> No
     bench.base.inputs.set("emergency_stop", 1)
     bench.period(50)
     assert bench.state == "ERROR"
-    assert "RefHardRh3: fault of the base: <Fault.EMERGENCY_STOP: 16>" in caplog.text
+    assert "RefHardRh3: fault of the base: emergency stop (left, right)" in caplog.text
     assert not moving(bench)
 
 
@@ -278,7 +278,7 @@ def test_a_base_that_goes_on_to_refuse_is_an_error(caplog: pytest.LogCaptureFixt
     bench = RefusingBench(5)
     bench.period(12)
     assert bench.state == "ERROR"
-    assert "the base refuses Request(function=3, read=(<Address.MODE: 16>, 1)" in caplog.text
+    assert "the base refuses function 03h at 0010h: " in caplog.text
 
 
 def test_a_limit_beyond_32_bits_is_the_highest_there_is() -> None:
