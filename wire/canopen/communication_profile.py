@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.object_table import CONST, RO, ROT, RW, Element, ObjectTable
+from tickrig.wire.canopen.object_table import (
+    CONST,
+    RO,
+    ROT,
+    RW,
+    Element,
+    ObjectCode,
+    ObjectTable,
+)
 
 U8: Final = DataType.UNSIGNED8
 U16: Final = DataType.UNSIGNED16
@@ -96,7 +104,8 @@ def _add_identity(objects: ObjectTable, profile: CommunicationProfile) -> None:
 def _add_errors(objects: ObjectTable) -> None:
     objects.variable(0x1001, "Error register", U8, ROT)
     rows = [Element(sub, f"Error {sub}", U32, RO) for sub in range(1, ERRORS_KEPT + 1)]
-    objects.record(0x1003, "Pre-defined error field", rows, count_access=RW, count=0)
+    title, code = "Pre-defined error field", ObjectCode.ARRAY
+    objects.record(0x1003, title, rows, count_access=RW, count=0, code=code)
     objects.variable(0x1014, "COB-ID EMCY", U32, RW, 0x80, relative=True)
     objects.variable(0x1015, "Inhibit time EMCY", U16, RW)
     objects.array(0x1029, "Error behaviour", 1, U8, RW)

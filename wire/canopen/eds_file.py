@@ -19,8 +19,10 @@ _DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB1")
 _KNOWN_SECTIONS: Final = {
     **{name.lower(): name for name in SECTIONS},
     "devicecommissioning": "DeviceComissioning",
+    "comments": "Comments",
 }
 _TITLE: Final = re.compile(r"\[([^\]]+)\]")
+_OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 _COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
@@ -124,6 +126,14 @@ class EdsFile:
             elif line and _matters(title) and (title or not self._errors):
                 reason = f"line {number} is no keyword with a value: {shorten(line)!r}"
                 self.refuse(title, reason)
+        self._take_comments()
+
+    def _take_comments(self) -> None:
+        """Learn what CiA 306 has no keyword for from comments, as `write_eds` writes it."""
+        for text in self.sections.get("Comments", {}).values():
+            if match := _OWN_WORD.fullmatch(text):
+                key, section, value = match.groups()
+                self.sections.get(section, {}).setdefault(key.lower(), value)
 
     def _begin(self, title: str, line: int) -> Section:
         """Begin a section; one that is there already is not read again."""

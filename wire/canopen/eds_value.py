@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+from contextlib import suppress
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -82,18 +83,32 @@ def parse_limit(kind: DataType, text: str) -> float | None:
     return value if isinstance(value, int | float) else None
 
 
+def format_limit(kind: DataType, limit: float) -> str:
+    """Write a limit, of a float as its bytes where they hold it."""
+    with suppress(ValueError):
+        if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:
+            return format_value(kind, data)
+    return str(limit)
+
+
 def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
     """Write a value; what it cannot express is for the caller to see by reading it again.
 
+    A float is written as its bytes, as Lely's tools want it; 0 is 0 for all.
+
     >>> format_value(DataType.UNSIGNED32, (0x180).to_bytes(4, "little"), relative=True)
     '$NODEID+0x180'
+    >>> format_value(DataType.REAL32, bytes.fromhex("0000803F"))
+    '0x3F800000'
     """
     value = kind.decode(data)
     if isinstance(value, bytes):
         return f"0x{int.from_bytes(data, 'little'):012X}" if kind in TIMES else data.hex().upper()
     if isinstance(value, str):
         return value
-    if isinstance(value, float) or kind.signed or kind is DataType.BOOLEAN:
+    if isinstance(value, float):
+        return f"0x{data[::-1].hex().upper()}" if any(data) else "0"
+    if kind.signed or kind is DataType.BOOLEAN:
         return str(value)
     return f"{NODE_ID}+0x{value:X}" if relative else f"0x{value:0{2 * kind.size}X}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import groupby
@@ -10,12 +11,13 @@ from typing import Final
 
 from tickrig.wire.canopen.described import Described, Table
 from tickrig.wire.canopen.device_info import BIT_RATES_KBIT, DeviceInfo
-from tickrig.wire.canopen.eds_value import format_value, parse_value
+from tickrig.wire.canopen.eds_value import format_limit, format_value, parse_value
 from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode, ObjectInfo
 
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER: Final = range(0x2000, 0x6000)
 IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
+SERIAL_NUMBER: Final = 4
 DUMMY_TYPES: Final = range(1, 8)
 VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
 MAPPABLE: Final = Access.TPDO | Access.RPDO
@@ -28,13 +30,15 @@ ACCESS_TYPES: Final = {
 
 NO_INFO: Final = DeviceInfo()
 
+_NO_WORD: Final = re.compile(r"[^a-z0-9]+")
+
 
 def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     """Write the objects with their default values.
 
-    Two keywords are ours, since CiA 306 has none for them, and only where they
-    are needed: `MaxBytes` limits a string or domain, `DefaultBytes` gives a
-    default that no text can express. No date and file name are written: the
+    What CiA 306 has no keyword for stands in its comments, where it is needed:
+    `MaxBytes` limits a string or domain, `DefaultBytes` gives a default that no
+    text can express. The file is named after the product and dated 1970: the
     same dictionary gives the same text.
 
     Raises:
@@ -43,41 +47,71 @@ def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     >>> from tickrig.wire.canopen.object_table import ObjectTable
     >>> text = write_eds(ObjectTable())
     >>> text.splitlines()[:2]
-    ['[FileInfo]', 'EDSVersion=4.0']
+    ['[FileInfo]', 'FileName=device.eds']
     """
-    return "\n".join([*_head(table, info), *_objects(table, present=False)])
+    return "\n".join([*_head(table, info, ".eds"), *_objects(table, present=False)])
 
 
 def write_dcf(table: Table, node_id: int, bit_rate: int, info: DeviceInfo = NO_INFO) -> str:
     """Write the objects with default and present values, for one node-ID; bit rate in bit/s."""
     commissioning = [
         "[DeviceComissioning]",
-        f"NodeID={node_id}",
-        f"Baudrate={bit_rate // 1_000}",
-        "",
+        *(f"NodeID={node_id}", "NodeName=", f"Baudrate={bit_rate // 1_000}"),
+        *("NetNumber=0", "NetworkName=", "CANopenManager=0"),
+        *(f"LSS_SerialNumber=0x{_identity(table).get(SERIAL_NUMBER, 0):08X}", ""),
     ]
     objects = _objects(table, present=True)
-    return "\n".join([*_head(table, info), *commissioning, *objects])
+    return "\n".join([*_head(table, info, ".dcf"), *commissioning, *objects])
 
 
-def _head(table: Table, info: DeviceInfo) -> Iterator[str]:
-    yield from ("[FileInfo]", "EDSVersion=4.0", "", "[DeviceInfo]")
+def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
+    yield from ("[FileInfo]", *_file_info(info, ending), "", "[DeviceInfo]")
     for key, text in (
         ("VendorName", info.vendor_name),
         ("ProductName", info.product_name),
         ("OrderCode", info.order_code),
     ):
         yield f"{key}={_name(text)}"
-    numbers = {row.sub: int.from_bytes(row.data, "little") for row in table if row.index == 0x1018}
+    numbers = _identity(table)
     for sub, key in IDENTITY:
         yield f"{key}=0x{numbers.get(sub, 0):08X}"
     for kbit in BIT_RATES_KBIT:
         yield f"BaudRate_{kbit}={int(1_000 * kbit in info.bit_rates)}"
     for key, area in (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00))):
         yield f"{key}={sum(index in area for index in table.objects)}"
-    yield from ("Granularity=1", "SimpleBootUpSlave=1", "LSS_Supported=1", "", "[DummyUsage]")
-    yield from (f"Dummy{kind:04d}=1" for kind in DUMMY_TYPES)
-    yield ""
+    yield from ("SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=1")
+    yield from ("DynamicChannelsSupported=0", "GroupMessaging=0", "LSS_Supported=1", "")
+    yield from ("[DummyUsage]", *(f"Dummy{kind:04d}=1" for kind in DUMMY_TYPES), "")
+    if comments := list(_comments(table)):
+        yield from ("[Comments]", f"Lines={len(comments)}")
+        yield from (f"Line{number}={text}" for number, text in enumerate(comments, 1))
+        yield ""
+
+
+def _identity(table: Table) -> dict[int, int]:
+    """Return the numbers of 1018h by sub-index."""
+    return {row.sub: int.from_bytes(row.data, "little") for row in table if row.index == 0x1018}
+
+
+def _file_info(info: DeviceInfo, ending: str) -> Iterator[str]:
+    name = _NO_WORD.sub("-", info.product_name.lower()).strip("-") or "device"
+    yield from (f"FileName={name}{ending}", "FileVersion=1", "FileRevision=1")
+    if ending == ".dcf":
+        yield f"LastEDS={name}.eds"
+    yield from ("EDSVersion=4.0", f"Description={_name(info.product_name)}")
+    for what in ("Creation", "Modification"):
+        yield from (f"{what}Time=12:00AM", f"{what}Date=01-01-1970")
+    yield from ("CreatedBy=tickrig", "ModifiedBy=tickrig")
+
+
+def _comments(table: Table) -> Iterator[str]:
+    """Give what CiA 306 has no keyword for; `EdsFile` reads it."""
+    for info, entries in _grouped(table):
+        for entry, title in zip(entries, _titles(info, entries), strict=True):
+            if entry.max_bytes != MAX_VARIABLE_BYTES:
+                yield f"MaxBytes of {title} is {entry.max_bytes}"
+            if _default(entry) is None:
+                yield f"DefaultBytes of {title} is {entry.default.hex().upper()}"
 
 
 def _objects(table: Table, *, present: bool) -> Iterator[str]:
@@ -92,20 +126,32 @@ def _objects(table: Table, *, present: bool) -> Iterator[str]:
         yield from (f"[{title}]", f"SupportedObjects={len(indices)}")
         yield from (f"{number}=0x{index:04X}" for number, index in enumerate(indices, 1))
         yield ""
+    for info, entries in _grouped(table):
+        yield from _object(info, entries, present=present)
+
+
+def _grouped(table: Table) -> Iterator[tuple[ObjectInfo, list[Described]]]:
     for index, entries in groupby(table, attrgetter("index")):
-        yield from _object(table.objects[index], list(entries), present=present)
+        yield table.objects[index], list(entries)
+
+
+def _titles(info: ObjectInfo, entries: list[Described]) -> list[str]:
+    """Return the names of the sections of an object's entries."""
+    head = f"{entries[0].index:04X}"
+    if len(entries) == 1 and entries[0].sub == 0 and info.code in VARIABLES:
+        return [head]
+    return [f"{head}sub{entry.sub:X}" for entry in entries]
 
 
 def _object(info: ObjectInfo, entries: list[Described], *, present: bool) -> Iterator[str]:
-    index, single = entries[0].index, len(entries) == 1 and entries[0].sub == 0
-    if single and info.code in VARIABLES:
-        yield from _variable(f"{index:04X}", info.code, entries[0], present=present)
+    head, titles = f"{entries[0].index:04X}", _titles(info, entries)
+    if titles == [head]:
+        yield from _variable(head, info.code, entries[0], present=present)
         return
     code = ObjectCode.RECORD if info.code in VARIABLES else info.code
-    yield from (f"[{index:04X}]", f"ParameterName={_name(info.name)}")
+    yield from (f"[{head}]", f"ParameterName={_name(info.name)}")
     yield from (f"ObjectType=0x{code:X}", f"SubNumber={len(entries)}", "")
-    for entry in entries:
-        title = f"{index:04X}sub{entry.sub:X}"
+    for entry, title in zip(entries, titles, strict=True):
         yield from _variable(title, ObjectCode.VAR, entry, present=present)
 
 
@@ -114,20 +160,14 @@ def _variable(title: str, code: ObjectCode, entry: Described, *, present: bool) 
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
     yield from (f"DataType=0x{kind:04X}", f"AccessType={_access_type(entry)}")
     yield f"PDOMapping={int(bool(entry.access & MAPPABLE))}"
-    default = format_value(kind, entry.default, relative=entry.relative)
-    exact = _reads_as(entry, default)
-    yield f"DefaultValue={default if exact else ''}"
-    if not exact:
-        yield f"DefaultBytes={entry.default.hex().upper()}"
+    yield f"DefaultValue={_default(entry) or ''}"
     if present:
         value = format_value(kind, entry.data)
         yield f"ParameterValue={value if _fits_a_line(value) else ''}"
     if entry.low is not None:
-        yield f"LowLimit={entry.low}"
+        yield f"LowLimit={format_limit(kind, entry.low)}"
     if entry.high is not None:
-        yield f"HighLimit={entry.high}"
-    if entry.max_bytes != MAX_VARIABLE_BYTES:
-        yield f"MaxBytes={entry.max_bytes}"
+        yield f"HighLimit={format_limit(kind, entry.high)}"
     yield ""
 
 
@@ -140,6 +180,12 @@ def _access_type(entry: Described) -> str:
         what = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
         raise ValueError(f"an EDS cannot express the access of {what}: {entry.access}")
     return name
+
+
+def _default(entry: Described) -> str | None:
+    """Return the text of a default, None if no text comes back exactly."""
+    text = format_value(entry.data_type, entry.default, relative=entry.relative)
+    return text if _reads_as(entry, text) else None
 
 
 def _reads_as(entry: Described, text: str) -> bool:

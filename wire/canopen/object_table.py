@@ -187,7 +187,7 @@ class ObjectTable:
             for sub in range(1, count + 1)
         )
 
-    def record(
+    def record(  # noqa: PLR0913 - a row of an object table
         self,
         index: int,
         name: str,
@@ -195,11 +195,15 @@ class ObjectTable:
         *,
         count_access: Access = RO,
         count: int | None = None,
+        code: ObjectCode = ObjectCode.RECORD,
     ) -> None:
-        """Add a record; sub-index 0 holds `count`, or else the highest sub-index."""
+        """Add a record; sub-index 0 holds `count`, or else the highest sub-index.
+
+        With `code` it is an array whose elements have names and defaults of their own.
+        """
         rows = list(elements)
         highest = max(row.sub for row in rows) if count is None else count
-        self._head(index, name, ObjectCode.RECORD, count_access, highest)
+        self._head(index, name, code, count_access, highest)
         self._rows += (
             ObjectRow(*(index, sub, what, kind, access, _encoded(kind, default)), relative=relative)
             for sub, what, kind, access, default, relative in rows

@@ -31,6 +31,7 @@ from tickrig.wire.canopen.communication_profile import (
     add_communication,
 )
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.object_table import ObjectCode
 
 NODE_ID: Final = 1
 """beego: 1 is the left wheel, 2 the right one."""
@@ -152,7 +153,7 @@ def _add_position(objects: Objects) -> None:
     objects.variable(0x607A, "Target position", I32, RWW)
     limits = (("Minimal position limit", I32_MIN), ("Maximal position limit", I32_MAX))
     rows = [Element(sub, name, I32, RW, value) for sub, (name, value) in enumerate(limits, 1)]
-    objects.record(0x607D, "Software position limit", rows)
+    objects.record(0x607D, "Software position limit", rows, code=ObjectCode.ARRAY)
     objects.variable(0x607E, "Polarity", U8, RW)
     objects.variable(0x60F4, "Following error actual value", I32, ROT)
     objects.variable(0x60FC, "Position demand internal value", I32, ROT)
@@ -200,7 +201,7 @@ def _add_homing(objects: Objects) -> None:
     objects.variable(0x6098, "Homing method", I8, RW, 7)
     speeds = (("Speed for switch search", 100), ("Speed for zero search", 10))
     rows = [Element(sub, name, U32, RW, value) for sub, (name, value) in enumerate(speeds, 1)]
-    objects.record(0x6099, "Homing speeds", rows)
+    objects.record(0x6099, "Homing speeds", rows, code=ObjectCode.ARRAY)
     objects.variable(0x609A, "Homing acceleration", U32, RW, 1_000)
 
 
@@ -210,7 +211,7 @@ def _add_cyclic(objects: Objects) -> None:
     objects.variable(0x60B2, "Torque offset", I16, RWW)
     objects.variable(0x60C0, "Interpolation sub mode select", I16, RW)
     rows = [Element(1, "Interpolation data record 1", I32, RWW)]
-    objects.record(0x60C1, "Interpolation data record", rows)
+    objects.record(0x60C1, "Interpolation data record", rows, code=ObjectCode.ARRAY)
     rows = [
         Element(1, "Interpolation time period value", U8, RW, 10),
         Element(2, "Interpolation time index", I8, RW, -3),

@@ -9,7 +9,7 @@ from typing import Final
 
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Converter, Ds401
-from tickrig.device.canopen.objects import RO, ROT, RW, RWW, Objects
+from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Objects
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.communication_profile import (
     CommunicationProfile,
@@ -21,11 +21,14 @@ from tickrig.wire.canopen.datatypes import DataType
 NODE_ID: Final = 16
 ANALOGUE_INPUTS: Final = 8
 
-ADC: Final = Converter("v", "V", low=0.0, high=5.0, high_raw=4095, shift=3)
+FULL_SCALE_MV: Final = 5_000
+
+ADC: Final = Converter("v", "V", low=0.0, high=FULL_SCALE_MV / 1_000, high_raw=4095, shift=3)
 """12 bit, left-justified in INTEGER16: 0..32760."""
 
 BOOL: Final = DataType.BOOLEAN
 U8: Final = DataType.UNSIGNED8
+U16: Final = DataType.UNSIGNED16
 U32: Final = DataType.UNSIGNED32
 I16: Final = DataType.INTEGER16
 I32: Final = DataType.INTEGER32
@@ -76,6 +79,7 @@ def _add_digital(objects: Objects) -> None:
 
 def _add_analogue(objects: Objects) -> None:
     count = ANALOGUE_INPUTS
+    objects.variable(0x2000, "Full scale of analogue inputs, mV", U16, CONST, FULL_SCALE_MV)
     objects.array(0x6401, "Read analogue input 16-bit", count, I16, ROT)
     objects.array(0x6421, "Analogue input interrupt trigger selection", count, U8, RW, 7)
     objects.array(0x6422, "Analogue input interrupt source", 1, U32, RO)

@@ -8,7 +8,7 @@ import canopen
 import pytest
 from canopen.objectdictionary import ODVariable, import_od
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.entry import Access, Entry
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
@@ -114,3 +114,9 @@ def test_no_output_of_a_model_hides_one_that_every_node_has(model: Model) -> Non
     assert not {item.name for item in NODE_OUTPUTS} & node.application.outputs.keys()
     for name in node.outputs:
         node.read(name)
+
+
+def test_what_cia_calls_an_array_is_one() -> None:
+    objects = MODELS["epos"].dictionary().objects
+    arrays = {0x1003, 0x1010, 0x1011, 0x1016, 0x1029, 0x607D, 0x6099, 0x60C1}
+    assert {index for index, info in objects.items() if info.code is ObjectCode.ARRAY} == arrays

@@ -119,8 +119,7 @@ def test_a_character_port_survives_its_eds(tmp_path: Path, mine: Path) -> None:
 def test_an_eds_that_derives_a0h_keeps_its_own_type(tmp_path: Path, mine: Path) -> None:
     file = tmp_path / "mine.eds"
     run("--rtc", f"{mine}:Mine", "--write-eds", file)
-    text = file.read_text("utf-8").replace("DefaultBytes=00", "DefaultValue=5")
-    text = text.replace("DefaultValue=\nDefaultValue=5", "DefaultValue=5")
+    text = file.read_text("utf-8").replace("DefaultBytes of 2100 is 00", "")
     derived = "\n[A0]\nSubNumber=2\n[A0sub1]\nParameterName=Type\nDefaultValue=0x5\n"
     file.write_text(text + derived)
     assert read_eds(file).template[0x2100, 0].data_type.name == "UNSIGNED8"
