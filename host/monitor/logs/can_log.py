@@ -19,12 +19,16 @@ import can
 from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.blf_end import missing_end
 from tickrig.host.monitor.logs.can_heard import to_heard
 from tickrig.host.monitor.logs.csv_line import UNNAMED
 from tickrig.host.monitor.logs.log_format import LogFormat
 from tickrig.host.monitor.logs.log_reader import LogError, open_log
 from tickrig.host.monitor.logs.tally import OTHER_OBJECTS, BadLines, Tally
 from tickrig.host.monitor.logs.watched_lines import WatchedLines
+
+BUS_ERROR: Final = 0x80
+"""The class of what ASC calls ErrorFrame (linux/can/error.h, CAN_ERR_BUSERROR)."""
 
 BROKEN: Final = (
     *(ValueError, LookupError, TypeError, ArithmeticError, EOFError, NotImplementedError),
@@ -59,6 +63,8 @@ class CanLogReader:
         for message in self._messages():
             if message.channel not in names:
                 names[message.channel] = self._name(message.channel)
+            if message.is_error_frame and self._kind is LogFormat.ASC:
+                message.arbitration_id = BUS_ERROR
             heard = to_heard(message, names[message.channel], self.tally)
             if heard is not None:
                 yield heard
@@ -78,6 +84,8 @@ class CanLogReader:
                     yield from self._blf(can.BLFReader(file))
                 else:
                     yield from can.MF4Reader(file)
+            except LogError:
+                raise
             except BROKEN as error:
                 reason = self._why(error)
                 raise LogError(f"{self._path} is no {self._kind} log: {reason}") from error
@@ -104,6 +112,11 @@ class CanLogReader:
         count = 0
         for count, message in enumerate(reader, 1):  # noqa: B007 - counted
             yield message
+        if reader.object_count == count:
+            return
+        with open_log(self._path) as file:
+            if reason := missing_end(file):
+                raise LogError(f"{self._path}: {reason}")
         if reader.object_count > count:
             self.tally.passed_over[OTHER_OBJECTS] += reader.object_count - count
 

@@ -248,6 +248,38 @@ def test_objects_of_blf_that_are_no_frames_are_counted(tmp_path: Path) -> None:
     assert reader.tally.words("run.blf") == ["run.blf: 1 objects that are no frames passed over"]
 
 
+def blf(path: Path, frames: int) -> bytes:
+    with can.BLFWriter(path, max_container_size=500) as writer:
+        writer.log_event("a marker", 1_436_509_052.0)
+        for n in range(frames):
+            writer.on_message_received(can.Message(timestamp=1_436_509_053 + n, data=[n]))
+    return path.read_bytes()
+
+
+def test_a_blf_log_that_was_cut_anywhere_says_so(tmp_path: Path) -> None:
+    whole = blf(tmp_path / "run.blf", 60)
+    assert len(list(read_log(tmp_path / "run.blf"))) == 60
+    for length in range(145, len(whole), 3):
+        (tmp_path / "cut.blf").write_bytes(whole[:length])
+        with pytest.raises(LogError, match=r"cut\.blf"):
+            list(read_log(tmp_path / "cut.blf"))
+
+
+def test_a_blf_log_that_was_never_ended_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    whole = bytearray(blf(tmp_path / "run.blf", 60))
+    whole[32:36] = bytes(4)  # its header is written with the end
+    (tmp_path / "run.blf").write_bytes(whole)
+    assert len(list(read_log(tmp_path / "run.blf"))) == 60
+    (tmp_path / "run.blf").write_bytes(whole[:-30])
+    with pytest.raises(LogError, match=r"it is cut after [0-9]+ objects"):
+        list(read_log(tmp_path / "run.blf"))
+
+
+def test_error_frames_of_asc_are_bus_errors(tmp_path: Path) -> None:
+    reader = read_log(log(tmp_path, "run.asc", ASC + "   0.000700 1  ErrorFrame\n"))
+    assert str(list(reader)[-1].frame) == "20000080#0000000000000000"
+
+
 @pytest.mark.parametrize("content", [b"", b"LOGG", b"x" * 400, b"LOGG" + bytes(300)])
 def test_what_is_no_blf_says_so(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "run.blf"

@@ -1,0 +1,73 @@
+"""Whether a BLF log is whole: python-can reads one that was cut as far as it goes, in silence.
+
+A BLF log is a header and objects. Most are containers, whose contents, put together,
+are the objects of interest; one may lie across two containers.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import BinaryIO, Final
+
+_FILE: Final = struct.Struct("<4sL24xL")  # signature, size of the header, count of objects
+_OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
+_CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in it
+_SIGNATURE: Final = b"LOBJ"
+_CONTAINER_TYPE: Final = 10
+_DEFLATED: Final = 2
+
+
+def missing_end(file: BinaryIO) -> str:
+    """Say what is missing at the end of a log; empty where nothing is.
+
+    Args:
+        file: a log that python-can has read without an error; it is read from its beginning.
+    """
+    file.seek(0)
+    _, header_bytes, told = _FILE.unpack(file.read(_FILE.size))
+    file.seek(header_bytes)
+    found, held = 0, b""
+    for content in _contents(file):
+        if content is None:
+            return f"it is cut after {found} objects"
+        objects, held = _count(held + content)
+        found += objects + 1
+    if len(held) >= _OBJECT.size:
+        return f"it is cut after {found} objects"
+    return f"it ends after {found} of {told} objects" if found < told else ""
+
+
+def _contents(file: BinaryIO) -> Iterator[bytes | None]:
+    """Yield what is in each object of the file: of others than containers nothing, None if cut."""
+    while head := file.read(_OBJECT.size):
+        if len(head) < _OBJECT.size:
+            yield None
+            return
+        _, _, _, size, kind = _OBJECT.unpack(head)
+        body = file.read(max(0, size - _OBJECT.size))
+        file.read(size % 4)
+        if len(body) < size - _OBJECT.size:
+            yield None
+            return
+        yield _content(body) if kind == _CONTAINER_TYPE else b""
+
+
+def _content(body: bytes) -> bytes | None:
+    method, size = _CONTAINER.unpack_from(body)
+    if method != _DEFLATED:
+        return body[_CONTAINER.size :]
+    content = zlib.decompressobj().decompress(body[_CONTAINER.size :])
+    return content if len(content) >= size else None
+
+
+def _count(data: bytes) -> tuple[int, bytes]:
+    """Return how many objects are whole, and the bytes behind them."""
+    count = at = 0
+    while (begin := data.find(_SIGNATURE, at, at + 8)) >= 0 and len(data) - begin >= _OBJECT.size:
+        size = _OBJECT.unpack_from(data, begin)[3]
+        if size < _OBJECT.size or begin + size > len(data):
+            break
+        count, at = count + 1, begin + size
+    return count, data[at:]
