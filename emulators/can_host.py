@@ -9,6 +9,7 @@ from tickrig.device.core import NEVER
 from tickrig.emulators.can_end import CanEnd
 from tickrig.emulators.rig import Rig
 from tickrig.host.errors import LinkClosed, LinkTimeout
+from tickrig.host.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 
 CHUNK_US: Final = 1_000_000
@@ -40,7 +41,7 @@ class Repeat:
 
 
 class CanHost:
-    """A `Link[Frames]` into a rig: waiting makes virtual time pass.
+    """A `StampedLink` into a rig: waiting makes virtual time pass.
 
     Args:
         rig: the rig that is stepped meanwhile.
@@ -74,10 +75,14 @@ class CanHost:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Let time pass until a frame has arrived; return all that are there then."""
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        """Let time pass until a frame has arrived; return the time, and all that are there."""
         first = self.take(timeout_us)
-        rest = [frame for _, frame in self._inbox]
+        heard = () if first is None else (first, *self._inbox)
         self._inbox.clear()
-        return () if first is None else (first[1], *rest)
+        return self.now_us, heard
 
     def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
         """Let time pass until a frame has arrived; return it with its time, None if none came.

@@ -12,6 +12,8 @@ import can
 from tickrig.host.can_message import to_frame, to_message
 from tickrig.host.errors import LinkClosed
 from tickrig.host.multicast_group import keep_to_group
+from tickrig.host.stamp_clock import StampClock
+from tickrig.host.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.can_error_class import CONTROLLER_BYTE, ControllerFlag, ErrorClass
@@ -21,7 +23,7 @@ PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
 class CanLink:
-    """A `Link[Frames]` over python-can.
+    """A `StampedLink` over python-can.
 
     CAN FD frames that arrive are passed over, and error frames but for what
     they say of the error state.
@@ -39,6 +41,7 @@ class CanLink:
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
         self._bus, self._name, self._drops, self.lost = bus, name, drops, 0
         self.on_error_state: Callable[[ErrorState], None] | None = None
+        self._stamps, self._looked_us = StampClock(), self.now_us
 
     @classmethod
     def open(cls, channel: str, interface: str, bit_rate: int | None = None) -> CanLink:
@@ -75,32 +78,44 @@ class CanLink:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Wait for a first frame, then return all that are there."""
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        """Wait for a first frame; return a time, and all that had arrived by then.
+
+        The time is of before the last look: a process that is stopped behind it knows
+        itself late, and takes nobody for silent.
+        """
         deadline_us = self.now_us + timeout_us
-        frames: list[CanFrame] = []
-        try:
-            while not frames:
-                wait_us = max(0, deadline_us - self.now_us)
-                message = self._bus.recv(wait_us / 1e6)
-                if message is None and not wait_us:
-                    break
-                while message is not None:
-                    frames += self._take(message)
-                    message = self._bus.recv(0)
-        except (can.CanError, OSError) as error:
-            raise LinkClosed(f"cannot read from {self._name}: {error}") from error
-        return tuple(frames)
+        heard: list[tuple[int, CanFrame]] = []
+        while True:
+            now_us = self.now_us
+            wait_us = 0 if heard else max(0, deadline_us - now_us)
+            message = self._read(wait_us)
+            if message is not None:
+                heard += self._take(message)
+            elif not wait_us:
+                self._looked_us = now_us
+                return now_us, tuple(heard)
 
     def close(self) -> None:
         """Close the bus."""
         self._bus.shutdown()
 
-    def _take(self, message: can.Message) -> Frames:
+    def _read(self, wait_us: int) -> can.Message | None:
+        try:
+            return self._bus.recv(wait_us / 1e6)
+        except (can.CanError, OSError) as error:
+            raise LinkClosed(f"cannot read from {self._name}: {error}") from error
+
+    def _take(self, message: can.Message) -> Stamped:
         if message.is_error_frame:
             state = _error_state(message)
             if state is not None and self.on_error_state is not None:
                 self.on_error_state(state)
-        frame = to_frame(message)
-        return () if frame is None else (frame,)
+        if (frame := to_frame(message)) is None:
+            return ()
+        return ((self._stamps.at_us(message.timestamp, self._looked_us, self.now_us), frame),)
 
 
 def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from tickrig.host.link import Link
+from tickrig.host.stamped_link import Stamped, StampedLink
 from tickrig.wire.can import CanFrame, Frames
 
 ECHO_US: Final = 1_000_000
@@ -13,7 +13,7 @@ ECHO_US: Final = 1_000_000
 
 
 class EchoFreeLink:
-    """A `Link[Frames]` on the udp_multicast bus of python-can, which hears its own frames.
+    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
 
     A frame of somebody else that is the same as one whose echo is awaited is taken
     for the echo, and the echo for it.
@@ -22,7 +22,7 @@ class EchoFreeLink:
         link: the link behind it.
     """
 
-    def __init__(self, link: Link[Frames]) -> None:
+    def __init__(self, link: StampedLink) -> None:
         self._link = link
         self._awaited: deque[tuple[int, CanFrame]] = deque()
 
@@ -38,10 +38,14 @@ class EchoFreeLink:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Return what others sent; nothing, maybe before its time, if it was all echo."""
-        frames = self._link.receive(timeout_us)
-        while self._awaited and self._awaited[0][0] < self.now_us - ECHO_US:
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        """Return a time, and what others sent by then."""
+        now_us, heard = self._link.hear(timeout_us)
+        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
             self._awaited.popleft()
-        return tuple(frame for frame in frames if not self._is_echo(frame))
+        return now_us, tuple((at_us, frame) for at_us, frame in heard if not self._is_echo(frame))
 
     def close(self) -> None:
         """Close the link behind it."""

@@ -90,6 +90,11 @@ class Dialogue:
         if self.job is None:
             self._next()
 
+    def defer(self, span_us: int) -> None:
+        """Let what is under way last so much longer: nobody listened for so long."""
+        if self.due_us < NEVER:
+            self.due_us += span_us
+
     def clear(self) -> None:
         """Forget all jobs."""
         dropped = [self.job, *self._jobs] if self.job is not None else []

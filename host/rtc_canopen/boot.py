@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Final
 
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
@@ -16,6 +17,7 @@ from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 
 DEVICE_TYPE: Final = 0x1000
 HEARTBEAT: Final = 0x1017
+SERIAL_NUMBER: Final = (0x1018, 4)
 
 COB_ID: Final = 1
 TYPE: Final = 2
@@ -93,6 +95,9 @@ def _check_identity(file: DeviceFile) -> Script[None]:
         found = yield from upload_number(index, sub)
         if found != wanted:
             raise WrongIdentity(f"{index:04X}h:{sub:02X} is {found:08X}h, not {wanted:08X}h")
+    if SERIAL_NUMBER in file.data_types:  # two nodes of one node-ID give two answers
+        with suppress(SdoAborted):
+            yield from upload_number(*SERIAL_NUMBER)
 
 
 def _read_pdo(index: int, file: DeviceFile) -> Script[PdoLayout | None]:

@@ -106,6 +106,7 @@ class NodeEntry:
         heartbeat_ms: its producer heartbeat time.
         ports: names of ports by PDO, such as `tpdo2`.
         pdos: what is written into PDOs, by the same names.
+        restart: how often one after the other it is restarted when it was lost.
     """
 
     id: int
@@ -115,6 +116,7 @@ class NodeEntry:
     heartbeat_ms: int = 100
     ports: Mapping[str, str] = field(default_factory=dict)
     pdos: Mapping[str, PdoEntry] = field(default_factory=dict)
+    restart: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,6 +129,7 @@ def _node(node: yaml.Node, place: str) -> NodeEntry:
         "eds": text,
         "role": one_of(*Role),
         "heartbeat_ms": whole(1, 0xFFFF),
+        "restart": _U16,
         "ports": _ports,
         "pdos": mapping(pdo, _pdo),
     }

@@ -13,6 +13,7 @@ from tickrig.host.rtc_canopen.definition import NodeEntry, Role
 from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES
 from tickrig.host.rtc_canopen.proxy import Asked, ProxyRtc
+from tickrig.host.rtc_canopen.restart import Restart
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 STATES: Final = {
@@ -36,6 +37,7 @@ class Operations:
         nmt_state: what the device reported last, None before.
         now_us: the present.
         resetting: between a reset that the RT side asked for and its result.
+        restart: how often it is brought back by itself.
     """
 
     def __init__(self, entry: NodeEntry, dialogue: Dialogue, note: Note) -> None:
@@ -45,6 +47,12 @@ class Operations:
         self.nmt_state: NmtState | None = None
         self.now_us = 0
         self.resetting = self._stopping = False
+        self.restart = Restart(entry.restart)
+
+    @property
+    def is_inactive(self) -> bool:
+        """Whether there is a proxy, Inactive."""
+        return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
         """Say on the bus what was asked for, unless the device is there already."""
@@ -64,6 +72,7 @@ class Operations:
                 self._stop()
             case Asked.RESET if not self.resetting:
                 self.resetting = True
+                self.restart.leave()
                 self._run("reset", self._life.reset(self._entry))
 
     def follow(self, state: NmtState, *, changed: bool) -> None:
@@ -96,10 +105,31 @@ class Operations:
             self._leave_error(self.proxy)
 
     def abort(self) -> None:
-        """Let the proxy go to Error."""
+        """Let the proxy go to Error, from which the restarts of its node may bring it back."""
         self.resetting = False
         if self.proxy is not None:
+            self.lose()
             self.proxy.contexts[0].abort_component(self.proxy)
+
+    def lose(self) -> None:
+        """Note that the device is not what it was, without anybody's will."""
+        active = self.proxy is not None and self.proxy.state is LifeCycleState.ACTIVE
+        self.restart.lose(self.now_us, active=active)
+
+    def go_on(self) -> None:
+        """Reset a node that was lost and is heard again, if a restart is left."""
+        proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
+        if proxy is None or busy or proxy.asked is not Asked.NOTHING:
+            return
+        if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
+            proxy.contexts[0].reset_component(proxy)
+
+    def begin_restart(self) -> bool:
+        """Take a restart, and tell; False if none is left."""
+        which = self.restart.take(self.now_us)
+        kind = EventKind.RESTARTED if which else EventKind.NOT_RESTARTED
+        self._note(kind, self._entry.id, which or "no restart is left")
+        return bool(which)
 
     def fail(self, failure: Failure) -> None:
         """Note what failed, and let the proxy go to Error."""

@@ -39,25 +39,25 @@ class Receiver:
         self._objects = OwnObjects(definition)
         self._foreign_us: int | None = None
 
-    def receive(self, now_us: int, frame: CanFrame) -> None:
-        """Take a data frame."""
+    def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
+        """Take a data frame that was on the bus at a time."""
         can_id, node = frame.can_id, self._nodes.get(frame.can_id & 0x7F)
         if can_id == NMT_COB_ID:
-            self._hear_command(now_us, frame.data)
+            self._hear_command(at_us, frame.data)
         elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
-            self._hear_master(now_us)
+            self._hear_master(at_us)
         elif can_id == REQUEST_COB_ID + self._master_id:
             self._hear_question(frame.data)
         elif node is None:
             return
         elif can_id in ERROR_CONTROL:
-            node.hear_error_control(now_us, frame.data)
+            node.hear_error_control(now_us, at_us, frame.data)
         elif can_id in SDO_RESPONSES:
             node.hear_sdo(now_us, frame.data)
         elif can_id in EMERGENCY:
             self._hear_emergency(node, frame.data)
 
-    def _hear_command(self, now_us: int, data: bytes) -> None:
+    def _hear_command(self, at_us: int, data: bytes) -> None:
         if len(data) != 2:
             return
         command, node_id = data
@@ -66,13 +66,13 @@ class Receiver:
         self._note(EventKind.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
         for node in self._nodes.values():
             if node_id in (ALL_NODES, node.entry.id):
-                node.hear_foreign(now_us, command)
+                node.hear_foreign(at_us, command)
 
-    def _hear_master(self, now_us: int) -> None:
-        if self._foreign_us is None or now_us - self._foreign_us >= QUIET_US:
+    def _hear_master(self, at_us: int) -> None:
+        if self._foreign_us is None or at_us - self._foreign_us >= QUIET_US:
             text = "another node has the node-ID of the server"
             self._note(EventKind.FOREIGN_MASTER, self._master_id, text)
-        self._foreign_us = now_us
+        self._foreign_us = at_us
 
     def _hear_question(self, data: bytes) -> None:
         if (answer := self._objects.answer(data)) is not None:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tickrig.host.link import NEVER, Link
+from tickrig.host.link import NEVER
 from tickrig.host.rtc_canopen.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition_file import read_definition
 from tickrig.host.rtc_canopen.device_file import DeviceFile, read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.host.rtc_canopen.server import Server
-from tickrig.wire.can import Frames
+from tickrig.host.stamped_link import StampedLink
 
 
 def serve(
     server: Server,
-    link: Link[Frames],
+    link: StampedLink,
     until_us: int = NEVER,
     done: Callable[[], bool] = lambda: False,
 ) -> None:
@@ -26,8 +26,8 @@ def serve(
         LinkClosed: the bus is gone.
     """
     while link.now_us < until_us and not done():
-        received = link.receive(max(0, min(server.due_us, until_us) - link.now_us))
-        if sent := server.tick(link.now_us, received):
+        now_us, heard = link.hear(max(0, min(server.due_us, until_us) - link.now_us))
+        if sent := server.tick(now_us, heard):
             link.send(sent)
 
 

@@ -16,7 +16,7 @@ from tickrig.host.rtc_canopen.operations import Operations, kind_of
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.twin_watch import TwinWatch
-from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
 
 FOREIGN_RESET_US: Final = 1_000_000
 """A boot-up so soon after another master's reset is its doing."""
@@ -37,6 +37,9 @@ class Phase(Enum):
 
 WATCHED: Final = (Phase.READY, Phase.DUPLICATE)
 """Phases in which heartbeats are awaited."""
+
+LIVING: Final = (Phase.LISTENING, Phase.BOOTING, Phase.READY)
+"""Phases in which a twin is looked for."""
 
 
 class House(Protocol):
@@ -90,14 +93,15 @@ class ServedNode:
     ) -> None:
         self.entry, self._file, self._writes, self._house = entry, file, writes, house
         self._remove_us, self._consumer_us = remove_us, 3_000 * entry.heartbeat_ms
-        self.dialogue = Dialogue(entry.id, house.send)
+        self.dialogue = Dialogue(entry.id, self._send)
         self.operations = Operations(entry, self.dialogue, house.note)
         self.phase, self.problem = Phase.ABSENT, ""
         self.layouts: tuple[PdoLayout, ...] = ()
         self._twins = TwinWatch(1_000 * entry.heartbeat_ms)
         self.heard_us, self.due_us = 0, NEVER
+        self._looked_us = self._blind_us = 0
         self._foreign_reset_us: int | None = None
-        self.lost = self.to_start = False
+        self.lost = self.to_start = self._suspected = False
 
     @property
     def proxy(self) -> ProxyRtc | None:
@@ -113,6 +117,7 @@ class ServedNode:
         """Look for it on the bus."""
         self.operations.now_us = now_us
         self.phase, self.lost = Phase.ABSENT, False
+        self._twins.forget()
         job = Job("probe", probe(), lambda _: self._found(), self._not_booted)
         self.dialogue.start(now_us, job)
         self._plan()
@@ -127,8 +132,15 @@ class ServedNode:
         """Leave it as it is until it boots again."""
         self.phase, self.problem = Phase.REFUSED, problem
 
-    def hear_error_control(self, now_us: int, data: bytes) -> None:
-        """Take a boot-up or heartbeat; anything else is passed over."""
+    def unseen(self, now_us: int, span_us: int) -> None:
+        """Take note that nobody looked for so long: it may have spoken all the same."""
+        self._looked_us, self._blind_us = now_us, self._blind_us + span_us
+        self.dialogue.defer(span_us)
+        self._twins.forget()
+        self._plan()
+
+    def hear_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
+        """Take a boot-up or heartbeat of a time on the bus; anything else is passed over."""
         try:
             (number,) = data
             state = NmtState(number)
@@ -136,7 +148,8 @@ class ServedNode:
             return
         operations = self.operations
         changed = state is not operations.nmt_state
-        operations.now_us, operations.nmt_state, self.heard_us = now_us, state, now_us
+        operations.now_us, operations.nmt_state, self.heard_us = now_us, state, at_us
+        self._blind_us = 0
         self.dialogue.hear_state(now_us, state)
         self._take(state, changed=changed)
         self._plan()
@@ -144,13 +157,16 @@ class ServedNode:
     def hear_sdo(self, now_us: int, data: bytes) -> None:
         """Take an SDO response."""
         self.operations.now_us = now_us
+        self._twins.answer(data)
         self.dialogue.hear_sdo(now_us, data)
+        self._judge()
         self._plan()
 
-    def hear_foreign(self, now_us: int, command: int) -> None:
+    def hear_foreign(self, at_us: int, command: int) -> None:
         """Take an NMT command of another master."""
+        self._twins.command(command)
         if command in RESETS:
-            self._foreign_reset_us = now_us
+            self._foreign_reset_us = at_us
 
     def run(self, now_us: int, job: Job) -> None:
         """Run a job of somebody else."""
@@ -171,7 +187,12 @@ class ServedNode:
     def carry_out(self, now_us: int) -> None:
         """Say on the bus what the RT side asked for."""
         self.operations.now_us = now_us
-        self.operations.carry_out(lost=self.lost)
+        operations, restart = self.operations, self.operations.restart
+        operations.carry_out(lost=self.lost)
+        if self.phase is Phase.READY and not self.lost:
+            operations.go_on()
+        if restart.to_activate and operations.is_inactive:
+            restart.to_activate, self.to_start = False, True
         self._plan()
 
     @property
@@ -179,7 +200,13 @@ class ServedNode:
         """When its heartbeat is late, or its proxy is to be removed."""
         if self.phase not in WATCHED:
             return NEVER
-        return self.heard_us + self._consumer_us + (self._remove_us if self.lost else 0)
+        since_us = max(self.heard_us, self._looked_us)
+        return since_us + self._consumer_us + (self._remove_us if self.lost else 0)
+
+    def _send(self, can_id: int, data: bytes) -> None:
+        if can_id == NMT_COB_ID:
+            self._twins.command(data[0])
+        self._house.send(can_id, data)
 
     def _plan(self) -> None:
         due_us = min(self.dialogue.due_us, self._deadline_us)
@@ -191,11 +218,11 @@ class ServedNode:
 
     def _take(self, state: NmtState, *, changed: bool) -> None:
         """See to a state that was reported just now."""
-        twin = self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
+        self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
         if state is NmtState.INITIALISING:
             self._booted_up()
-        elif twin and self.phase in (Phase.READY, Phase.LISTENING):
-            self._refuse_twin()
+        elif self._judge():
+            pass
         elif self.phase is Phase.ABSENT:
             self._found()
         elif self.phase is Phase.READY:
@@ -204,12 +231,13 @@ class ServedNode:
 
     def _booted_up(self) -> None:
         self._house.note(EventKind.BOOT_UP, self.entry.id)
-        now_us, told_us = self.operations.now_us, self._foreign_reset_us
-        foreign = told_us is not None and now_us - told_us < FOREIGN_RESET_US
+        told_us = self._foreign_reset_us
+        foreign = told_us is not None and self.heard_us - told_us < FOREIGN_RESET_US
         expected = self.lost or self.operations.resetting or foreign
         if self.phase is Phase.READY and not expected:
             self.phase = Phase.LISTENING
             self.dialogue.clear()
+            self.operations.lose()
         else:
             self._boot()
 
@@ -226,6 +254,7 @@ class ServedNode:
             self._house.gone(self)
         self.phase, self.problem, self.lost = Phase.BOOTING, "", False
         self.operations.begin()
+        self._twins.forget()
         self.dialogue.clear()
         if first is not None:
             self.operations.say(first)
@@ -235,9 +264,11 @@ class ServedNode:
 
     def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:
         self.phase, self.layouts, self.heard_us = Phase.READY, layouts, self.operations.now_us
-        self._twins.forget(self.heard_us)
+        self._twins.forget()
         self.operations.booted()
         self._house.booted(self)
+        if self.operations.restart.pending:
+            self.operations.begin_restart()
 
     def _not_booted(self, failure: Failure) -> None:
         self.operations.resetting, self.problem = False, str(failure)
@@ -248,12 +279,24 @@ class ServedNode:
         else:
             self.phase = Phase.REFUSED
 
-    def _refuse_twin(self) -> None:
-        self.phase, self.problem = Phase.DUPLICATE, "two nodes have this node-ID"
-        self._house.note(EventKind.DUPLICATE_NODE, self.entry.id, "both are stopped")
+    def _judge(self) -> bool:
+        """See whether it has a twin: then both are stopped; a suspicion is told once."""
+        twins = self._twins
+        if twins.sign and self.phase in LIVING:
+            self._refuse_twin(twins.sign)
+            return True
+        if twins.suspicion and not self._suspected and self.phase in LIVING:
+            self._suspected = True
+            self._house.note(EventKind.DUPLICATE_SUSPECTED, self.entry.id, twins.suspicion)
+        return False
+
+    def _refuse_twin(self, sign: str) -> None:
+        self.phase, self.problem = Phase.DUPLICATE, f"two nodes have this node-ID: {sign}"
+        self._house.note(EventKind.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}")
         self.dialogue.clear()
         self.operations.say(NmtCommand.STOP)
         self.operations.abort()
+        self.operations.restart.forget()
 
     def _lose(self, now_us: int) -> None:
         if self.lost:
@@ -262,7 +305,9 @@ class ServedNode:
             self.look(now_us)
             return
         self.lost = True
-        text = f"{self._consumer_us // 1_000} ms"
+        text = f"silent for {(now_us - self.heard_us) // 1_000} ms"
+        if self._blind_us:
+            text += f"; for {self._blind_us // 1_000} ms of them the server did not look"
         self._house.note(EventKind.HEARTBEAT_LOST, self.entry.id, text)
         self.dialogue.clear()
         self.operations.abort()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 from tickrig.host.link import NEVER
 from tickrig.host.rtc.errors import RtcRefused
@@ -18,9 +19,10 @@ from tickrig.host.rtc_canopen.events import EventKind, EventLog
 from tickrig.host.rtc_canopen.links import Links
 from tickrig.host.rtc_canopen.own_objects import SYNC_COB_ID
 from tickrig.host.rtc_canopen.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.receiver import Receiver
+from tickrig.host.rtc_canopen.receiver import QUIET_US, Receiver
 from tickrig.host.rtc_canopen.served_node import ServedNode
 from tickrig.host.rtc_canopen.start_order import StartOrder
+from tickrig.host.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import (
@@ -30,6 +32,9 @@ from tickrig.wire.canopen.nmt import (
     NmtState,
 )
 from tickrig.wire.rtc_types.idl import Struct
+
+LATE_US: Final = 100_000
+"""A server that looks so much later than it wanted to knows nothing of the nodes meanwhile."""
 
 
 class Server:
@@ -67,7 +72,7 @@ class Server:
         self.findings = tuple(odd for file in files.values() for odd in file.findings)
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
-        self._started = False
+        self._started, self._quiet_us, self._late_us = False, 0, 0
         self._heartbeat = Beat(1_000 * definition.master.heartbeat_ms)
         self._sync = Beat(1_000 * definition.master.sync_ms)
         self._bus_states: list[ErrorState] = []
@@ -80,15 +85,17 @@ class Server:
         self._start_order = StartOrder(self.nodes, definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
-    def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Take what was heard; do what is due; return what is to be sent."""
-        self.now_us = now_us
+    def tick(self, now_us: int, rx: Stamped, /) -> Frames:
+        """Take all that was on the bus by now; do what is due; return what is to be sent."""
+        late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
             self._start()
+        elif late_us >= LATE_US:
+            self._be_late(late_us)
         self._hear_bus()
-        for frame in rx:
-            if not (frame.remote or frame.extended or self._data.receive(now_us, frame)):
-                self._receiver.receive(now_us, frame)
+        for at_us, frame in rx:
+            if not (frame.remote or frame.extended or self._data.receive(at_us, frame)):
+                self._receiver.receive(now_us, at_us, frame)
         if self._nodes_due_us <= now_us:
             self._tick_nodes()
         begins = self._context.due_us <= now_us
@@ -189,6 +196,15 @@ class Server:
         self._sync.start(self.now_us)
         for node in self.nodes.values():
             node.look(self.now_us)
+
+    def _be_late(self, late_us: int) -> None:
+        """Say so, at most once a second, and take no node for silent in that time."""
+        self._late_us = max(self._late_us, late_us)
+        for node in self.nodes.values():
+            node.unseen(self.now_us, late_us)
+        if self.now_us >= self._quiet_us:
+            self.note(EventKind.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
+            self._quiet_us, self._late_us = self.now_us + QUIET_US, 0
 
     def _make_proxy(self, node: ServedNode) -> None:
         if node.proxy is not None:

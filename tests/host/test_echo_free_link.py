@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.emulators.can_bench import frames
 from tickrig.host.echo_free_link import EchoFreeLink
+from tickrig.host.stamped_link import Stamped
 from tickrig.wire.can import Frames
 
 
@@ -19,8 +20,11 @@ class EchoingLink:
         self.frames += traffic
 
     def receive(self, timeout_us: int, /) -> Frames:
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
         received, self.frames = self.frames, ()
-        return received
+        return self.now_us, tuple((self.now_us, frame) for frame in received)
 
     def close(self) -> None:
         self.closed = True

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import can
 import pytest
 
 from tests.interop.buses import Bus
@@ -47,6 +48,7 @@ class Server:
             text=True,
         )
         self._lines: queue.Queue[str] = queue.Queue()
+        self.seen = list[str]()
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
 
@@ -58,6 +60,7 @@ class Server:
             except queue.Empty:
                 pytest.fail(f"no {kind} of node {node} in {seen}")
             event = json.loads(seen[-1])
+            self.seen.append(event["event"])
             if (event["event"], event["node"]) == (kind, node) and text in (None, event["text"]):
                 return
 
@@ -104,6 +107,35 @@ def test_nodes_are_set_up_started_lost_and_found(nodes: Slave, server: Server) -
     server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
     assert server.end() == 0
     nodes.wait_for("32/state", "Pre-operational")
+
+
+def test_processes_that_are_stopped_for_a_moment_come_back_and_are_no_twins(
+    bus: Bus, nodes: Slave, tmp_path: Path
+) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        f"nodes: [{{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, restart: 100}}]\n"
+        "start: {autoactivate: true}\n",
+        "utf-8",
+    )
+    server = Server(bus, file)
+    try:
+        server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+        nodes.process.send_signal(signal.SIGSTOP)
+        server.wait_for("HeartbeatLost", 16)
+        nodes.process.send_signal(signal.SIGCONT)
+        server.wait_for("Restarted", 16)
+        server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+        with can.Bus(**bus.keywords) as other:
+            server.process.send_signal(signal.SIGSTOP)
+            heartbeats = (one for one in other if one.arbitration_id == 0x710)
+            first = next(heartbeats)
+            assert any(one.timestamp > first.timestamp + 0.5 for one in heartbeats)
+            server.process.send_signal(signal.SIGCONT)
+        server.wait_for("ServerLate", 0)
+    finally:
+        server.end(signal.SIGKILL)
+    assert "DuplicateNode" not in server.seen
 
 
 def test_the_motor_of_fig_120_follows_though_the_server_is_killed(

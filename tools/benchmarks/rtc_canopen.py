@@ -18,7 +18,8 @@ from tickrig.host.rtc_canopen.device_file import read_device_file
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, lay_out
 from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.server import Server
-from tickrig.wire.can import CanFrame
+from tickrig.host.stamped_link import Stamped
+from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import MappedObject
@@ -102,7 +103,9 @@ def ready(count: int) -> Server:
         server.booted(node)
     for at_us in range(PERIOD_US, 50 * PERIOD_US, PERIOD_US):
         alive = at_us % (10 * PERIOD_US) == 0
-        server.tick(at_us, heartbeats(server, NmtState.OPERATIONAL) if alive else ())
+        server.tick(
+            at_us, stamped(at_us, heartbeats(server, NmtState.OPERATIONAL) if alive else ())
+        )
     assert all(node.proxy and node.proxy.confirmed for node in server.nodes.values())
     return server
 
@@ -114,9 +117,14 @@ def layout(node_id: int) -> PdoLayout:
     return lay_out(0x1801, 0x280 + node_id, mapping, types)
 
 
-def heartbeats(server: Server, state: NmtState) -> tuple[CanFrame, ...]:
+def heartbeats(server: Server, state: NmtState) -> Frames:
     """Return a heartbeat of each node."""
     return tuple(CanFrame(0x700 + node_id, bytes((state,))) for node_id in server.nodes)
+
+
+def stamped(at_us: int, frames: Frames) -> Stamped:
+    """Return frames of one time."""
+    return tuple((at_us, frame) for frame in frames)
 
 
 def periods() -> None:
@@ -130,7 +138,8 @@ def periods() -> None:
         start, begin_us = time.perf_counter(), server.now_us
         for period in range(1, SECONDS * 100 + 1):
             heard = (*pdos, *alive) if period % 10 == 0 else pdos
-            server.tick(begin_us + period * PERIOD_US, heard)
+            at_us = begin_us + period * PERIOD_US
+            server.tick(at_us, stamped(at_us, heard))
         values.append(NODES * SECONDS / (time.perf_counter() - start))
     row("proxies at 100 Hz that one core serves, a PDO and a port write each period", values, "")
 
@@ -152,7 +161,7 @@ def frames() -> None:
 
         def work(traffic: list[CanFrame] = traffic) -> None:
             for frame in traffic:
-                server.tick(server.now_us, (frame,))
+                server.tick(server.now_us, ((server.now_us, frame),))
 
         rates(f"{what}, {NODES} proxies, one frame a tick", FRAMES, "frames/s", work)
 
@@ -167,7 +176,7 @@ def latency() -> None:
     for n in range(CALLS):
         frame = CanFrame(0x281, n.to_bytes(8, "little"))
         start = time.perf_counter()
-        server.tick(server.now_us, (frame,))
+        server.tick(server.now_us, ((server.now_us, frame),))
         assert port.is_new
         values.append(1e6 * (time.perf_counter() - start))
         port.read()

@@ -15,9 +15,8 @@ from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.user_file import find_class, told
-from tickrig.host.link import Link
 from tickrig.host.rtc.component import RtComponent
-from tickrig.wire.can import Frames
+from tickrig.host.stamped_link import StampedLink
 
 if TYPE_CHECKING:
     from tickrig.host.can_link import CanLink
@@ -92,7 +91,7 @@ def furnish(server: Server, words: Sequence[str]) -> None:
 
 def open_link(
     options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
-) -> tuple[Link[Frames], str]:
+) -> tuple[StampedLink, str]:
     """Open the bus of a server; return it, and how people call it.
 
     Args:

@@ -16,7 +16,7 @@ from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.errors import LinkClosed
-from tickrig.host.link import NEVER, Link
+from tickrig.host.link import NEVER
 from tickrig.host.rtc_canopen.commands.opening import (
     BusFailed,
     bus_of,
@@ -25,7 +25,7 @@ from tickrig.host.rtc_canopen.commands.opening import (
     open_link,
     read_server,
 )
-from tickrig.wire.can import Frames
+from tickrig.host.stamped_link import StampedLink
 
 if TYPE_CHECKING:
     from tickrig.host.rtc_canopen.server import Server
@@ -76,7 +76,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _run(server, link, span_us)
 
 
-def _run(server: Server, link: Link[Frames], span_us: int) -> None:
+def _run(server: Server, link: StampedLink, span_us: int) -> None:
     from tickrig.host.rtc_canopen.serve import serve  # noqa: PLC0415
 
     until_us = NEVER if span_us == NEVER else link.now_us + span_us

@@ -8,12 +8,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.link import Link
 from tickrig.host.rtc_canopen.definition_file import save_definition
 from tickrig.host.rtc_canopen.events import Listener
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.host.rtc_canopen.view import ServerView
+from tickrig.host.stamped_link import StampedLink
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 
@@ -46,7 +46,7 @@ class Session:
         self,
         server: Server,
         path: Path,
-        link: Link[Frames],
+        link: StampedLink,
         furnish: Furnish = lambda server: None,
         listeners: tuple[Listener, ...] = (),
     ) -> None:
@@ -103,9 +103,9 @@ class Session:
         """Wait for what is heard or due, not beyond a time, and let the server do it."""
         link = self._link
         due_us = min(self.server.due_us, until_us)
-        received = link.receive(max(0, due_us - link.now_us))
+        now_us, heard = link.hear(max(0, due_us - link.now_us))
         with self.lock:
-            sent = (*self._leaving, *self.server.tick(link.now_us, received))
+            sent = (*self._leaving, *self.server.tick(now_us, heard))
             self._leaving = ()
         if sent:
             link.send(sent)

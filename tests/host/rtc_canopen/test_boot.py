@@ -20,11 +20,12 @@ PALETTE = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n
 ONE = {16: "f-palette"}
 
 BOOT = """
-    77F#00 610#4000100000000000 710#00
-    610#4000100000000000 590#4300100091010700
+    710#00 77F#00 610#4000100000000000
+    610#4000100000000000 590#4300100091010700 590#4300100091010700
     610#4018100100000000 590#4318100100000000
     610#4018100200000000 590#4318100201000000
     610#4018100300000000 590#4318100300000100
+    610#4018100400000000 590#4318100401000000
     610#2B17100064000000 590#6017100000000000
 """
 
@@ -122,7 +123,7 @@ def test_a_refused_value_ends_the_boot_of_that_node_alone() -> None:
 
 def test_a_node_that_falls_silent_while_it_boots_is_looked_for_again() -> None:
     bench = Bench(PALETTE, ONE)
-    bench.run_ms(4)
+    bench.run_ms(3)
     bench.devices[16].physical["unplugged"].write(1)
     event = bench.run_until(EventKind.SDO_TIMEOUT)
     assert event.text == "1018h:02 was not answered"

@@ -97,31 +97,75 @@ def test_a_second_node_of_the_same_node_id_is_found_and_both_are_stopped(active:
     bench = running({16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
     if active:
         bench.activate(16)
-    bench.run_ms(20 if active else 57)
+    bench.run_ms(20 if active else 157)
     bench.devices[1016].physical["power_off"].write(0)
     event = bench.run_until(EventKind.DUPLICATE_NODE, within_ms=300)
-    assert (event.node, event.text) == (16, "both are stopped")
+    reason = "a boot-up, and heartbeats at the times of before"
+    assert (event.node, event.text) == (16, f"both are stopped: {reason}")
     bench.run_ms(100)
     assert bench.server.nodes[16].phase is Phase.DUPLICATE
     assert bench.state(16) is ERROR
     assert [bench.devices[n].read("state") for n in (16, 1016)] == ["Stopped", "Stopped"]
 
 
-def test_heartbeats_that_come_twice_as_often_show_a_second_node() -> None:
+def test_heartbeats_that_come_twice_as_often_are_a_suspicion_and_stop_nothing() -> None:
     bench = running()
+    bench.activate(16)
     bench.run_ms(30)
-    for _ in range(20):
-        bench.other.send(frames("710#7F"))
+    for _ in range(30):
+        bench.other.send(frames("710#05"))
         bench.run_ms(100)
-    assert len(bench.events(EventKind.DUPLICATE_NODE)) == 1
+    assert bench.events(EventKind.DUPLICATE_SUSPECTED, EventKind.DUPLICATE_NODE) == [
+        "DuplicateSuspected 16 two heartbeats in each 100 ms"
+    ]
+    assert bench.state(16) is ACTIVE
+    assert "000#0210" not in bench.log.text
 
 
-def test_heartbeats_that_are_read_at_once_show_no_second_node() -> None:
+@pytest.mark.parametrize("busy_ms", [1_200, 5_000])
+def test_heartbeats_that_a_device_sends_at_once_when_it_goes_on_show_no_second_node(
+    busy_ms: int,
+) -> None:
     bench = running()
-    for busy_ms in (150, 250, 290, 800, 2_000) * 4:
-        bench.rig.run_for(1_000 * busy_ms)
-        bench.run_ms(30)
-    assert bench.events(EventKind.DUPLICATE_NODE, EventKind.HEARTBEAT_LOST) == []
+    bench.activate(16)
+    bench.devices[16].physical["unplugged"].write(1)
+    bench.run_ms(busy_ms)
+    bench.devices[16].physical["unplugged"].write(0)
+    bench.other.send(frames("710#05 " * (busy_ms // 100)))
+    bench.run_ms(2_000)
+    assert bench.events(EventKind.DUPLICATE_NODE, EventKind.DUPLICATE_SUSPECTED) == []
+
+
+def test_states_that_nobody_commanded_in_turn_show_a_second_node() -> None:
+    bench = running()
+    bench.activate(16)
+    bench.server.nodes[16].dialogue.clear()
+    for state in ("7F", "05", "7F", "05"):
+        bench.other.send(frames(f"710#{state}"))
+        bench.rig.run_for(2_000)
+    bench.run_ms(50)
+    (event,) = bench.events(EventKind.DUPLICATE_NODE)
+    assert event.endswith("OPERATIONAL in turn with PRE_OPERATIONAL, uncommanded")
+    assert bench.state(16) is ERROR
+
+
+@pytest.mark.parametrize(
+    ("answer", "found"),
+    [
+        ("4318100477000000", ["1018h:04 is 00000001h and 00000077h"]),
+        ("4318100401000000", []),
+        ("8018100400000206", []),
+        ("4301140277000000", []),
+    ],
+)
+def test_two_answers_for_its_identity_show_a_second_node(answer: str, found: list[str]) -> None:
+    bench = Bench()
+    bench.run_ms(20)
+    assert "590#4318100401000000" in bench.log.text
+    foreign(bench, f"590#{answer}")
+    both = "DuplicateNode 16 both are stopped: "
+    assert bench.events(EventKind.DUPLICATE_NODE) == [both + reason for reason in found]
+    assert (bench.devices[16].read("state") == "Stopped") is bool(found)
 
 
 def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:

@@ -41,7 +41,7 @@ def test_noise_is_survived(
         server.bus_state(state)
     for wait_us, heard in noise:
         now_us += wait_us
-        for frame in server.tick(now_us, tuple(heard)):
+        for frame in server.tick(now_us, tuple((now_us, frame) for frame in heard)):
             frame.checked()
         assert server.due_us > now_us
 

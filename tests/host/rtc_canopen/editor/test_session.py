@@ -12,10 +12,10 @@ import pytest
 from tests.host.rtc_canopen.bench import SYSTEMS
 from tickrig.host.can_link import CanLink
 from tickrig.host.errors import LinkClosed
-from tickrig.host.link import Link
 from tickrig.host.rtc_canopen.editor.session import Session
 from tickrig.host.rtc_canopen.events import Event, EventKind
 from tickrig.host.rtc_canopen.serve import open_server
+from tickrig.host.stamped_link import Stamped, StampedLink
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 
@@ -36,11 +36,14 @@ class Broken:
     def receive(self, timeout_us: int, /) -> Frames:
         raise LinkClosed("gone")
 
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        raise LinkClosed("gone")
+
     def close(self) -> None:
         """Nothing is open."""
 
 
-def session(link: Link[Frames], *listeners: Callable[[Event], None]) -> Session:
+def session(link: StampedLink, *listeners: Callable[[Event], None]) -> Session:
     return Session(open_server(FIG_120), FIG_120, link, listeners=listeners)
 
 
