@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import signal
 import sys
 from collections.abc import Iterable, Sequence
 from functools import partial
@@ -11,10 +9,10 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 import click
-from textual.app import App, ComposeResult, SystemCommand
+from textual.app import ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
-from textual.widgets import Footer, TabbedContent, TabPane
+from textual.widgets import TabbedContent, TabPane
 
 from tickrig.host.canmon.bench_setup import BenchSetup
 from tickrig.host.canmon.tui.bench import Bench
@@ -23,16 +21,16 @@ from tickrig.host.canmon.tui.panel import Panel
 from tickrig.host.canmon.tui.session import Session
 from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
+from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui.key_footer import KeyFooter
 
 PAINT_S: Final = 0.1
 SAVE_S: Final = 2.0
 SWITCH_S: Final = 0.002
 """How long the screen may keep the session from running."""
 
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-
-class Monitor(App[None]):
+class Monitor(FramedApp):
     """Tabs, keys, help and the status line.
 
     Args:
@@ -45,17 +43,15 @@ class Monitor(App[None]):
     CSS = """
     TabbedContent, ContentSwitcher, TabPane, Panel { height: 1fr; }
     TabPane { padding: 0; }
+    ContentTab { padding: 0 1 0 0; }
     TabbedContent, ContentSwitcher, TabPane { visibility: hidden; }
     ContentTabs, Panel { visibility: visible; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("f1,question_mark", "help", "help", key_display="F1"),
         Binding("A", "arm", "arm"),
         Binding("f9", "stop", "stop all", priority=True, key_display="F9"),
         *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
         Binding("w", "export", "save as"),
-        Binding("q,ctrl+q", "quit", "quit", key_display="q"),
-        Binding("ctrl+c", "quit", "quit", show=False, priority=True),
     ]
 
     def __init__(
@@ -73,13 +69,10 @@ class Monitor(App[None]):
                 with TabPane(f"{number} {panel.title}", id=_tab(panel)):
                     yield panel
         yield StatusLine(self.session)
-        yield Footer(compact=True)
+        yield KeyFooter()
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        loop = asyncio.get_running_loop()
-        for number in ENDING:
-            loop.add_signal_handler(number, self.exit)
         self.set_interval(PAINT_S, self.look)
         self.set_interval(SAVE_S, self.save)
         if unknown := self.bench.unknown():
@@ -129,13 +122,6 @@ class Monitor(App[None]):
         """Show a tab."""
         if number <= len(self.panels):
             self.query_one(TabbedContent).active = _tab(self.panels[number - 1])
-
-    def action_help(self) -> None:
-        """Show or hide what the keys do here."""
-        if self.screen.query("HelpPanel"):
-            self.action_hide_help_panel()
-        else:
-            self.action_show_help_panel()
 
     def action_arm(self) -> None:
         """Let panels send, or stop them."""

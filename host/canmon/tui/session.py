@@ -122,7 +122,8 @@ class Session:
             self._thread.result()
 
     def close(self) -> None:
-        """End the thread; the source stays open for whoever reports on it."""
+        """End the thread, and send no more; the source stays open for whoever reports on it."""
+        self.armed = False  # else a slow bus would take all that is due first
         self._stop.set()
         self._pool.shutdown()
 

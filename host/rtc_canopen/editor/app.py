@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar, Final
 
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
-from textual.widgets import Footer
 
 from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.rtc.errors import RtcRefused
@@ -21,11 +18,13 @@ from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc_canopen.editor.question import Question
 from tickrig.host.rtc_canopen.editor.session import Session
-from tickrig.host.rtc_canopen.editor.status import event_line, status_line
+from tickrig.host.rtc_canopen.editor.status import event_lines, status_line
 from tickrig.host.rtc_canopen.editor.system_pane import SystemPane
 from tickrig.host.rtc_canopen.editor.system_rows import Item
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.view import ServerView
+from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui.key_footer import KeyFooter
 from tickrig.host.tui.line_view import LineView
 
 PAINT_S: Final = 0.1
@@ -33,7 +32,6 @@ SWITCH_S: Final = 0.000_5
 """How long the screen may keep the server from running."""
 
 EVENTS_SHOWN: Final = 500
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 Command = Callable[[ServerView], object]
 Join = Callable[[ServerView, Item, Item], None]
@@ -45,7 +43,7 @@ ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
 }
 
 
-class SystemEditor(App[None]):
+class SystemEditor(FramedApp):
     """Shows a server and commands it by keys and mouse.
 
     Args:
@@ -60,7 +58,8 @@ class SystemEditor(App[None]):
     #panes, SystemPane { height: 1fr; }
     ObjectsPane { height: 1fr; }
     .-wide #panes { layout: horizontal; }
-    .-wide SystemPane, .-wide ObjectsPane { width: 1fr; }
+    .-wide SystemPane { width: 2fr; }
+    .-wide ObjectsPane { width: 3fr; }
     #events { height: 7; }
     #status { height: 1; background: $boost; }
     """
@@ -69,7 +68,6 @@ class SystemEditor(App[None]):
         (130, "-wide"),
     ]
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("f1,question_mark", "help", "help", key_display="F1"),
         Binding("a", "ask('activate')", "activate"),
         Binding("d", "ask('deactivate')", "deactivate"),
         Binding("r", "ask('reset')", "reset"),
@@ -84,8 +82,6 @@ class SystemEditor(App[None]):
         Binding("l", "live", "live"),
         Binding("ctrl+s", "save", "save", key_display="^s"),
         Binding("ctrl+o", "load", "load", key_display="^o"),
-        Binding("q,ctrl+q", "quit", "quit", key_display="q"),
-        Binding("ctrl+c", "quit", "quit", show=False, priority=True),
     ]
 
     def __init__(self, session: Session, bus: str = "") -> None:
@@ -101,13 +97,10 @@ class SystemEditor(App[None]):
             yield self.objects
         yield self.events
         yield self.status
-        yield Footer(compact=True)
+        yield KeyFooter()
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        loop = asyncio.get_running_loop()
-        for number in ENDING:
-            loop.add_signal_handler(number, self.exit)
         self.status.can_focus, self.events.border_title = False, "events"
         self.system.focus()
         self.set_interval(PAINT_S, self.look)
@@ -144,7 +137,8 @@ class SystemEditor(App[None]):
         file = self.session.path.name
         self.status.show([status_line(system.nodes, file, self._bus, marked)])
         follows = self.events.at_end
-        self.events.show([event_line(event) for event in events])
+        width = max(1, self.events.scrollable_content_region.width)
+        self.events.show([line for event in events for line in event_lines(event, width)])
         if follows:
             self.events.show_end()
 
@@ -157,13 +151,6 @@ class SystemEditor(App[None]):
         self.look()
         if event.view is self.objects:
             self.action_write()
-
-    def action_help(self) -> None:
-        """Show or hide what the keys do."""
-        if self.screen.query("HelpPanel"):
-            self.action_hide_help_panel()
-        else:
-            self.action_show_help_panel()
 
     def action_ask(self, what: str) -> None:
         """Ask the proxy or component under the cursor for a state."""

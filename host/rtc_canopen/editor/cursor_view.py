@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import ClassVar, Final, Generic, TypeVar
 
 from textual.binding import Binding, BindingType
+from textual.content import Content
 from textual.events import Blur, Click, Focus
 from textual.message import Message
 
 from tickrig.host.rtc_canopen.editor.row import Row
+from tickrig.host.tui.line import line_width
 from tickrig.host.tui.line_view import Line, LineView
 
 T = TypeVar("T")
@@ -22,6 +24,8 @@ MARGIN: Final = 2
 
 class CursorView(LineView, Generic[T]):
     """Shows rows; the cursor stays on what it was on while others come and go.
+
+    What a row under the cursor ends with stands below, too, where the row is cut.
 
     Attributes:
         rows_shown: the rows.
@@ -56,6 +60,7 @@ class CursorView(LineView, Generic[T]):
         super().__init__(id)
         self.rows_shown: list[Row[T]] = []
         self.cursor = 0
+        self._cut = ""
 
     @property
     def row(self) -> Row[T] | None:
@@ -80,9 +85,17 @@ class CursorView(LineView, Generic[T]):
     def paint(self) -> None:
         """Show the rows and the cursor."""
         lines = [row.line for row in self.rows_shown]
+        cut = ""
         if lines:
-            lines[self.cursor] = self._under_cursor(lines[self.cursor])
+            line = lines[self.cursor]
+            cut = line[-1][0].strip() if line_width(line) > self._columns else ""
+            lines[self.cursor] = self._under_cursor(line)
+        self._tell_cut(cut)
         self.show(lines)
+
+    @property
+    def _columns(self) -> int:
+        return int(self.scrollable_content_region.width)
 
     def put_cursor(self, number: int) -> None:
         """Put the cursor on a row, and bring that into view."""
@@ -123,8 +136,12 @@ class CursorView(LineView, Generic[T]):
         """Show that the keys go elsewhere."""
         self.paint()
 
+    def _tell_cut(self, text: str) -> None:
+        if text != self._cut:  # each time paints the whole view again
+            self._cut = text
+            self.border_subtitle = Content(text) if text else None
+
     def _under_cursor(self, line: Line) -> Line:
         style = FOCUSED if self.has_focus else ELSEWHERE
-        width = sum(len(text) for text, _ in line)
-        rest = (" " * max(0, self.size.width - width), "")
+        rest = (" " * max(0, self.size.width - line_width(line)), "")
         return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)

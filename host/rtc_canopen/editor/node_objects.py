@@ -124,7 +124,7 @@ class NodeObjects:
 
     def _take(self, entry: Entry, transfer: Transfer) -> None:
         if transfer.problem:
-            self._problems[entry] = transfer.problem
+            self._problems[entry] = _reason(entry, transfer)
             return
         self._problems.pop(entry, None)
         self._reads += 1
@@ -140,7 +140,7 @@ class NodeObjects:
         for entry, transfer in [one for one in self._writing if one[1].done]:
             self._writing.remove((entry, transfer))
             if transfer.problem:
-                self._problems[entry] = transfer.problem
+                self._problems[entry] = _reason(entry, transfer)
             else:
                 self.read(entry)
 
@@ -156,13 +156,15 @@ class NodeObjects:
         data, problem = self._values.get(entry), self._problems.get(entry)
         kind = "" if text.kind is None else text.kind.name
         value = "" if data is None else f"{text.read(data)[1]} {text.unit}"
-        line = (
-            (f"{write_entry(entry)} ", DIM),
-            (f"{_tail(text.name):<{NAME}} ", ""),
-            (f"{kind:<14} ", DIM),
-            (problem or value, ALARM if problem else CHANGED if entry in self._changed else "bold"),
-        )
-        return Row(write_entry(entry), line, entry)
+        head = (f"{write_entry(entry)} ", DIM), (f"{_tail(text.name):<{NAME}} ", "")
+        style = CHANGED if entry in self._changed else "bold"
+        rest = ((problem, ALARM),) if problem else ((f"{kind:<14} ", DIM), (value, style))
+        return Row(write_entry(entry), (*head, *rest), entry)
+
+
+def _reason(entry: Entry, transfer: Transfer) -> str:
+    """Return why a transfer failed, in the columns that a row of 80 leaves."""
+    return transfer.problem.removeprefix(f"{write_entry(entry)} ").removeprefix("aborted: ")
 
 
 def _tail(name: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain, repeat
+from textwrap import wrap
 from typing import Final
 
 from tickrig.host.rtc_canopen.events import Event, EventKind
@@ -12,6 +14,9 @@ from tickrig.host.tui.line_view import Line
 DIM: Final = "bright_black"
 MARK: Final = "bold yellow"
 ALARM: Final = "bold red"
+
+STAMP: Final = 12
+"""Columns of a time."""
 
 GOOD: Final = (
     EventKind.BOOT_UP,
@@ -25,10 +30,13 @@ GOOD: Final = (
 """Events that are nothing to see to."""
 
 
-def event_line(event: Event) -> Line:
-    """Return an event as a line."""
+def event_lines(event: Event, width: int) -> list[Line]:
+    """Return an event as lines of so many columns, which cut no word."""
     at, _, rest = str(event).partition(" ")
-    return (f"{at:>12} ", DIM), (rest, "" if event.kind in GOOD else ALARM)
+    style = "" if event.kind in GOOD else ALARM
+    stamps = chain([f"{at:>{STAMP}} "], repeat(" " * (STAMP + 1)))
+    parts = wrap(rest, max(1, width - STAMP - 1)) or [""]
+    return [((stamp, DIM), (part, style)) for stamp, part in zip(stamps, parts, strict=False)]
 
 
 def status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:

@@ -7,6 +7,8 @@ from collections.abc import Awaitable, Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from textual.app import App
+
 from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.file_source import FileSource
 from tickrig.host.canmon.source_word import FileWord
@@ -96,7 +98,7 @@ async def until(pilot: Any, holds: Callable[[], bool]) -> None:
     raise AssertionError(screen_text(pilot.app))
 
 
-def screen_text(monitor: Monitor) -> str:
+def screen_text(app: App[None]) -> str:
     """Return all that is on the screen."""
-    strips = monitor.screen._compositor.render_strips()
+    strips = app.screen._compositor.render_strips()
     return "\n".join(strip.text.rstrip() for strip in strips)

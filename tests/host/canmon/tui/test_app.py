@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from textual.binding import Binding
+from textual.widgets import Input
 
 from tests.host.canmon.tui.pilot import (
     OURS,
@@ -30,6 +31,8 @@ from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.trace_panel import TracePanel
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui.key_footer import KeyFooter
 from tickrig.host.tui.line import line_text
 from tickrig.wire.can import CanFrame, Frames
 
@@ -71,6 +74,45 @@ def test_f1_tells_what_each_panel_shows_and_what_its_keys_do(panel: Any) -> None
         assert not monitor.screen.query("HelpPanel")
 
     on_monitor(drive_session(), act, panels=[panel])
+
+
+def test_escape_hides_help_and_else_goes_to_the_panel() -> None:
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        await pilot.press("slash", "f1", "escape")
+        assert not monitor.screen.query("HelpPanel")
+        assert isinstance(monitor.focused, Input)
+        await pilot.press("escape")
+        assert not isinstance(monitor.focused, Input)
+
+    on_monitor(drive_session(), act)
+
+
+@pytest.mark.parametrize("columns", [80, 100])
+def test_all_keys_and_tabs_are_on_the_screen(columns: int) -> None:
+    frame = [*Monitor.BINDINGS, *FramedApp.BINDINGS]
+
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        for number, panel in enumerate(PANELS, 1):
+            await pilot.press(str(number))
+            await pilot.pause()
+            text = screen_text(monitor)
+            for binding in Binding.make_bindings([*frame, *panel.BINDINGS]):
+                assert not binding.show or f" {binding.description}" in text
+            assert all(f"{n} {one.title}" in text for n, one in enumerate(PANELS, 1))
+
+    on_monitor(drive_session(), act, panels=PANELS, size=(columns, 24))
+
+
+def test_a_click_presses_a_key() -> None:
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        footer = monitor.query_one(KeyFooter)
+        row = screen_text(monitor).splitlines()[footer.region.y]
+        await pilot.click(KeyFooter, offset=(row.index("o overwrite"), 0))
+        assert monitor.query_one(TracePanel).overwrite
+        await pilot.click(KeyFooter, offset=(row.index("o overwrite") - 1, 0))
+        assert monitor.query_one(TracePanel).overwrite
+
+    on_monitor(drive_session(), act)
 
 
 def test_all_keys_of_the_panel_are_commands_by_name() -> None:
@@ -150,10 +192,10 @@ def test_a_log_cannot_be_armed() -> None:
     on_monitor(drive_session(), act)
 
 
-@pytest.mark.parametrize("key", ["q", "ctrl+q", "ctrl+c"])
-def test_these_keys_leave(key: str) -> None:
+@pytest.mark.parametrize("keys", [["q"], ["ctrl+q"], ["ctrl+c"], ["w", "ctrl+q"], ["w", "ctrl+c"]])
+def test_these_keys_leave(keys: list[str]) -> None:
     async def act(monitor: Monitor, pilot: Any) -> None:
-        await pilot.press(key)
+        await pilot.press(*keys)
         assert not monitor.is_running
 
     on_monitor(drive_session(), act)

@@ -111,6 +111,21 @@ def test_a_bus_that_takes_nothing_disarms(wire: Wire) -> None:
     session.source.close()
 
 
+def test_who_leaves_does_not_wait_for_what_is_due(wire: Wire) -> None:
+    sent: list[CanFrame] = []
+
+    def send(frame: CanFrame) -> None:
+        sent.append(frame)
+        left.close()
+
+    left = Session(wire_session(wire).source, Model(), {"can0": send})
+    left.tasks += [Echo(), Echo(), Echo()]
+    left.arm()
+    hear(left, wire, "181#01")
+    assert (len(sent), left.withheld) == (1, 2)
+    left.source.close()
+
+
 def test_a_task_sends_on_the_bus_that_it_names(wire: Wire) -> None:
     with new_wire() as other:
         session = open_session([wire.word, other.word], BusOptions(), Model())

@@ -5,15 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from textual.binding import Binding
 from textual.widgets import Markdown
 
+from tests.host.canmon.tui.pilot import screen_text
 from tests.host.rtc_canopen.bench import EDS
 from tests.host.rtc_canopen.components import Knob
 from tests.host.rtc_canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.question import Question
 from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.tui.framed_app import FramedApp
 from tickrig.wire.rtc_types.basic import TimedShortSeq
 
 TWO = f"""
@@ -235,6 +239,33 @@ def test_a_value_that_cannot_be_is_told_and_one_that_is_refused_shown() -> None:
     at_desk(act)
 
 
+@pytest.mark.parametrize("columns", [80, 130])
+def test_the_reason_of_a_refusal_is_not_cut(columns: int) -> None:
+    async def act(desk: Desk) -> None:
+        await desk.go_to("6401h:01", "objects")
+        await desk.press("enter", "7", "enter")
+        for _ in range(3):
+            await desk.pass_ms(20)
+        assert "06010002h READ_ONLY" in screen_text(desk.app)
+
+    at_desk(act, size=(columns, 24))
+
+
+def test_what_is_cut_of_the_row_under_the_cursor_stands_below(two: Path) -> None:
+    async def act(desk: Desk) -> None:
+        await desk.go_to("32 Motor0")
+        assert desk.app.system.border_subtitle is None
+        why = "refused: 1018h:02 is 00000002h, not 00000001h in the EDS"
+        desk.app.session.server.nodes[32].refuse(why)
+        desk.app.look()
+        await desk.pilot.pause()
+        assert f" refused: {why} " in screen_text(desk.app)
+        await desk.press("home")
+        assert why not in screen_text(desk.app)
+
+    at_desk(act, two)
+
+
 def test_a_question_is_left_by_escape() -> None:
     async def act(desk: Desk) -> None:
         await desk.go_to("6426h:01", "objects")
@@ -367,14 +398,28 @@ def test_help_is_shown_and_hidden() -> None:
         assert "Those that the EDS of the node has" in text.source
         await desk.press("question_mark")
         assert not desk.app.screen.query("HelpPanel")
+        await desk.press("f1", "escape")
+        assert not desk.app.screen.query("HelpPanel")
 
     at_desk(act)
 
 
-@pytest.mark.parametrize("key", ["q", "ctrl+c"])
-def test_it_is_left(key: str) -> None:
+@pytest.mark.parametrize("columns", [80, 100])
+def test_all_keys_are_on_the_screen(columns: int) -> None:
     async def act(desk: Desk) -> None:
-        await desk.press(key)
+        text = screen_text(desk.app)
+        for binding in (*SystemEditor.BINDINGS, *FramedApp.BINDINGS):
+            assert isinstance(binding, Binding)
+            if binding.show:
+                assert f" {binding.description}" in text
+
+    at_desk(act, size=(columns, 24))
+
+
+@pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["w", "ctrl+q"]])
+def test_it_is_left(keys: list[str]) -> None:
+    async def act(desk: Desk) -> None:
+        await desk.press("tab", *keys)
         assert not desk.app.is_running or desk.app._exit
 
     at_desk(act)

@@ -1,0 +1,52 @@
+"""What all full-screen programs do alike: how they end, and how they explain their keys."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from typing import ClassVar, Final
+
+from textual.app import App
+from textual.binding import Binding, BindingType
+
+ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class FramedApp(App[None]):
+    """F1 shows and hides help, Escape hides it; q, Ctrl-Q, Ctrl-C and signals end it.
+
+    Ctrl-Q and Ctrl-C do so from anywhere, also while a question is on the screen.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f1,question_mark", "help", "help", key_display="F1"),
+        Binding("escape", "leave_help", "leave help", show=False, priority=True),
+        Binding("q", "quit", "quit"),
+        Binding("ctrl+q,ctrl+c", "quit", "quit", show=False, priority=True),
+    ]
+
+    def on_mount(self) -> None:
+        """Let signals end it."""
+        loop = asyncio.get_running_loop()
+        for number in ENDING:
+            loop.add_signal_handler(number, self.exit)
+
+    @property
+    def helps(self) -> bool:
+        """Whether help is on the screen."""
+        return bool(self.screen_stack and self.screen.query("HelpPanel"))
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Leave Escape to others where there is no help."""
+        return self.helps if action == "leave_help" else super().check_action(action, parameters)
+
+    def action_help(self) -> None:
+        """Show or hide what the keys do here."""
+        if self.helps:
+            self.action_leave_help()
+        else:
+            self.action_show_help_panel()
+
+    def action_leave_help(self) -> None:
+        """Hide what the keys do."""
+        self.action_hide_help_panel()
