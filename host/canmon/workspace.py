@@ -60,6 +60,7 @@ class Workspace:
         self.path, self._text = path, text
         try:
             self._document: TOMLDocument = tomlkit.parse(text)
+            self._document.unwrap()  # some tables that are there twice are found by it alone
         except ParseError as error:
             raise WorkspaceError(f"{path}, line {error.line}: {_reason(error)}") from None
         except TOMLKitError as error:

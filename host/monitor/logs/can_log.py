@@ -19,7 +19,7 @@ import can
 from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.blf_end import missing_end
+from tickrig.host.monitor.logs.blf_damage import BlfReader, missing_end
 from tickrig.host.monitor.logs.can_heard import to_heard
 from tickrig.host.monitor.logs.csv_line import UNNAMED
 from tickrig.host.monitor.logs.log_format import LogFormat
@@ -81,7 +81,7 @@ class CanLogReader:
                 if self._kind in _TEXT:
                     yield from self._text(file)
                 elif self._kind is LogFormat.BLF:
-                    yield from self._blf(can.BLFReader(file))
+                    yield from self._blf(BlfReader(file))
                 else:
                     yield from can.MF4Reader(file)
             except LogError:
@@ -108,7 +108,7 @@ class CanLogReader:
                 except BROKEN as error:
                     lines.refused(error)
 
-    def _blf(self, reader: can.BLFReader) -> Iterator[can.Message]:
+    def _blf(self, reader: BlfReader) -> Iterator[can.Message]:
         count = 0
         for count, message in enumerate(reader, 1):  # noqa: B007 - counted
             yield message

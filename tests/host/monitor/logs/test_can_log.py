@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -263,6 +264,16 @@ def test_a_blf_log_that_was_cut_anywhere_says_so(tmp_path: Path) -> None:
         (tmp_path / "cut.blf").write_bytes(whole[:length])
         with pytest.raises(LogError, match=r"cut\.blf"):
             list(read_log(tmp_path / "cut.blf"))
+
+
+@pytest.mark.parametrize("kind", [1, 10, 96])
+def test_a_blf_log_with_an_object_of_no_size_is_none(kind: int, tmp_path: Path) -> None:
+    head = blf(tmp_path / "run.blf", 1)[:144]
+    empty = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 0, kind) + bytes(32)
+    container = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 32 + len(empty), 10) + bytes(16) + empty
+    (tmp_path / "run.blf").write_bytes(head + container)
+    with pytest.raises(LogError, match="an object of 0 bytes"):
+        list(read_log(tmp_path / "run.blf"))
 
 
 def test_a_blf_log_that_was_never_ended_is_read_as_far_as_it_goes(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Whether a BLF log is whole: python-can reads one that was cut as far as it goes, in silence.
+"""BLF logs that are damaged: python-can reads one that was cut as far as it goes, in silence.
 
 A BLF log is a header and objects. Most are containers, whose contents, put together,
 are the objects of interest; one may lie across two containers.
@@ -11,12 +11,30 @@ import zlib
 from collections.abc import Iterator
 from typing import BinaryIO, Final
 
+import can
+
 _FILE: Final = struct.Struct("<4sL24xL")  # signature, size of the header, count of objects
 _OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in it
 _SIGNATURE: Final = b"LOBJ"
+_SEARCHED: Final = 8
+"""Bytes in which an object begins: behind the padding of the one before."""
+
 _CONTAINER_TYPE: Final = 10
 _DEFLATED: Final = 2
+
+
+class BlfReader(can.BLFReader):
+    """python-can's reader, but for objects without a size, of which it never sees the end."""
+
+    def _parse_data(self, data: bytes) -> Iterator[can.Message]:
+        _, rest = _count(data)
+        at = rest.find(_SIGNATURE, 0, _SEARCHED)
+        if at >= 0 and len(rest) >= at + _OBJECT.size:
+            size = _OBJECT.unpack_from(rest, at)[3]
+            if size < _OBJECT.size:
+                raise ValueError(f"it has an object of {size} bytes")
+        yield from super()._parse_data(data)
 
 
 def missing_end(file: BinaryIO) -> str:
@@ -65,7 +83,9 @@ def _content(body: bytes) -> bytes | None:
 def _count(data: bytes) -> tuple[int, bytes]:
     """Return how many objects are whole, and the bytes behind them."""
     count = at = 0
-    while (begin := data.find(_SIGNATURE, at, at + 8)) >= 0 and len(data) - begin >= _OBJECT.size:
+    while (begin := data.find(_SIGNATURE, at, at + _SEARCHED)) >= 0 and len(
+        data
+    ) - begin >= _OBJECT.size:
         size = _OBJECT.unpack_from(data, begin)[3]
         if size < _OBJECT.size or begin + size > len(data):
             break
