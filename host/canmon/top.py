@@ -24,7 +24,7 @@ from tickrig.host.canmon.listening import (
 )
 from tickrig.host.canmon.meaning import Meaning
 from tickrig.host.canmon.painting import paint
-from tickrig.host.canmon.source import AnySource, explain_sources, open_any
+from tickrig.host.canmon.source import explain_sources, open_any
 from tickrig.host.canmon.unread import until_unread
 from tickrig.host.canmon.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
@@ -88,7 +88,9 @@ def command(  # noqa: PLR0913 - options
                 paint(
                     frames,
                     take,
-                    lambda *at: model.lines(at[0], frames.lost, *at[1:]),
+                    lambda at_us, width, height: model.lines(
+                        at_us, frames.lost, width, height, frames.unread
+                    ),
                     span_us,
                     model.press,
                 )
@@ -103,12 +105,6 @@ def command(  # noqa: PLR0913 - options
 
 def _meant(model: TopModel, meaning: Meaning) -> Take:
     return lambda heards: model.take_meant(meaning.take(heards))
-
-
-def _lines(
-    model: TopModel, source: AnySource[object], now_us: int, width: int, height: int
-) -> list[str]:
-    return model.lines(now_us, source.lost, width, height)
 
 
 explain_sources(command)

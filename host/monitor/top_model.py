@@ -75,12 +75,13 @@ class TopModel:
         if key in self._acts:
             self._acts[key]()
 
-    def lines(self, now_us: int, lost: int, width: int, height: int) -> list[str]:
+    def lines(self, now_us: int, lost: int, width: int, height: int, unread: int = 0) -> list[str]:
         """Return what a screen shows at a time."""
         self._now_us = now_us
         snapshot, rows = self._held or self._snapshot()
         below = line_table(rows, snapshot.at_us, width)[: height // 2]
-        return render(snapshot, self.view, lost, width, height - len(below)) + below
+        view = replace(self.view, unread=unread)
+        return render(snapshot, view, lost, width, height - len(below)) + below
 
     def final(self, lost: int, snapshot: Snapshot | None = None) -> list[str]:
         """Return the whole table of all that came, or of a snapshot, as plain text."""

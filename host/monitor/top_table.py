@@ -54,6 +54,7 @@ class View:
         bit_rate: of the buses, None if it is not known.
         keys: a line tells the keys.
         meaning: what the latest frame of a row means, shown instead of its bytes.
+        unread: what came and is no frame of classic CAN.
     """
 
     order: Order = Order.ID
@@ -64,6 +65,7 @@ class View:
     bit_rate: int | None = None
     keys: bool = False
     meaning: Callable[[IdRow], str] | None = None
+    unread: int = 0
 
 
 def render(
@@ -107,7 +109,8 @@ def bus_line(bus: BusRow, bit_rate: int | None) -> str:
 
 
 def _state_line(snapshot: Snapshot, view: View, lost: int) -> str:
-    words = [f"lost {lost}", f"{len(snapshot.rows)} identifiers by {view.order}"]
+    words = [f"lost {lost}", *[f"passed over {view.unread}"] * bool(view.unread)]
+    words += [f"{len(snapshot.rows)} identifiers by {view.order}"]
     words += ["held"] * view.held
     keys = KEYS if view.keys else ""
     return ", ".join(words) + keys

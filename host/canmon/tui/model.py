@@ -35,6 +35,7 @@ class Model:
         frames: how many were taken, error frames among them.
         now_us: the time at the source.
         lost: frames that were there and did not get here.
+        unread: what came and is no frame of classic CAN.
         failed: why the source ended before its time; empty if it did not.
         ended: no more will come.
     """
@@ -50,7 +51,7 @@ class Model:
         self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
         self.top = TopModel(bit_rate)
         self.trace = Trace()
-        self.frames = self.now_us = self.lost = 0
+        self.frames = self.now_us = self.lost = self.unread = 0
         self.failed, self.ended = "", False
 
     def take(self, heards: Sequence[Listened]) -> list[Meant]:

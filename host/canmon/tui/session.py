@@ -134,7 +134,8 @@ class Session:
         with self.lock:
             out = self._take([*self._echo, *heards])
             model, source = self.model, self.source
-            model.lost, model.failed, model.ended = source.lost, source.failed, source.ended
+            model.lost, model.unread = source.lost, source.unread
+            model.failed, model.ended = source.failed, source.ended
         for channel, frame in out:
             self._send(channel, frame)
 

@@ -58,7 +58,7 @@ class StatisticsPanel(Panel):
         """Keep the table as wide as the screen, and as long as it is."""
         top = model.top
         top.view = replace(top.view, keys=False)
-        lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED)
+        lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
         heads = next((number for number, line in enumerate(lines, 1) if TITLE in line), 0)
         self._lines = [
             plain(line, "bold") if number < heads else ansi_line(line)

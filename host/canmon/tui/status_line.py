@@ -31,6 +31,7 @@ class Status(NamedTuple):
         frames: taken in all.
         rate: frames in the latest second.
         lost: frames that did not get here.
+        unread: what came and is no frame of classic CAN.
         sent: frames that this program sent.
         trouble: what is wrong; empty if nothing.
         ended: no more will come.
@@ -42,6 +43,7 @@ class Status(NamedTuple):
     frames: int = 0
     rate: int = 0
     lost: int = 0
+    unread: int = 0
     sent: int = 0
     trouble: str = ""
     ended: bool = False
@@ -58,6 +60,7 @@ def status_line(status: Status) -> Line:
         line += [(f" {bus.errors.frames} error frames", WARNING)] if bus.errors.frames else []
     line.append((f"  {status.frames} frames  {status.rate}/s", ""))
     line.append((f"  lost {status.lost}", ALARM if status.lost else ""))
+    line += [(f"  passed over {status.unread}", ALARM)] if status.unread else []
     line += [(f"  sent {status.sent}", "")] if status.sent else []
     line += [(f"  {status.trouble}", ALARM)] if status.trouble else []
     line += [("  end of the log", "")] if status.ended and not status.trouble else []
@@ -97,6 +100,7 @@ class StatusLine(Widget):
             model.frames,
             model.frames - self._counts[0],
             model.lost,
+            model.unread,
             session.sent,
             session.trouble or model.failed,
             model.ended,

@@ -215,6 +215,20 @@ def test_the_status_tells_load_controller_errors_and_rate(tmp_path: Path) -> Non
     on_monitor(session, act)
 
 
+def test_what_is_passed_over_is_told_while_it_comes(tmp_path: Path) -> None:
+    log = tmp_path / "run.log"
+    log.write_text("(0.1) can0 181#01\n(0.2) can0 123##1AA\nwhat?\n", "ascii")
+    session = open_session([str(log)], BusOptions(), Model())
+
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        session.step()
+        assert "1 frames  1/s  lost 0  passed over 2" in status(monitor)
+        await pilot.press("3")
+        assert shown(monitor)[1] == "lost 0, passed over 2, 1 identifiers by id"
+
+    on_monitor(session, act)
+
+
 def test_it_fits_into_any_window(wire: Wire) -> None:
     session = wire_session(wire)
 
