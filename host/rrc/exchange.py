@@ -81,6 +81,10 @@ class Exchange:
         """Whether nothing else may be sent before this is settled."""
         return isinstance(self.command, StableMode | Watchdog)
 
+    def refuses_barrier_too(self, reason: str) -> bool:
+        """Whether this is the refusal of the query behind a command that was refused itself."""
+        return self.refusal is not None and self.has_barrier and reason == self._last
+
     def take(self, answer: Answer) -> bool:
         """Take a line if it belongs here; True if it does."""
         match answer:

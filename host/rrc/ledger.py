@@ -33,7 +33,10 @@ class Ledger:
         """Account for a reply; False if no command awaits it."""
         match reply:
             case Refusal(reason):
-                self.refusals.refused(self._refused_name(reply, exchange), reason)
+                counts = exchange is None or not exchange.refuses_barrier_too(reason)
+                name = self._refused_name(reply, exchange)
+                if counts:
+                    self.refusals.refused(name, reason)
                 return True
             case Ok(name) if self._take_unawaited(name, exchange):
                 return True

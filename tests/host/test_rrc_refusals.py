@@ -195,3 +195,14 @@ def test_renewals_in_between_do_not_hide_that_every_output_is_refused(period_us:
     with pytest.raises(RrcStopped):
         stream(bench, 10, period_us)
     assert bench.link.heard.count(b"ER:") - refused_before == 3
+
+
+def test_a_refused_command_and_the_query_behind_it_are_one_refusal() -> None:
+    bench = standby_bench(stable=True, max_refusals=2)
+    bench.link.spoil = lambda line: {
+        b"speedmode40A\n": b"speedmode60C\n",
+        b"device0\n": b"devicex8\n",
+    }.get(line, line)
+    with pytest.raises(RrcRefused):
+        bench.client.speedmode(4)
+    assert not bench.client.stopped
