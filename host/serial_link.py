@@ -8,6 +8,7 @@ from typing import Final
 import serial
 
 from tickrig.host.errors import LinkClosed
+from tickrig.host.serial_trouble import trouble
 
 NEGOTIATED: Final = ("rfc2217:",)
 """URLs under which each change of a port setting is a dialogue of 100 ms with the other end."""
@@ -22,21 +23,27 @@ class SerialLink:
         url: a device path or pyserial URL: `/dev/ttyACM0`, `COM3`,
             `socket://host:port`, `rfc2217://host:port`, `loop://`.
         baud: bit rate in bit/s, 8N1.
+        exclusive: whether to keep out other programs that ask in the same way, by flock as
+            pyserial's own tools do; of two readers each would get a part.
 
     Raises:
-        LinkClosed: the port cannot be opened.
+        LinkClosed: the port cannot be opened, or another program uses it.
     """
 
-    def __init__(self, url: str, baud: int = 115_200) -> None:
+    def __init__(self, url: str, baud: int = 115_200, *, exclusive: bool = True) -> None:
         self._url, self._negotiated = url, url.startswith(NEGOTIATED)
         wait_s = NEGOTIATED_WAIT_S if self._negotiated else 0
         write_timeout_s = None if self._negotiated else 1  # pyserial has none there
         try:
             self._port = serial.serial_for_url(
-                url, baudrate=baud, timeout=wait_s, write_timeout=write_timeout_s
+                url,
+                baudrate=baud,
+                timeout=wait_s,
+                write_timeout=write_timeout_s,
+                exclusive=exclusive or None,
             )
         except (serial.SerialException, ValueError, OSError) as error:
-            raise LinkClosed(f"cannot open {url!r}: {error}") from error
+            raise LinkClosed(f"cannot open {url!r}: {trouble(url, error)}") from error
 
     @property
     def now_us(self) -> int:

@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import grp
+import os
 import threading
 from collections.abc import Callable, Iterator
 from itertools import islice
+from pathlib import Path
 
 import pytest
 
@@ -38,6 +41,48 @@ def test_a_closed_link_neither_sends_nor_receives() -> None:
 def test_a_port_that_cannot_be_opened_is_named(url: str) -> None:
     with pytest.raises(LinkClosed, match=f"cannot open '{url}'"):
         RrcClient.open(url)
+
+
+def test_a_port_that_another_program_uses_is_refused_with_its_name() -> None:
+    with pty() as port, contextlib.closing(SerialLink(port.path)):
+        with pytest.raises(LinkClosed) as refused:
+            SerialLink(port.path)
+        told = f"cannot open '{port.path}': another program uses it: "
+        assert str(refused.value).startswith(told)
+        assert str(refused.value).endswith(f" (process {os.getpid()})")
+        SerialLink(port.path, exclusive=False).close()
+
+
+def test_a_port_is_free_again_after_it_was_closed() -> None:
+    with pty() as port:
+        SerialLink(port.path).close()
+        SerialLink(port.path).close()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+@pytest.mark.parametrize(
+    ("mode", "remedy"),
+    [
+        (0o660, r"join its group: sudo usermod -aG daemon \$USER, then log in again"),
+        (0o620, "its owner alone may use it"),
+    ],
+)
+def test_a_port_that_is_forbidden_is_told_once_with_the_remedy(mode: int, remedy: str) -> None:
+    with pty() as port:
+        os.chown(port.path, 0, grp.getgrnam("daemon").gr_gid)
+        Path(port.path).chmod(mode)
+        os.seteuid(65_534)
+        try:
+            with pytest.raises(LinkClosed, match=f"': permission denied; {remedy}$"):
+                SerialLink(port.path)
+        finally:
+            os.seteuid(0)
+
+
+def test_a_port_that_is_not_there_is_told_in_few_words() -> None:
+    with pytest.raises(LinkClosed) as refused:
+        SerialLink("/dev/no-such-port")
+    assert str(refused.value) == "cannot open '/dev/no-such-port': No such file or directory"
 
 
 @pytest.mark.realtime
