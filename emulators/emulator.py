@@ -28,6 +28,11 @@ class Outside(Port[bytes], Protocol):
 
     lost: int
 
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, if that is not what the device has."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class LineKind:
@@ -105,6 +110,13 @@ class Emulator(Workbench):
         """Bytes that found a buffer full, on the line or outside."""
         outside = self._outside.lost if self._outside else 0
         return {"lost_bytes": self.line.a.lost + self.line.b.lost + outside}
+
+    def status(self) -> dict[str, str | int]:
+        """Return how the run is going, and what the host has set its port to."""
+        return {
+            **super().status(),
+            "host_setting": self._outside.host_setting if self._outside else "",
+        }
 
     @property
     def lost_bytes(self) -> int:

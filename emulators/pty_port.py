@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import tty
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from tickrig.device.core import NEVER
+from tickrig.emulators.pty_link import PtyLink
+from tickrig.emulators.pty_setting import HostSetting
 
 READ_BYTES: Final = 4_096
 
@@ -20,8 +23,8 @@ class PtyPort:
     after that whole sends are dropped and counted.
 
     Args:
-        link: path of a symbolic link to the terminal; none if not given. A link
-            that is left over from a killed emulator is replaced.
+        link: path of a symbolic link to the terminal, see `PtyLink`; none if not given.
+            One that is left over from a killed emulator is replaced.
         buffer_bytes: bytes kept for a host that does not read.
 
     Attributes:
@@ -29,7 +32,7 @@ class PtyPort:
         lost: bytes dropped because nobody read.
 
     Raises:
-        FileExistsError: `link` exists and is not a dead symbolic link.
+        FileExistsError: `link` exists, and no emulator left it over.
         OSError: no pseudo-terminal is to be had, or no link can be made there.
     """
 
@@ -40,10 +43,11 @@ class PtyPort:
         self.path = os.ttyname(self._slave)
         self.lost = 0
         self._buffer_bytes, self._unsent = buffer_bytes, b""
-        self._link: Path | None = None
+        self._link: PtyLink | None = None
+        self._setting: HostSetting | None = None
         if link is not None:
             try:
-                self._make_link(link)
+                self._link = PtyLink(link, self.path)
             except OSError:
                 self.close()
                 raise
@@ -53,8 +57,19 @@ class PtyPort:
         """Unknown to anybody but the host."""
         return NEVER
 
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        return self._setting.differing if self._setting else ""
+
+    def watch_setting(self, baud: int, tell: Callable[[str], None]) -> None:
+        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`."""
+        self._setting = HostSetting(self._slave, baud, tell)
+
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""
+        if self._setting is not None:
+            self._setting.look(now_us)
         self._flush()
         try:
             return os.read(self._master, READ_BYTES)
@@ -71,9 +86,9 @@ class PtyPort:
 
     def close(self) -> None:
         """Give the pseudo-terminal back and remove the link."""
-        if self._link is not None and self._links_here(self._link):
-            self._link.unlink()
-        self._link = None
+        if self._link is not None:
+            self._link.close()
+        self._link = self._setting = None
         for fd in (self._master, self._slave):
             if fd >= 0:
                 os.close(fd)
@@ -85,12 +100,3 @@ class PtyPort:
                 self._unsent = self._unsent[os.write(self._master, self._unsent) :]
             except BlockingIOError:
                 return
-
-    def _make_link(self, link: Path) -> None:
-        if link.is_symlink() and (self._links_here(link) or not link.exists()):
-            link.unlink()  # left over; the terminal it named may be ours by now
-        link.symlink_to(self.path)
-        self._link = link
-
-    def _links_here(self, link: Path) -> bool:
-        return link.is_symlink() and os.readlink(link) == self.path

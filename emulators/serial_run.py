@@ -37,9 +37,9 @@ class Options(RunOptions):
         return not self.scenario or bool(self.link or self.control or self.panel)
 
 
-def _picocom(link: str) -> str:
-    command = f"picocom -b 115200 --imap lfcrlf --omap crlf --echo {link}"
-    return f" Talk to it with\n  {command}"
+def by_miniterm(link: str, baud: int) -> str:
+    """Say how to talk to a device of lines of text; miniterm comes with pyserial."""
+    return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Kind:
         panel: runs the operator panel until it is left.
         senders: the verbs of its scenarios that send, where the line carries no text.
         line: baud rate, wire faults and the cutting of the log.
-        talk: how a person talks to it at a path, empty if that takes a program.
+        talk: says how to talk to it at a path and a baud rate.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Kind:
     panel: Callable[[Emulator], None] | None = None
     senders: Mapping[str, Sender] | None = None
     line: LineKind = field(default_factory=LineKind)
-    talk: Callable[[str], str] = _picocom
+    talk: Callable[[str, int], str] = by_miniterm
 
 
 class SerialRun(EmulatorRun):
@@ -116,13 +116,19 @@ class SerialRun(EmulatorRun):
     def _open_pty(self, stack: ExitStack) -> PtyPort:
         try:
             pty = PtyPort(self._options.link)
-        except FileExistsError as error:
-            path = error.filename2
-            raise Refused(f"link {path}: exists; remove it if no emulator uses it") from None
         except OSError as error:
             refuse_path("link", error)
         stack.callback(pty.close)
+        pty.watch_setting(self._kind.line.baud, self._tell_setting)
         return pty
+
+    def _tell_setting(self, setting: str) -> None:
+        if not self._options.panel:
+            own = f"{self._kind.line.baud} 8N1"
+            say(
+                f"The host has set its port to {setting}, the device has {own}:"
+                " on a real line they would not understand each other."
+            )
 
     def _open_trace(self) -> TraceFile | None:
         if self._options.trace is None:
@@ -153,7 +159,7 @@ class SerialRun(EmulatorRun):
             return
         click.echo(bench.link)
         control = self._options.control
-        kind, talk = self._kind, self._kind.talk(bench.link)
+        kind, talk = self._kind, self._kind.talk(bench.link, self._kind.line.baud)
         say(f"{kind.title} at {bench.link}, {kind.line.baud} 8N1. Ctrl-C ends.{talk}")
         way = "--control PATH or --panel" if kind.panel else "--control PATH"
         say(

@@ -28,8 +28,9 @@ def emulate(baud: int, options: dict[str, Any]) -> int:
         is_event=_is_event,
         senders=verbs(parameters.address),
         line=LineKind(baud, splitter=frame_splitter, wire=Rs485Line),
-        talk=lambda link: (
+        talk=lambda link, baud: (
             f" Any Modbus RTU master can open this path, as address {parameters.address}."
+            f" To address 1:\n  rh3 goto 1 0 0 --device {link} --baud {baud}"
         ),
     )
     run = SerialRun(kind, Rh3Base(parameters), config_to_trace(parameters), Options(**options))

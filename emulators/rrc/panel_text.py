@@ -166,6 +166,8 @@ def status_line(view: View) -> Text:
     late, lost = int(status.get("late_steps", 0)), int(status.get("lost_bytes", 0))
     text.append(f"   late ticks {late}", style=ON if late else "")
     text.append(f"   lost bytes {lost}", style=ON if lost else "")
+    if setting := status.get("host_setting"):
+        text.append(f"   host at {setting}", style=ON)
     if error := status.get("trace_error"):
         text.append(f"   trace ended: {error}", style="bold red")
     return text

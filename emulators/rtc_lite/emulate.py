@@ -50,7 +50,9 @@ def emulate(  # noqa: PLR0913, PLR0917 - the command line
         is_event=_is_event,
         senders=verbs(device.component, config),
         line=LineKind(baud, LINE_FAULTS, frame_splitter(config)),
-        talk=lambda link: " Its proxy opens this path.",
+        talk=lambda link, baud: (
+            f" Its proxy opens this path:\n  tickrig rtc run SYSTEM.toml --lite NAME={link}@{baud}"
+        ),
     )
     run = SerialRun(kind, device, config_to_trace(node, config), Options(**options))
     return _run(run, node)

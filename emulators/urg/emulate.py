@@ -11,7 +11,7 @@ from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
 from tickrig.emulators.emulator import LineKind
 from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.serial_run import Kind, Options, SerialRun, by_miniterm
 from tickrig.emulators.trace import Mark
 from tickrig.emulators.urg.build import (
     NAME,
@@ -20,8 +20,12 @@ from tickrig.emulators.urg.build import (
     parse_post,
     parse_wall,
 )
+from tickrig.emulators.urg.cli import USB_BAUD
 from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.refused import Refused
+
+USUAL_BAUD: Final = 115_200
+"""What a host sets, which means nothing on USB."""
 
 BUFFER_BYTES: Final = 16_384
 """Room for several whole scans at once."""
@@ -49,8 +53,8 @@ def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> Worl
     return World(around.walls + more, tuple(parse_post(text) for text in posts))
 
 
-def _talk(link: str) -> str:
-    return " Any program that speaks SCIP 2.0 can open this path."
+def _talk(link: str, baud: int) -> str:
+    return by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud)
 
 
 def _is_event(line: WireLine) -> bool:

@@ -202,10 +202,11 @@ def test_the_stick_is_where_it_is(v_pct: int, w_pct: int, row: int, column: int)
 def test_trouble_is_in_the_status_line() -> None:
     status: dict[str, int | str] = {
         **{"link": "/tmp/rrc", "now_us": 1_500_000, "late_steps": 3, "lost_bytes": 4},
-        **{"trace_error": "disk full"},
+        **{"host_setting": "9600 8N1", "trace_error": "disk full"},
     }
     assert panel_text.status_line(View(status=status)).plain == (
-        " /tmp/rrc   1.5 s   late ticks 3   lost bytes 4   trace ended: disk full"
+        " /tmp/rrc   1.5 s   late ticks 3   lost bytes 4   host at 9600 8N1"
+        "   trace ended: disk full"
     )
     assert panel_text.status_line(View()).plain == "    0.0 s   late ticks 0   lost bytes 0"
 

@@ -4,10 +4,12 @@ import os
 import select
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+import serial
 
 from tickrig.device.core import NEVER
 from tickrig.emulators.bridge import Bridge
@@ -99,6 +101,102 @@ def test_a_dead_link_is_replaced(target: str, tmp_path: Path) -> None:
     link.symlink_to(target)
     with opened(link) as (port, _):
         assert os.readlink(link) == port.path
+
+
+@contextmanager
+def terminal_of_somebody() -> Iterator[str]:
+    ends = os.openpty()
+    try:
+        yield os.ttyname(ends[1])
+    finally:
+        for end in ends:
+            os.close(end)
+
+
+def test_a_link_of_a_killed_emulator_is_replaced_though_its_terminal_is_anothers(
+    tmp_path: Path,
+) -> None:
+    link = tmp_path / "tty"
+    with terminal_of_somebody() as taken:
+        link.symlink_to(taken)
+        (tmp_path / ".tty.emulator").write_text(f"123 {taken}\n")
+        with opened(link) as (port, _):
+            assert os.readlink(link) == port.path
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_to_another_terminal_than_the_noted_one_stays(tmp_path: Path) -> None:
+    link = tmp_path / "tty"
+    with terminal_of_somebody() as taken:
+        link.symlink_to(taken)
+        (tmp_path / ".tty.emulator").write_text("123 /dev/pts/99999\n")
+        with pytest.raises(FileExistsError, match="exists; remove it if no emulator uses it"):
+            PtyPort(link)
+        assert os.readlink(link) == taken
+
+
+def test_a_link_in_use_is_refused_with_the_process_that_uses_it(tmp_path: Path) -> None:
+    link = tmp_path / "tty"
+    with opened(link) as (port, _):
+        used = rf"another emulator uses it \(process {os.getpid()}\): '{link}'"
+        with pytest.raises(FileExistsError, match=used):
+            PtyPort(link)
+        assert os.readlink(link) == port.path
+
+
+def test_a_folder_without_room_for_a_link_is_named(tmp_path: Path) -> None:
+    link = tmp_path / "missing" / "tty"
+    with pytest.raises(FileNotFoundError, match=str(link)):
+        PtyPort(link)
+
+
+def settings_told(
+    baud: int, host_baud: int, bits: int = 8, parity: str = "N", stops: int = 1
+) -> list[str]:
+    """Return what a port of this rate tells of a host with this setting."""
+    told: list[str] = []
+    with closing(PtyPort()) as port:
+        port.watch_setting(baud, told.append)
+        port.poll(0)
+        with serial.Serial(port.path, host_baud, bits, parity, stops):
+            for now_us in range(1_000_000, 3_000_000, 10_000):
+                port.poll(now_us)
+            told.append(port.host_setting)
+    return told
+
+
+def test_a_host_that_is_set_as_the_device_is_fine() -> None:
+    assert settings_told(115_200, 115_200) == [""]
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ((9_600,), "9600 8N1"),
+        ((115_200, 8, "N", 2), "115200 8N2"),
+        ((115_200, 8, "O"), "115200 8O1"),
+        ((12_345,), "another rate, 8N1"),
+        # The kernel's pseudo-terminals drop the size and even parity.
+        ((9_600, 7, "E"), "9600 8N1"),
+    ],
+)
+def test_another_setting_is_told_once(setting: tuple[Any, ...], told: str) -> None:
+    assert settings_told(115_200, *setting) == [told, told]
+
+
+def test_a_rate_without_a_name_is_not_judged() -> None:
+    assert settings_told(12_000_000, 9_600) == [""]
+
+
+def test_each_setting_is_told_once_and_the_present_one_is_known() -> None:
+    told: list[str] = []
+    with closing(PtyPort()) as port:
+        port.watch_setting(57_600, told.append)
+        for number, baud in enumerate((9_600, 57_600, 9_600, 19_200), 1):
+            with serial.Serial(port.path, baud):
+                port.poll(number * 1_000_000)
+            assert port.host_setting == ("" if baud == 57_600 else f"{baud} 8N1")
+    assert told == ["9600 8N1", "19200 8N1"]
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, Path.touch, lambda path: path.symlink_to("/")])

@@ -100,7 +100,7 @@ def test_a_host_talks_to_it_while_somebody_presses_its_buttons(tmp_path: Path) -
         *("* state Standby", "< EV:PowerOnSuccess", "* state Output"),
         *("! stick_v_pct=100", "! stick_w_pct=-20"),
     ]
-    assert f"picocom -b 115200 --imap lfcrlf --omap crlf --echo {child.link}" in err
+    assert f"\n  python -m serial.tools.miniterm --eol LF -e {child.link} 115200\n" in err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -137,7 +137,8 @@ def test_a_second_one_at_the_same_place_refuses_to_start(tmp_path: Path) -> None
     with running(tmp_path) as child:
         code, out, err = Child(tmp_path).end(signal.SIGCONT)
         assert (code, out) == (2, "")
-        assert err == f"Error: link {child.link}: exists; remove it if no emulator uses it\n"
+        used = f"another emulator uses it (process {child.process.pid})"
+        assert err == f"Error: link {child.link}: {used}\n"
         words = [sys.executable, "-c", PROGRAM, "--control", str(child.control)]
         second = subprocess.run(words, capture_output=True, text=True, check=False)
         assert second.returncode == 2

@@ -116,7 +116,7 @@ class TcpPort:
     """A `Port[bytes]` that takes one connection on the loopback interface."""
 
     due_us = NEVER
-    lost = 0
+    lost, host_setting = 0, ""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(("127.0.0.1", 0))
