@@ -25,6 +25,7 @@ class Connections:
     def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], note: Note) -> None:
         self._manager, self._note = manager, note
         self.wanted = list(wanted)
+        self._refused = set[str]()
 
     @property
     def all(self) -> tuple[RtConnection, ...]:
@@ -36,9 +37,10 @@ class Connections:
         """Make those whose ports are there; one that cannot be is wanted no more."""
         for entry in tuple(self.wanted):
             try:
-                self._manager.port(entry.source)
-                self._manager.port(entry.target)
-            except RtcRefused:
+                if not are_there(self._manager, entry):
+                    continue
+            except RtcRefused as error:
+                self._refuse(str(error))
                 continue
             self.wanted.remove(entry)
             self._connect(entry)
@@ -57,6 +59,12 @@ class Connections:
         self.wanted = [entry for entry in self.wanted if entry not in waiting]
         return bool(waiting)
 
+    def _refuse(self, text: str) -> None:
+        """Tell once of a port that is not there; another boot of its device may bring it."""
+        if text not in self._refused:
+            self._refused.add(text)
+            self._note(EventKind.CONNECTION_REFUSED, 0, text)
+
     def _connect(self, entry: RtConnection) -> None:
         ends = f"{entry.source} to {entry.target}"
         try:
@@ -65,6 +73,15 @@ class Connections:
             self._note(EventKind.CONNECTION_REFUSED, 0, str(error))
         else:
             self._note(EventKind.CONNECTED, 0, ends)
+
+
+def are_there(manager: Manager, entry: RtConnection) -> bool:
+    """Say whether both components are there; RtcRefused if one that is has no such port."""
+    names = {component.instance_name for component in manager.components}
+    ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
+    for end in ends:
+        manager.port(end)
+    return len(ends) == 2
 
 
 def _entry(profile: ConnectorProfile) -> RtConnection:

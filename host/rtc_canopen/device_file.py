@@ -25,6 +25,7 @@ class DeviceFile:
 
     Attributes:
         identity: values of `IDENTITY` that the file gives.
+        defaults: bytes of the power-on values that it gives; a node-ID is not added.
         data_types: data type by index and sub-index.
         pdos: communication parameters that it has.
         findings: what is wrong in the file, whose objects are then not used.
@@ -33,6 +34,7 @@ class DeviceFile:
     identity: Mapping[tuple[int, int], int]
     data_types: Mapping[tuple[int, int], int]
     pdos: tuple[int, ...]
+    defaults: Mapping[tuple[int, int], bytes]
     findings: tuple[Finding, ...] = ()
 
 
@@ -44,14 +46,15 @@ def read_device_file(path: Path) -> DeviceFile:
     """
     device, findings = _read(path)
     defaults = {
-        (row.index, row.sub): int.from_bytes(row.default, "little")
+        (row.index, row.sub): row.default
         for row in device.entries
         if row.default is not None and row.data_type.is_integer
     }
     return DeviceFile(
-        {key: defaults[key] for key in IDENTITY if key in defaults},
+        {key: int.from_bytes(defaults[key], "little") for key in IDENTITY if key in defaults},
         {(row.index, row.sub): row.data_type for row in device.entries},
         tuple(index for index in device.objects if index in RPDOS or index in TPDOS),
+        defaults,
         findings,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from tickrig.host.canopen.dialogue import Failure, Job
 from tickrig.host.rtc_canopen.boot import set_pdo
@@ -68,20 +68,13 @@ class Links:
         """Return a PDO of a node that is ready; ServerRefused if it has none."""
         if name.node not in self._nodes or not self._ready(name.node):
             raise ServerRefused(f"node {name.node} is not ready")
-        for layout in self._nodes[name.node].layouts:
-            if layout.index == name.index:
-                return layout
-        raise ServerRefused(f"{name} is off, or not there")
+        return find_layout(name, self._nodes[name.node].layouts)
 
     def _ready(self, node_id: int) -> bool:
         return self._nodes[node_id].phase is Phase.READY
 
     def _check(self, link: PdoLink) -> None:
-        source, target = self.layout(link.source), self.layout(link.target)
-        if source.bits != target.bits:
-            raise ServerRefused(
-                f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
-            )
+        check_lengths(link, self.layout(link.source), self.layout(link.target))
 
     def _make(self, now_us: int, link: PdoLink) -> None:
         """Give the RPDO the COB-ID of the TPDO."""
@@ -106,3 +99,19 @@ class Links:
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
         node.run(now_us, Job("link", script, done, failed, moves=False))
+
+
+def find_layout(name: PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
+    """Return that of a PDO; ServerRefused if it is off."""
+    for layout in layouts:
+        if layout.index == name.index:
+            return layout
+    raise ServerRefused(f"{name} is off, or not there")
+
+
+def check_lengths(link: PdoLink, source: PdoLayout, target: PdoLayout) -> None:
+    """Raise ServerRefused if what one sends is not as long as what the other takes."""
+    if source.bits != target.bits:
+        raise ServerRefused(
+            f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
+        )

@@ -72,6 +72,7 @@ class ServedNode:
         house: the server.
 
     Attributes:
+        entry, file, writes: as given.
         phase: how far it has come.
         heard_us: when it was heard last.
         lost: its heartbeat is late.
@@ -91,7 +92,7 @@ class ServedNode:
         remove_us: int,
         house: House,
     ) -> None:
-        self.entry, self._file, self._writes, self._house = entry, file, writes, house
+        self.entry, self.file, self.writes, self._house = entry, file, writes, house
         self._remove_us, self._consumer_us = remove_us, 3_000 * entry.heartbeat_ms
         self.dialogue = Dialogue(entry.id, self._send)
         self.operations = Operations(entry, self.dialogue, house.note)
@@ -258,7 +259,7 @@ class ServedNode:
         self.dialogue.clear()
         if first is not None:
             self.operations.say(first)
-        script = boot(self.entry, self._file, self._writes)
+        script = boot(self.entry, self.file, self.writes)
         job = Job("boot", script, self._booted, self._not_booted)
         self.dialogue.start(self.operations.now_us, job)
 

@@ -61,7 +61,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     server = read_server(file, options.pop("components"))
     definition = server.definition
     if options.pop("check"):
-        click.echo(f"{file}: {len(definition.nodes)} nodes, no mistake found")
+        _check(file, server)
         return
     log, quiet, start = (options.pop(name) for name in ("log", "quiet", "start"))
     with ExitStack() as stack:
@@ -74,6 +74,14 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         if start:
             server.start()
         _run(server, link, span_us)
+
+
+def _check(file: Path, server: Server) -> None:
+    from tickrig.host.rtc_canopen.paper_check import check_on_paper  # noqa: PLC0415
+
+    if mistakes := check_on_paper(server):
+        raise Refused("\n".join(f"{file}: {mistake}" for mistake in mistakes))
+    click.echo(f"{file}: {len(server.nodes)} nodes, no mistake found")
 
 
 def _run(server: Server, link: StampedLink, span_us: int) -> None:
