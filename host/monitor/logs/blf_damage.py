@@ -83,9 +83,8 @@ def _content(body: bytes) -> bytes | None:
 def _count(data: bytes) -> tuple[int, bytes]:
     """Return how many objects are whole, and the bytes behind them."""
     count = at = 0
-    while (begin := data.find(_SIGNATURE, at, at + _SEARCHED)) >= 0 and len(
-        data
-    ) - begin >= _OBJECT.size:
+    last = len(data) - _OBJECT.size
+    while 0 <= (begin := data.find(_SIGNATURE, at, at + _SEARCHED)) <= last:
         size = _OBJECT.unpack_from(data, begin)[3]
         if size < _OBJECT.size or begin + size > len(data):
             break

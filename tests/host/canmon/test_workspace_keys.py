@@ -1,6 +1,8 @@
 from __future__ import annotations
 
-from tickrig.host.canmon.workspace import Workspace
+import pytest
+
+from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 
 
 def test_a_key_that_is_none_is_taken_out_wherever_it_stands() -> None:
@@ -13,3 +15,8 @@ def test_a_key_that_is_none_is_taken_out_wherever_it_stands() -> None:
     }
     workspace.put("t", {"row": [{"send": "081#"}, {"send": "082#", "every": None}]})
     assert workspace.section("t")["row"][1] == {"send": "082#"}
+
+
+def test_tables_that_are_there_twice_are_refused() -> None:
+    with pytest.raises(WorkspaceError, match="item"):
+        Workspace("[t]\n[[t.item]]\na = 1\n[u]\n[t.item.x]\n")
