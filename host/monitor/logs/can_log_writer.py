@@ -11,8 +11,9 @@ from typing import Any, Final
 import can
 
 from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.logs.asc_writer import AscWriter
 from tickrig.host.monitor.logs.can_heard import to_can
-from tickrig.host.monitor.logs.can_writers import AscWriter, BlfWriter, TrcWriter
+from tickrig.host.monitor.logs.can_writers import BlfWriter, TrcWriter
 from tickrig.host.monitor.logs.log_format import COMPRESSED, LogFormat
 from tickrig.host.monitor.logs.log_reader import LogError
 from tickrig.host.monitor.logs.log_writer import create

@@ -138,6 +138,15 @@ def test_a_log_that_starts_early_in_a_second_is_not_shifted(start_us: int, tmp_p
         assert [round(message.timestamp * 1e6) for message in reader] == times
 
 
+def test_an_asc_log_is_dated_by_its_first_frame_not_by_its_writing(tmp_path: Path) -> None:
+    assert through(tmp_path, "run.asc", [START_US]) == [START_US]
+    date, *_, block, start, _, _ = (tmp_path / "run.asc").read_text("ascii").splitlines()
+    assert date.removeprefix("date ") == block.removeprefix("Begin Triggerblock ")
+    assert start == "   0.000000 Start of measurement"
+    write_log(tmp_path / "empty.asc").close()
+    assert list(read_log(tmp_path / "empty.asc")) == []
+
+
 @pytest.fixture
 def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with monkeypatch.context() as patched:
