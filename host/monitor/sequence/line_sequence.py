@@ -39,6 +39,8 @@ def parse_lines(text: str, file: str) -> Sequence:
                 steps += _line(content, number)
         except (ValueError, WireError) as error:
             raise SequenceError(f"{file}:{number}: {error}") from None
+    if not steps:
+        raise SequenceError(f"{file}:1: no frame, as '+10 123#DEADBEEF'")
     if times == FOREVER and not any(isinstance(step, Wait) and step.wait_us for step in steps):
         raise SequenceError(f"{file}:1: loop forever takes no time: write +10 before a frame")
     return Sequence((Repeat((1,), times, tuple(steps)),), partial(_place, file))

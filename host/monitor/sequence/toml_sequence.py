@@ -89,7 +89,7 @@ class TomlSequence:
         try:
             self._variables = {**self._vars(top.get("vars", {})), **self._given}
             _check_keys(top, _TOP, ())
-            if "step" not in top:
+            if not top.get("step"):
                 raise _Wrong((), "no [[step]]")
             steps = self._steps(top["step"], ("step",))
         except _Wrong as error:

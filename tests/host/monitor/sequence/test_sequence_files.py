@@ -25,6 +25,7 @@ def refused(text: str) -> str:
     ("text", "said"),
     [
         ("", "a.toml:1: no [[step]]"),
+        ("step = []\n", "a.toml:1: no [[step]]"),
         ("[[step]]\nsend = \n", "a.toml:2: Invalid value"),
         ('[[step]]\nsend = "080#', "a.toml:2: "),
         ('\n[[step]]\nsend = "080"\n', "a.toml:3: '080' is not a frame like 705#7F"),
@@ -65,6 +66,8 @@ def test_a_mistake_is_told_with_its_line(text: str, said: str) -> None:
         ("+1 080#\nloop 2\n", "a.seq:2: loop stands before the first frame"),
         ("loop 0\n+1 080#\n", "a.seq:1: loop takes 1 or more, or forever; got 0"),
         ("loop forever\n+0 080#\n", "a.seq:1: loop forever takes no time"),
+        ("", "a.seq:1: no frame, as '+10 123#DEADBEEF'"),
+        ("loop 3  # times nothing\n", "a.seq:1: no frame"),
         ("+1 FFF#\n", "a.seq:1: CAN-ID 0xFFF is not 11-bit"),
     ],
 )
