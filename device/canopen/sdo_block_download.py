@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.canopen.download_size import DownloadSize
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.crc import crc16
 from tickrig.wire.canopen.sdo_command import (
@@ -42,12 +43,9 @@ class BlockDownload:
         self._server, self._entry = server, entry
         self._data, self._in_sequence, self._finished = bytearray(), 0, False
         self._crc = request[0] & BLOCK_CRC
-        entry.check_writable()
-        self._size: int | None = None
-        self._most = entry.size or entry.max_bytes
-        if request[0] & BLOCK_SIZE_INDICATED:
-            self._size = self._most = int.from_bytes(request[4:], "little")
-            entry.check_size(self._size)
+        indicated = request[0] & BLOCK_SIZE_INDICATED
+        announced = int.from_bytes(request[4:], "little") if indicated else None
+        self._size = DownloadSize(server, entry, announced)
         self._block_size = server.block_size
         command = ServerCommand.BLOCK_DOWNLOAD | self._crc
         server.confirm(command, bytes([self._block_size, 0, 0, 0]))
@@ -71,8 +69,7 @@ class BlockDownload:
 
     def _acknowledge(self) -> None:
         """Say how far the block was received, and begin the next."""
-        if len(self._data) > self._most + SEGMENT_BYTES:
-            raise SdoAbort(AbortCode.TOO_LONG)
+        self._size.check(len(self._data) - SEGMENT_BYTES)
         self._block_size = self._server.block_size
         head = bytes([BLOCK_ACKNOWLEDGE, self._in_sequence, self._block_size])
         self._server.respond(head + bytes(5))
@@ -85,9 +82,9 @@ class BlockDownload:
             self._server.initiate(request)
             return
         data = bytes(self._data[: len(self._data) - (request[0] >> 2 & 7)])
-        size = len(data) if self._size is None else self._size
-        if len(data) != size:
-            raise SdoAbort(AbortCode.TOO_LONG if len(data) > size else AbortCode.TOO_SHORT)
+        self._size.check(len(data))
+        if len(data) < (self._size.announced or 0):
+            raise SdoAbort(AbortCode.TOO_SHORT)
         if self._crc and crc16(data) != int.from_bytes(request[1:3], "little"):
             raise SdoAbort(AbortCode.CRC)
         self._entry.download(data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.canopen.download_size import DownloadSize
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.sdo_command import (
     FRAME_BYTES,
@@ -56,12 +57,8 @@ class SegmentedDownload:
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
         self._server, self._entry = server, entry
         self._data, self._toggle = bytearray(), 0
-        entry.check_writable()
-        self._size: int | None = None
-        self._most = entry.size or entry.max_bytes
-        if request[0] & SIZE_INDICATED:
-            self._size = self._most = int.from_bytes(request[4:], "little")
-            entry.check_size(self._size)
+        announced = int.from_bytes(request[4:], "little") if request[0] & SIZE_INDICATED else None
+        self._size = DownloadSize(server, entry, announced)
         server.confirm(ServerCommand.DOWNLOAD)
         server.wait(self._segment)
 
@@ -74,8 +71,7 @@ class SegmentedDownload:
         if command & TOGGLE != self._toggle:
             raise SdoAbort(AbortCode.TOGGLE_BIT)
         self._data += request[1 : FRAME_BYTES - (command >> 1 & 7)]
-        if len(self._data) > self._most:
-            raise SdoAbort(AbortCode.TOO_LONG)
+        self._size.check(len(self._data))
         if command & LAST:
             self._commit()
         self._server.respond(bytes([ServerCommand.DOWNLOAD_SEGMENT | self._toggle]) + bytes(7))
@@ -87,6 +83,6 @@ class SegmentedDownload:
 
     def _commit(self) -> None:
         """Write all that came; SdoAbort if it is too little, or the object refuses."""
-        if self._size is not None and len(self._data) < self._size:
+        if len(self._data) < (self._size.announced or 0):
             raise SdoAbort(AbortCode.TOO_SHORT)
         self._entry.download(bytes(self._data))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.sdo_block_download import BlockDownload
 from tickrig.device.canopen.sdo_block_upload import BlockUpload
+from tickrig.device.canopen.sdo_limits import SdoLimits
 from tickrig.device.canopen.sdo_segmented import SegmentedDownload, SegmentedUpload
 from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
@@ -28,9 +29,6 @@ from tickrig.wire.canopen.sdo_command import (
 if TYPE_CHECKING:
     from tickrig.device.canopen.entry import Entry
     from tickrig.device.canopen.slave import CanopenSlave
-
-TIMEOUT_US: Final = 5_000_000
-"""Silence of the client after which a transfer is aborted; CiA 301 leaves it to the device."""
 
 State = Callable[[bytes], None]
 """What the next request means; a transfer is in one of these at a time."""
@@ -63,6 +61,7 @@ class SdoServer:
     Args:
         node: the slave.
         wake: asks for a look at `due_us` at that time.
+        limits: what CiA 301 leaves to the device.
 
     Attributes:
         request_id: CAN-ID from client to server.
@@ -71,8 +70,8 @@ class SdoServer:
         due_us: when the transfer times out.
     """
 
-    def __init__(self, node: CanopenSlave, wake: Callable[[int], None]) -> None:
-        self.node, self._wake = node, wake
+    def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
+        self.node, self._wake, self._limits = node, wake, limits
         self.request_id = self.response_id = 0
         self.block_size = MAX_BLOCK_SIZE
         self._entries = node.dictionary.by_multiplexer
@@ -107,8 +106,13 @@ class SdoServer:
     def wait(self, state: State) -> None:
         """Let the transfer wait for a request, but not for ever."""
         self._state = state
-        self.due_us = self.node.now_us + TIMEOUT_US
+        self.due_us = self.node.now_us + self._limits.timeout_us
         self._wake(self.due_us)
+
+    def free_bytes(self, entry: Entry) -> int:
+        """Return what a string or domain may hold beside all others."""
+        others = (one for one in self.node.dictionary if not one.size and one is not entry)
+        return self._limits.memory_bytes - sum(len(one.data) for one in others)
 
     def end(self) -> None:
         """End the transfer."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.cob_id_rules import cob_id_guard, is_valid
 from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.sdo_server import SdoServer
 from tickrig.device.canopen.service import ALIVE, Handler, Service
 from tickrig.device.core import NEVER
@@ -59,12 +60,12 @@ class SdoServers(Service):
         default: the server of 1200h.
     """
 
-    def __init__(self, node: CanopenSlave, slot: int) -> None:
+    def __init__(self, node: CanopenSlave, slot: int, limits: SdoLimits = USUAL) -> None:
         super().__init__(node, slot)
         self._due_us = NEVER
-        self.default = SdoServer(node, self._wake)
+        self.default = SdoServer(node, self._wake, limits)
         self._additional = [
-            _Additional(SdoServer(node, self._wake), request, response)
+            _Additional(SdoServer(node, self._wake, limits), request, response)
             for index in ADDITIONAL_SERVERS
             if (request := node.dictionary.find(index, CLIENT_TO_SERVER))
             and (response := node.dictionary.find(index, SERVER_TO_CLIENT))

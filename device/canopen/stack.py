@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.application import Application
@@ -19,6 +20,7 @@ from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.parameter_store import ParameterStore
 from tickrig.device.canopen.pdo_consumer import PdoConsumer
 from tickrig.device.canopen.pdo_producer import PdoProducer
+from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.sdo_servers import SdoServers
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.sync import Sync
@@ -50,6 +52,7 @@ def make_slave(
     node_id: int,
     nonvolatile: Nonvolatile | None = None,
     application: ServiceMaker = Application,
+    sdo: SdoLimits = USUAL,
 ) -> CanopenSlave:
     """Make a slave with every service that its dictionary has objects for.
 
@@ -58,6 +61,11 @@ def make_slave(
         node_id: 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: what it kept from an earlier life.
         application: what the device does with its objects: a device profile, or nothing.
+        sdo: what its SDO servers put up with.
     """
-    services = tuple(application if make is Application else make for make in SERVICES)
+    own: dict[ServiceMaker, ServiceMaker] = {
+        Application: application,
+        SdoServers: partial(SdoServers, limits=sdo),
+    }
+    services = tuple(own.get(make, make) for make in SERVICES)
     return CanopenSlave(dictionary, node_id, services, nonvolatile)

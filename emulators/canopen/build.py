@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
@@ -77,7 +78,10 @@ def describe_device(name: str) -> DeviceDescription:
 
 
 def make_nodes(
-    described: Iterable[Described], wire: CanWire, store: StoreFile | None = None
+    described: Iterable[Described],
+    wire: CanWire,
+    store: StoreFile | None = None,
+    sdo: SdoLimits = USUAL,
 ) -> list[Node]:
     """Make the nodes, with what they stored in an earlier life."""
     nodes = []
@@ -85,7 +89,7 @@ def make_nodes(
         description = item.description
         dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
-        slave = make_slave(dictionary, item.node_id, memory, description.application)
+        slave = make_slave(dictionary, item.node_id, memory, description.application, sdo)
         nodes.append(Node(item.name, slave, wire))
     return nodes
 

@@ -61,6 +61,18 @@ def complete_node(
 )
 @bus_options
 @click.option("--store", type=PATH, help="File for what is stored by 1010h and LSS.")
+@click.option(
+    "--sdo-timeout",
+    default="5s",
+    metavar="TIME",
+    help="Silence of a client after which an SDO transfer is aborted.  [5s]",
+)
+@click.option(
+    "--sdo-memory",
+    default="64M",
+    metavar="SIZE",
+    help="What the strings and domains of a node hold together, as 4096, 64k, 16M.  [64M]",
+)
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
 @run_options("drop, corrupt, duplicate, delay, babble, short")
 @click.pass_context

@@ -8,13 +8,16 @@ from typing import Any, Final
 
 import click
 
+from tickrig.device.canopen.sdo_limits import SdoLimits
 from tickrig.emulators.canopen.build import describe_device
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.rtc import one_line_for
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.size import parse_size
 from tickrig.wire.canopen.eds_writer import write_eds as format_eds
 
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
@@ -32,7 +35,8 @@ def emulate(
     bus = BusOptions(**{name: options.pop(name) for name in BUS_FIELDS})
     file = RigFile(()) if rig is None else read_rig(rig)
     specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
-    run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, **options))
+    sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
+    run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, sdo=sdo, **options))
     with one_line_for(spec.device for spec in specs):
         return run.run()
 
@@ -50,6 +54,13 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
         path.write_text(text, "utf-8", newline="\n")
     except OSError as error:
         refuse_path("EDS", error)
+
+
+def _sdo_limits(timeout: str, memory: str) -> SdoLimits:
+    try:
+        return SdoLimits(parse_time_us(timeout), parse_size(memory))
+    except ValueError as error:
+        raise Refused(f"--sdo-timeout, --sdo-memory: {error}") from None
 
 
 def _specs(given: Mapping[str, Path | str | None], node_id: str | None) -> Iterator[NodeSpec]:

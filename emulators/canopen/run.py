@@ -9,6 +9,7 @@ from typing import Final
 
 import click
 
+from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
 from tickrig.emulators.can_emulator import CanEmulator
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump_file import CandumpFile
@@ -45,6 +46,7 @@ class CanopenOptions(RunOptions):
         profile: of nodes of files; see `choices.PROFILES`.
         bus: the bus outside.
         store: file in which nodes keep what 1010h and LSS store.
+        sdo: what the SDO servers of all nodes put up with.
     """
 
     specs: tuple[NodeSpec, ...] = ()
@@ -52,6 +54,7 @@ class CanopenOptions(RunOptions):
     profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
     store: Path | None = None
+    sdo: SdoLimits = USUAL
 
     @property
     def in_real_time(self) -> bool:
@@ -91,7 +94,7 @@ class CanopenRun(EmulatorRun):
             outside, link, self._channel = open_bus(self._options.bus, stack)
         wire = self._make_wire()
         store = self._open_store()
-        nodes = make_nodes(self._described, wire, store)
+        nodes = make_nodes(self._described, wire, store, self._options.sdo)
         trace = self._open_trace(wire)
         bench = make_bench(
             wire,

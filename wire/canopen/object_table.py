@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType, Value
 
-MAX_VARIABLE_BYTES: Final = 65_536
-"""What a string or domain holds unless its description says less."""
+MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
+"""What a string or domain holds unless its description says less: all that SDO can carry."""
 
 
 class Access(Flag):

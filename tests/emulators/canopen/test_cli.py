@@ -133,6 +133,19 @@ def test_an_eds_that_cannot_be_used_says_all_that_is_wrong(tmp_path: Path) -> No
     ]
 
 
+def test_sdo_servers_have_the_limits_that_are_asked_for() -> None:
+    result = play(
+        "1ms send 605#2107200009000000\n90ms end\n",
+        *("--eds", EDS, "--node-id", "5", "--sdo-timeout", "50ms"),
+    )
+    assert "585#8007200000000405" in frames(result)
+    result = play(
+        "1ms send 605#2107200009000000\n9ms end\n",
+        *("--eds", EDS, "--node-id", "5", "--sdo-memory", "8"),
+    )
+    assert "585#8007200005000405" in frames(result)
+
+
 def test_a_rig_file_names_the_nodes(tmp_path: Path) -> None:
     eds = ROOT / EDS
     rig = tmp_path / "rig.toml"
@@ -223,6 +236,9 @@ def test_lss_finds_a_node_without_node_id() -> None:
         (f"--eds {EDS} --node-id 128", "--node-id: a node-ID is 1..127, a range as 1-20, or lss"),
         (f"--eds {EDS} --node-id five", "--node-id: a node-ID is 1..127"),
         (f"--node 9-5={EDS}", f"--node 9-5={EDS}: a node-ID is 1..127"),
+        (f"--eds {EDS} --node-id 5 --sdo-timeout soon", "'soon' is not a time"),
+        (f"--eds {EDS} --node-id 5 --sdo-timeout 0", "an SDO time-out of 0 us is less than 1 us"),
+        (f"--eds {EDS} --node-id 5 --sdo-memory much", "'much' is not a size"),
         ("--node 5=", "--node 5=: give ID=FILE or ID=MODEL, as 5=a.eds"),
         (f"--node 5={EDS} --node 4-6={EDS}", f"node 5 is there twice: {EDS}, {EDS}"),
         ("--eds nowhere.eds --node-id 5", "file nowhere.eds: No such file or directory"),
