@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.device.core import NEVER
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.emulated import look_at
 from tickrig.emulators.fault_spec import parse_fault_spec
@@ -14,6 +15,8 @@ from tickrig.emulators.workbench import Workbench
 from tickrig.host.cli.setting import Setting
 
 MAX_LINES: Final = 100
+MAX_PRESS_US: Final = 10**15
+"""As long as a command line can say."""
 
 
 class Control(Requests):
@@ -82,7 +85,7 @@ class Control(Requests):
         return {}
 
     def _press(self, request: Object) -> Object:
-        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us")
+        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, MAX_PRESS_US)
         emulator = self._emulator
         emulator.operator.press(emulator.touch_us, text_of(request, "name"), duration_us)
         return {}
@@ -97,7 +100,7 @@ class Control(Requests):
         return {}
 
     def _lines(self, request: Object) -> Object:
-        since = whole(request.get("since", 0), "since")
+        since = whole(request.get("since", 0), "since", 0, NEVER)
         return {
             "lines": [
                 {"number": x.number, "at_us": x.at_us, "mark": x.mark, "text": escape(x.data)}

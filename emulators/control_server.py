@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -15,9 +17,12 @@ MAX_LINE: Final = 4_096
 MAX_CLIENTS: Final = 32
 MAX_UNSENT: Final = 262_144
 READ_BYTES: Final = 4_096
+IDLE_S: Final = 60.0
+"""A client that is silent so long makes room for another where none is left."""
 
 TOO_LONG: Final = refusal_line(f"the line is longer than {MAX_LINE} bytes")
 TOO_MANY: Final = refusal_line(f"there are {MAX_CLIENTS} clients already")
+IDLE: Final = refusal_line(f"silent for {IDLE_S:g} s, and {MAX_CLIENTS} clients are the most")
 
 
 class ControlServer:
@@ -29,16 +34,19 @@ class ControlServer:
     Args:
         path: where the socket is; that of a killed process is replaced.
         control: answers the requests.
+        clock: monotonic time in seconds.
 
     Raises:
         FileExistsError: somebody listens there, or something else.
         OSError: no socket can be made there.
     """
 
-    def __init__(self, path: Path, control: Requests) -> None:
+    def __init__(
+        self, path: Path, control: Requests, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._listener = listen_at(path)
         self._path, self._inode = path, path.stat().st_ino
-        self._control = control
+        self._control, self._clock = control, clock
         self._clients: dict[socket.socket, _Client] = {}
 
     def serve(self, wait_us: int) -> None:
@@ -50,12 +58,14 @@ class ControlServer:
         ready = select.select([self._listener, *readers], writers, [], wait_us / 1e6)
         for connection in ready[1]:
             self._clients[connection].flush()
+            self._clients[connection].active_s = self._clock()
         for connection in ready[0]:
-            if connection is self._listener:
-                self._accept()
-            else:
+            if connection is not self._listener:
                 self._clients[connection].read()
+                self._clients[connection].active_s = self._clock()
         self._answer()
+        if self._listener in ready[0]:
+            self._accept()
 
     def close(self) -> None:
         """Send what can be sent, hang up, and remove the socket."""
@@ -74,11 +84,19 @@ class ControlServer:
         except OSError:  # the client is gone again, or no descriptor is left
             return
         connection.setblocking(False)
+        if len(self._clients) == MAX_CLIENTS:
+            self._make_room()
         if len(self._clients) < MAX_CLIENTS:
-            self._clients[connection] = _Client(connection)
+            self._clients[connection] = _Client(connection, self._clock())
             return
-        with connection, contextlib.suppress(OSError):
-            connection.send(TOO_MANY)
+        _dismiss(connection, TOO_MANY)
+
+    def _make_room(self) -> None:
+        """Hang up on the client that has been silent the longest, if that was long."""
+        client = min(self._clients.values(), key=lambda client: client.active_s)
+        if self._clock() - client.active_s >= IDLE_S:
+            del self._clients[client.connection]
+            _dismiss(client.connection, b"" if client.has_unsent else IDLE)
 
     def _answer(self) -> None:
         for client in list(self._clients.values()):
@@ -90,11 +108,16 @@ class ControlServer:
                 del self._clients[client.connection]
 
 
-class _Client:
-    """One connection, its unfinished line and its unsent answers."""
+def _dismiss(connection: socket.socket, reason: bytes) -> None:
+    with connection, contextlib.suppress(OSError):
+        connection.send(reason)
 
-    def __init__(self, connection: socket.socket) -> None:
-        self.connection = connection
+
+class _Client:
+    """One connection, its unfinished line, its unsent answers, and when it last did something."""
+
+    def __init__(self, connection: socket.socket, active_s: float) -> None:
+        self.connection, self.active_s = connection, active_s
         self._received, self._unsent = b"", b""
         self._closing = self._broken = self._skipping = False
 

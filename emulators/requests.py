@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Final
+from math import isfinite
+from typing import Final, NoReturn
 
 VERSION: Final = 1
 
@@ -31,24 +32,30 @@ class Requests:
     def answer_line(self, line: bytes) -> bytes:
         """Answer a line as it came from the wire."""
         try:
-            request = json.loads(line)
+            request = json.loads(line.decode(), parse_constant=_refuse_constant)
             if not isinstance(request, dict):
                 return refusal_line(NOT_JSON)
-            return json.dumps(self.answer(request)).encode() + b"\n"
+            return _encode(self.answer(request))
+        except UnicodeDecodeError as error:
+            byte = line[error.start]
+            return refusal_line(f"the line is not UTF-8: byte {error.start} is {byte:02x}h")
         except (ValueError, RecursionError) as error:
             return refusal_line(f"{NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
         """Answer a request: `ok`, and what was asked for or `error`."""
-        head: Object = {"id": request["id"]} if isinstance(request.get("id"), int | str) else {}
+        head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
         except ValueError as error:
             return {**refusal(str(error)), **head}
 
     def _dispatch(self, request: Object) -> Object:
-        if request.get("v") != VERSION:
-            raise ValueError(f"version {short(request.get('v'))} of the request is not {VERSION}")
+        version = request.get("v")
+        if type(version) is not int or version != VERSION:
+            raise ValueError(f"version {short(version)} of the request is not {VERSION}")
+        if "id" in request and not _is_id(request["id"]):
+            raise ValueError(f"id is a whole number or a string, not {short(request['id'])}")
         do = request.get("do")
         if not isinstance(do, str) or do not in self._verbs:
             raise ValueError(f"no request {short(do)}; known: {', '.join(self._verbs)}")
@@ -66,7 +73,7 @@ def refusal(error: str) -> Object:
 
 def refusal_line(error: str) -> bytes:
     """Return that answer as a line."""
-    return json.dumps(refusal(error)).encode() + b"\n"
+    return _encode(refusal(error))
 
 
 def text_of(request: Mapping[str, object], key: str) -> str:
@@ -77,10 +84,12 @@ def text_of(request: Mapping[str, object], key: str) -> str:
     return value
 
 
-def whole(value: object, key: str) -> int:
-    """Return a whole number; ValueError if it is none."""
+def whole(value: object, key: str, low: int, high: int) -> int:
+    """Return a whole number; ValueError if it is none, or none of `low` to `high`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{key} is a whole number, not {short(value)}")
+    if not low <= value <= high:
+        raise ValueError(f"{key} {short(value)} is not in {low}..{high}")
     return value
 
 
@@ -88,3 +97,28 @@ def short(value: object) -> str:
     """Show what came, as JSON, cut to a sensible length."""
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:60]}..."
+
+
+def _is_id(value: object) -> bool:
+    return isinstance(value, int | str) and not isinstance(value, bool)
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"JSON has no {name}")
+
+
+def _encode(answer: Object) -> bytes:
+    try:
+        text = json.dumps(answer, allow_nan=False)
+    except ValueError:
+        text = json.dumps(_spelt(answer))
+    return text.encode() + b"\n"
+
+
+def _spelt(value: object) -> object:
+    """Return a value with text in place of the numbers that JSON has not."""
+    if isinstance(value, dict):
+        return {key: _spelt(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_spelt(each) for each in value]
+    return str(value) if isinstance(value, float) and not isfinite(value) else value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tickrig.device.core import NEVER
 from tickrig.emulators.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
 from tickrig.host.cli.user_file import told
@@ -130,7 +131,7 @@ class SystemControl(Requests):
         return self._manager.find(text_of(request, "name")).configuration
 
     def _seen(self, request: Object) -> Object:
-        since = whole(request.get("since", 0), "since")
+        since = whole(request.get("since", 0), "since", 0, NEVER)
         seen, latest = self._probes.seen(text_of(request, "port"), since)
         values = [{"number": one.number, "value": literal(one.value)} for one in seen]
         return {"values": values, "latest": latest}

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.requests import Requests
 
 
 @pytest.fixture
@@ -89,6 +90,11 @@ def test_an_id_comes_back(emulator: Emulator) -> None:
     [
         ({"do": "get"}, "version null of the request is not 1"),
         ({"v": 2, "do": "get"}, "version 2 of the request is not 1"),
+        ({"v": 1.0, "do": "get"}, "version 1.0 of the request is not 1"),
+        ({"v": True, "do": "get"}, "version true of the request is not 1"),
+        ({"v": 1, "do": "get", "id": True}, "id is a whole number or a string, not true"),
+        ({"v": 1, "do": "get", "id": 1.5}, "id is a whole number or a string, not 1.5"),
+        ({"v": 1, "do": "get", "id": None}, "id is a whole number or a string, not null"),
         ({"v": 1}, "no request null; known: describe, get, set"),
         ({"v": 1, "do": "reboot"}, 'no request "reboot"; known: describe'),
         ({"v": 1, "do": ["get"]}, 'no request ["get"]; known'),
@@ -100,7 +106,12 @@ def test_an_id_comes_back(emulator: Emulator) -> None:
         ({"v": 1, "do": "set", "name": "lamp", "value": True}, "a number or a string, not true"),
         ({"v": 1, "do": "set", "name": 5, "value": 1}, "name is a string, not 5"),
         ({"v": 1, "do": "set", "name": "a", "value": 1}, "no input 'a'; known: place, lamp"),
-        ({"v": 1, "do": "press", "name": "key", "duration_us": -1}, "at least 1 us"),
+        ({"v": 1, "do": "press", "name": "key", "duration_us": -1}, "-1 is not in 1..1000"),
+        (
+            {"v": 1, "do": "press", "name": "key", "duration_us": 10**15 + 1},
+            "duration_us 1000000000000001 is not in 1..1000000000000000",
+        ),
+        ({"v": 1, "do": "lines", "since": -1}, "since -1 is not in 0..9223372036854775807"),
         ({"v": 1, "do": "fault", "spec": "flip"}, "flip wants a rate"),
         ({"v": 1, "do": "clear", "name": "x" * 5_000}, "no fault 'xxx"),
         ({"v": 1, "do": "get", "names": ["../etc"]}, 'no input or output "../etc"'),
@@ -136,6 +147,29 @@ def test_what_is_no_object_is_answered(emulator: Emulator, line: bytes) -> None:
     assert answer["v"] == 1
     if not line.startswith(b'{"v":1,"do":"get"'):
         assert not answer["ok"]
+
+
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [
+        (b'{"v":1,"do":"g\xffet"}', "the line is not UTF-8: byte 14 is ffh"),
+        ('{"v":1,"do":"get"}'.encode("utf-16"), "the line is not UTF-8: byte 0 is ffh"),
+        ('{"v":1,"do":"get"}'.encode("utf-8-sig"), "the line is not a JSON object: "),
+        (b'{"v":1,"do":"set","name":"lamp","value":NaN}', "JSON has no NaN"),
+        (b'{"v":1,"do":"set","name":"lamp","value":-Infinity}', "JSON has no -Infinity"),
+    ],
+)
+def test_a_line_is_json_in_utf_8(emulator: Emulator, line: bytes, error: str) -> None:
+    answer = Control(emulator).answer_line(line)
+    assert answer.count(b"\n") == 1
+    assert error in json.loads(answer)["error"]
+
+
+def test_a_number_that_json_lacks_is_text() -> None:
+    values: dict[str, object] = {"values": [float("nan"), float("inf"), -float("inf"), 1.5]}
+    requests = Requests({"get": (lambda request: values, ())})
+    answer = json.loads(requests.answer_line(b'{"v":1,"do":"get"}'))
+    assert answer["values"] == ["nan", "inf", "-inf", 1.5]
 
 
 @given(st.binary(max_size=300))

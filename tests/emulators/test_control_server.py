@@ -12,7 +12,13 @@ import pytest
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.control import Control
-from tickrig.emulators.control_server import MAX_CLIENTS, MAX_LINE, MAX_UNSENT, ControlServer
+from tickrig.emulators.control_server import (
+    IDLE_S,
+    MAX_CLIENTS,
+    MAX_LINE,
+    MAX_UNSENT,
+    ControlServer,
+)
 from tickrig.emulators.emulator import Emulator
 
 
@@ -148,6 +154,70 @@ def test_there_is_room_for_some_clients_only(server: ControlServer, path: Path) 
         assert answer["error"] == f"there are {MAX_CLIENTS} clients already"
     for client in clients:
         client.socket.close()
+
+
+Full = tuple[ControlServer, list[Client], list[float]]
+"""A server without a free place, its clients, and its time in seconds."""
+
+
+@pytest.fixture
+def full(path: Path) -> Iterator[Full]:
+    now_s = [0.0]
+    server = ControlServer(path, Control(Emulator("lamp", Lamp())), lambda: now_s[0])
+    clients = []
+    for _ in range(MAX_CLIENTS):
+        clients.append(Client(server, path))
+        server.serve(0)
+    yield server, clients, now_s
+    for client in clients:
+        client.socket.close()
+    server.close()
+
+
+def test_a_silent_client_makes_room(full: Full, path: Path) -> None:
+    server, clients, now_s = full
+    silent = clients.pop(7)
+    now_s[0] = 1.0
+    for client in clients:
+        client.send(GET)
+        assert client.answers()[0]["ok"]
+    now_s[0] = IDLE_S
+    with Client(server, path) as late, silent:
+        late.send(GET)
+        assert [answer["ok"] for answer in late.answers()] == [True]
+        assert silent.answers()[0]["error"].startswith("silent for 60 s")
+        assert silent.socket.recv(1) == b""
+    for client in clients:
+        client.send(GET)
+        assert [answer["ok"] for answer in client.answers()] == [True]
+
+
+def test_a_silent_client_stays_where_there_is_room(full: Full, path: Path) -> None:
+    server, clients, now_s = full
+    clients.pop().socket.close()
+    server.serve(0)
+    now_s[0] = 1_000 * IDLE_S
+    with Client(server, path) as late:
+        late.send(GET)
+        assert [answer["ok"] for answer in late.answers()] == [True]
+    for client in clients:
+        client.send(GET)
+        assert [answer["ok"] for answer in client.answers()] == [True]
+
+
+def test_a_client_that_does_not_read_makes_room(full: Full, path: Path) -> None:
+    server, clients, now_s = full
+    for _ in range(3_000):
+        server.serve(0)
+        try:
+            clients[3].socket.send(b'{"v":1,"do":"describe"}\n')
+        except BlockingIOError:
+            break
+    now_s[0] = IDLE_S
+    with Client(server, path) as late:
+        for client in [*clients[:3], *clients[4:], late]:
+            client.send(GET)
+        assert [answer["ok"] for answer in late.answers()] == [True]
 
 
 def test_waiting_ends_when_its_time_is_over(server: ControlServer) -> None:
