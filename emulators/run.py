@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -19,6 +20,10 @@ from tickrig.emulators.serving_clock import ServingClock
 from tickrig.emulators.signals import stopped_by_signals
 from tickrig.emulators.workbench import Workbench
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.telling import warnings_told
+
+RECORDING_ENDED: Final = 3
+"""Exit status where the recording is not whole."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +60,8 @@ class EmulatorRun(ABC):
         """
         faults, scenario = self._checked()
         with ExitStack() as stack:
+            if self._tells_warnings:
+                stack.enter_context(warnings_told())
             if self._in_real_time:
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
@@ -70,6 +77,11 @@ class EmulatorRun(ABC):
             if player:
                 player.finish(bench.rig.now_us)
         return self._sum_up(bench, player)
+
+    @property
+    def _tells_warnings(self) -> bool:
+        """Whether warnings go to standard error."""
+        return True
 
     @abstractmethod
     def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
@@ -118,16 +130,18 @@ class EmulatorRun(ABC):
             self._running.stop()
 
     def _sum_up(self, bench: Workbench, player: Player | None) -> int:
-        """Say how it went; 1 if an expectation was not met."""
+        """Say how it went; 3 if it was not recorded to the end, 1 if an expectation was missed."""
         rig = bench.rig
         worst = f" (up to {rig.late_us / 1_000:.1f} ms)" if rig.late_steps else ""
         late = f"; late ticks: {rig.late_steps}{worst}" if self._in_real_time else ""
         lost = "".join(f"; {what.replace('lost_', '')} lost: {n}" for what, n in bench.lost.items())
         say(f"ran {rig.now_us / 1e6:.3f} s{late}{lost}")
-        if player is None or not player.met + player.missed:
-            return 0
-        say(f"expectations met: {player.met}; missed: {player.missed}")
-        return 1 if player.missed else 0
+        if player and player.met + player.missed:
+            say(f"expectations met: {player.met}; missed: {player.missed}")
+        if bench.trace_error:
+            say(f"the recording ended early: {bench.trace_error}")
+            return RECORDING_ENDED
+        return 1 if player and player.missed else 0
 
 
 def say(text: str) -> None:

@@ -99,6 +99,10 @@ class SerialRun(EmulatorRun):
         if find_spec("textual") is None:
             raise Refused("--panel needs Textual: pip install 'tickrig[tui]'")
 
+    @property
+    def _tells_warnings(self) -> bool:
+        return not self._options.panel
+
     def _open(self, stack: ExitStack) -> Emulator:
         options = self._options
         pty = self._open_pty(stack) if options.in_real_time else None

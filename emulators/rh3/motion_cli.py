@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import Any, Final
 
@@ -64,7 +63,6 @@ def main() -> None:
     rh3 square --tread-m 0.459
     rh3 goto 1 0 0 --device /dev/ttyUSB0
     """  # noqa: D301 - click wants the backspace
-    logging.getLogger("tickrig").addHandler(logging.NullHandler())  # a line on stderr is ours
 
 
 @main.command(context_settings=COORDINATES)

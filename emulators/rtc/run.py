@@ -18,6 +18,7 @@ from tickrig.emulators.run import say
 from tickrig.emulators.serving_clock import ServingClock
 from tickrig.emulators.signals import stopped_by_signals
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.telling import warnings_told
 from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
@@ -52,7 +53,7 @@ def run_system(options: SystemOptions) -> None:
     manager = Manager()
     for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
         manager.register(kind)
-    with ExitStack() as stack:
+    with warnings_told(), ExitStack() as stack:
         for word in options.lites:
             attach_lite(manager, word, stack, options.lite_boot_us, options.rate_hz)
         _restore(manager, system, options)

@@ -245,3 +245,17 @@ def test_a_missing_emulator_is_one_line(tmp_path: Path) -> None:
     result = CliRunner().invoke(tickrig, ["ctl", str(tmp_path / "none"), "get"])
     assert result.exit_code == 2
     assert result.stderr.endswith("none: No such file or directory, is the emulator running?\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_recording_that_ended_early_is_exit_status_3() -> None:
+    met = "0 expect EV:Initialized within 1s\n0 expect nothing within 1s\n"
+    result = rrc("--scenario", "-", "--trace", "/dev/full", text=met)
+    assert result.exit_code == 3
+    reason = "/dev/full: No space left on device"
+    assert result.stderr.splitlines() == [
+        f"recording ended: {reason}; the emulator goes on",
+        "ran 1.000 s; bytes lost: 0",
+        "expectations met: 1; missed: 1",
+        f"the recording ended early: {reason}",
+    ]

@@ -15,6 +15,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.telling import warnings_told
 from tickrig.host.errors import LinkClosed
 from tickrig.host.link import NEVER
 from tickrig.host.rtc_canopen.commands.opening import (
@@ -64,7 +65,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _check(file, server)
         return
     log, quiet, start = (options.pop(name) for name in ("log", "quiet", "start"))
-    with ExitStack() as stack:
+    with warnings_told(), ExitStack() as stack:
         if not quiet:
             server.log.listeners.append(lambda event: click.echo(str(event), err=True))
         server.log.listeners += log_listener(log, stack)

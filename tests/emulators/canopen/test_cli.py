@@ -322,3 +322,10 @@ def test_the_shell_completes_options_and_models(words: str, completed: str) -> N
         check=True,
     )
     assert result.stdout == completed
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_recording_that_ended_early_is_exit_status_3() -> None:
+    result = run("--model", "epos", "--scenario", "-", "--trace", "/dev/full", text="0.1 end")
+    assert result.exit_code == 3
+    assert result.stderr.endswith("the recording ended early: /dev/full: No space left on device\n")

@@ -1,0 +1,24 @@
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+
+import pytest
+
+from tickrig.host.cli.telling import warnings_told
+
+
+def test_the_library_is_silent_unless_somebody_listens() -> None:
+    program = "import logging, tickrig; logging.getLogger('tickrig.host').warning('beware')"
+    process = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert process.stderr == b""
+
+
+def test_a_command_tells_warnings_and_no_more(capsys: pytest.CaptureFixture[str]) -> None:
+    logger = logging.getLogger("tickrig.host")
+    with warnings_told():
+        logger.info("all is well")
+        logger.warning("beware")
+    logger.warning("unheard")
+    assert capsys.readouterr().err == "beware\n"
