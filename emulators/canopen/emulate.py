@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -57,10 +58,13 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
 
 
 def _sdo_limits(timeout: str, memory: str) -> SdoLimits:
+    option = "--sdo-timeout"
     try:
-        return SdoLimits(parse_time_us(timeout), parse_size(memory))
+        limits = SdoLimits(parse_time_us(timeout))
+        option = "--sdo-memory"
+        return replace(limits, memory_bytes=parse_size(memory))
     except ValueError as error:
-        raise Refused(f"--sdo-timeout, --sdo-memory: {error}") from None
+        raise Refused(f"{option}: {error}") from None
 
 
 def _specs(given: Mapping[str, Path | str | None], node_id: str | None) -> Iterator[NodeSpec]:
