@@ -58,7 +58,7 @@ class SystemEditor(FramedApp):
     #panes, SystemPane { height: 1fr; }
     ObjectsPane { height: 1fr; }
     .-wide #panes { layout: horizontal; }
-    .-wide SystemPane { width: 2fr; }
+    .-wide SystemPane { width: 2fr; min-width: 56; }
     .-wide ObjectsPane { width: 3fr; }
     #events { height: 7; }
     #status { height: 1; background: $boost; }

@@ -378,12 +378,16 @@ def test_the_cursor_moves_by_keys_and_stays_on_its_row() -> None:
 
 def test_panes_are_side_by_side_where_there_is_room() -> None:
     async def act(desk: Desk) -> None:
-        for columns, lines, side_by_side in ((80, 24, False), (140, 40, True), (129, 24, False)):
+        for columns, lines, side_by_side in ((80, 24, False), (130, 40, True), (129, 24, False)):
             await desk.pilot.resize_terminal(columns, lines)
             await desk.pilot.pause()
             system, objects = desk.app.system.region, desk.app.objects.region
             assert (system.y == objects.y) is side_by_side
             assert min(system.height, objects.height) >= 6
+            await desk.pass_ms(0)
+            rows = screen_text(desk.app).splitlines()
+            row = next(row for row in rows if "▾  16 Palette0" in row)
+            assert " ms" in row.split("│")[1]
 
     at_desk(act)
 
