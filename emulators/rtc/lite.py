@@ -57,4 +57,4 @@ def parse_lite(word: str) -> tuple[str, str, int]:
 
 
 def _tell(event: ProxyEvent) -> None:
-    say(f"{event.instance_name}: {event.kind}")
+    say(str(event))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.link import Link
@@ -10,7 +11,7 @@ from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
 from tickrig.host.rtc_lite.rtno_link import RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, State
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, State, Status
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame
 from tickrig.wire.rtc_lite.framing import Framing
@@ -36,6 +37,18 @@ FAULTS: Final = frozenset(FAULT_COMMANDS)
 RETRIES: Final = 3
 """For requests that may be repeated (DECISION L13)."""
 
+_MEANINGS: Final[Mapping[int, str]] = {
+    Status.ERROR: "x: a callback failed",
+    Status.WRONG_STATE: "H: wrong state",
+    Status.NO_IN_PORT: "F: no such in-port",
+    Status.NO_OUT_PORT: "D: no such out-port",
+    Status.EMPTY: "I: nothing new",
+    Status.UNSUPPORTED: "!: not supported",
+    LinkFault.TIMEOUT: "FK: broken off",
+    LinkFault.CHECKSUM: "FH: wrong checksum",
+    LinkFault.UNKNOWN: "FU: unknown",
+}
+
 _LOG: Final = logging.getLogger(__name__)
 
 
@@ -58,6 +71,7 @@ class Conversation:
         pushed: data of out-ports, not yet taken, with the time at which they arrived.
         in_ports: in-ports that the device has described.
         out_ports: out-ports that it has described.
+        trouble: why the last request was not done, empty if it was.
     """
 
     def __init__(self, link: Link[bytes], settings: Settings) -> None:
@@ -67,9 +81,15 @@ class Conversation:
         self.pushed: list[tuple[int, PortData]] = []
         self.in_ports: list[PortProfile] = []
         self.out_ports: list[PortProfile] = []
+        self.trouble = ""
         self._reply: Reply | None = None
         self._awaited: Command | None = None
         self._looked_us = self._deadline_us = link.now_us
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The last frames with their times, as `1.234 > CX`, `1.238 < CX@I`."""
+        return tuple(self._line.latest)
 
     @property
     def now_us(self) -> int:
@@ -83,9 +103,14 @@ class Conversation:
         return min(due_us, self._looked_us + POLL_US) if self.watch.asked else due_us
 
     def tick(self) -> None:
-        """Take what has arrived, and send a PING if one is due."""
+        """Take what has arrived, and send a PING if one is due.
+
+        All that had arrived when a PING is overdue is read before that is judged: who looks
+        late takes no device for lost.
+        """
+        now_us = self.now_us
         self.poll()
-        if (number := self.watch.tick(self.now_us)) is not None:
+        if (number := self.watch.tick(now_us)) is not None:
             self._ping(number)
 
     def ask(self, command: Command, data: bytes = b"") -> Reply | None:
@@ -93,8 +118,9 @@ class Conversation:
         if not self._free():
             return None
         reply = self._exchange(command, data)
+        self.trouble = self._trouble(command, reply)
         if reply is None:
-            _LOG.info("no reply to %s", command.value.decode())
+            _LOG.info("%s", self.trouble)
             self._ping(self.watch.doubt(self.now_us))
         return reply
 
@@ -154,7 +180,15 @@ class Conversation:
         while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
             if not self._hear(self._deadline_us - self.now_us):
                 break
+        if self._reply is None:
+            self._hear(0)  # it may have come while this process was stopped
         return self._reply
+
+    def _trouble(self, command: Command, reply: Reply | None) -> str:
+        name = command.value.decode()
+        if reply is None:
+            return f"no reply to {name} within {self._settings.reply_us // 1_000} ms"
+        return "" if reply.ok else f"{name} was answered {_MEANINGS.get(reply.status, reply)}"
 
     def _ping(self, number: int) -> None:
         self.post(Command.PING, bytes([number]))

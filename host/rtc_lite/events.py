@@ -31,15 +31,21 @@ class ProxyEvent:
         at_us: when, on the clock of its link.
         kind: what.
         instance_name: to which proxy.
+        reason: why it went to Error, for people; empty for other events.
+        frames: the last ones before that, with their times on the clock of its link.
     """
 
     at_us: int
     kind: EventKind
     instance_name: str
+    reason: str = ""
+    frames: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """Write it in a line for people."""
-        return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}"
+        why = f": {self.reason}" if self.reason else ""
+        frames = f"; last frames: {', '.join(self.frames)}" if self.frames else ""
+        return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}{why}{frames}"
 
 
 Listener = Callable[[ProxyEvent], None]

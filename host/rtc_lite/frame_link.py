@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable
 from typing import Final, Protocol
 
@@ -13,6 +14,9 @@ from tickrig.wire.rtc_lite.frame import Frame
 
 SILENCE_US: Final = 20_000
 """Silence after which the rest of a broken frame is not waited for."""
+
+KEPT: Final = 8
+"""Frames that are kept, for who wants to know what was said last."""
 
 _LOG: Final = logging.getLogger(__name__)
 
@@ -44,6 +48,9 @@ class FrameLink:
         link: the line.
         encode: writes a request.
         decoder: reads the replies.
+
+    Attributes:
+        latest: the last frames with their times, as `1.234 > CX`, `1.238 < CX@I`.
     """
 
     def __init__(
@@ -51,6 +58,7 @@ class FrameLink:
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
+        self.latest: deque[str] = deque(maxlen=KEPT)
 
     @property
     def now_us(self) -> int:
@@ -61,7 +69,7 @@ class FrameLink:
         """Send a frame; a broken one that came long before is not waited for any more."""
         if self.now_us - self._byte_us >= SILENCE_US:
             self._decoder.clear()
-        _LOG.debug("> %s", frame.body)
+        self._note(">", frame)
         try:
             self._link.send(self._encode(frame))
         except LinkError as error:
@@ -80,5 +88,9 @@ class FrameLink:
             self._decoder.clear()
         frames = [found for found in self._decoder.push(data) if isinstance(found, Frame)]
         for frame in frames:
-            _LOG.debug("< %s", frame.body)
+            self._note("<", frame)
         return frames
+
+    def _note(self, arrow: str, frame: Frame) -> None:
+        _LOG.debug("%s %s", arrow, frame.body)
+        self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")

@@ -89,6 +89,7 @@ class RtcLiteProxy(RtComponent):
         self._untold = False  # an error of which nobody knows whether it is a fatal one
         self._mirrored = -1  # in which ten ticks its state was asked
         self._unanswered = 0  # how often in vain
+        self._why: tuple[str, tuple[str, ...]] = "", ()  # it went to Error, and the last frames
 
     @property
     def due_us(self) -> int:
@@ -111,6 +112,9 @@ class RtcLiteProxy(RtComponent):
         self._talk.tick()
         if self._talk.watch.lost and self.fatal_us is None:
             self.fatal_us, self._untold = self._talk.now_us, False
+            before = f"{self._talk.trouble}, and " if self._talk.trouble else ""
+            pings = f"none of {self._settings.pings} PINGs was answered"
+            self._why = before + pings, self._talk.frames
             self._tell(EventKind.FATAL_ERROR)
             for context in self.contexts:
                 context.abort_component(self)
@@ -173,6 +177,8 @@ class RtcLiteProxy(RtComponent):
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Let the device follow into Error, if it is not there."""
         self._untold = self.fatal_us is None
+        if self._untold:
+            self._why = self._talk.trouble or "it was told to abort", self._talk.frames
         self._tell_passive()
         return self._follow()
 
@@ -234,6 +240,7 @@ class RtcLiteProxy(RtComponent):
             return _OK
         code = _code_of(reply)
         if code is _OK and self._talk.state is not State.ACTIVE:
+            self._talk.trouble = "the device is no longer Active"
             return ReturnCode.RTC_ERROR
         return code
 
@@ -257,7 +264,7 @@ class RtcLiteProxy(RtComponent):
             self._tell(EventKind.PASSIVE_ERROR)
 
     def _tell(self, kind: EventKind) -> None:
-        tell(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name))
+        tell(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name, *self._why))
 
 
 def _code_of(reply: Reply | None) -> ReturnCode:
