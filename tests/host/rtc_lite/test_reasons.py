@@ -87,13 +87,15 @@ def test_an_abort_that_somebody_asked_for_is_told_as_such() -> None:
 
 
 class StoppedLink(SpyLink):
-    """The process is stopped behind each request for longer than a reply may take."""
+    """The process is stopped behind each look in vain, for longer than a reply may take."""
 
     rig: Rig
 
-    def send(self, traffic: bytes, /) -> None:
-        super().send(traffic)
-        self.rig.run_for(300_000)
+    def receive(self, timeout_us: int, /) -> bytes:
+        data = super().receive(0)
+        if not data and timeout_us:
+            self.rig.run_for(300_000)
+        return data
 
 
 def test_a_reply_that_came_while_this_process_was_stopped_is_one() -> None:
