@@ -19,6 +19,10 @@ BIT_RATE: Final = 19_200
 """Of RS-232C after power-up; on USB it means nothing."""
 
 
+PROTOCOLS: Final = ("1.1", "2.0")
+"""What sensors speak after power-up."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrgParameters:
     """A sensor.
@@ -27,6 +31,8 @@ class UrgParameters:
         serial: its serial number, letters and digits.
         noise: share of the accuracy of 10 mm below 1 m and 1 % above, 0..1.
         seed: of the noise.
+        scip: the protocol after power-up. 1.1 is that of the URG-04LX, whose laser is on then;
+            2.0 that of sensors such as the URG-04LX-UG01, whose laser is off.
 
     Raises:
         ValueError: a value that cannot be.
@@ -35,6 +41,7 @@ class UrgParameters:
     serial: str = "H0614967"
     noise: float = 0.0
     seed: int = 0
+    scip: str = "1.1"
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -42,3 +49,5 @@ class UrgParameters:
             raise ValueError(f"serial {self.serial!r} is not letters and digits")
         if not 0 <= self.noise <= 1:
             raise ValueError(f"noise {self.noise} is not in 0..1")
+        if self.scip not in PROTOCOLS:
+            raise ValueError(f"scip {self.scip!r} is not one of {', '.join(PROTOCOLS)}")

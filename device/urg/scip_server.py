@@ -7,6 +7,8 @@ from typing import Final
 
 from tickrig.device.body.pose import Pose
 from tickrig.device.core import NEVER
+from tickrig.device.urg import first_protocol
+from tickrig.device.urg.first_protocol import Capture
 from tickrig.device.urg.parameters import URG_04LX, UrgParameters
 from tickrig.device.urg.refusal import flaw, refusal
 from tickrig.device.urg.rotation import Rotation
@@ -34,14 +36,17 @@ Answer = tuple[str, tuple[bytes, ...]]
 class ScipServer:
     """Obeys commands and gives scans out (SCIP 2.0, sensor commands).
 
-    Not emulated: SCIP 1.1 and the switch from it, DB, the firmware update mode, the statuses
-    21..49 and 98 of a sensor that checks itself; SS is obeyed and changes no line.
+    Until it is switched it obeys those of SCIP 1.1 (`first_protocol`).
+
+    Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a sensor that
+    checks itself; SS is obeyed and changes no line.
 
     Args:
         parameters: of the sensor.
 
     Attributes:
         laser: whether it is on.
+        settings: bit rate and sensitivity.
         rotation: of the mirror.
         trouble: status of what is broken, empty if nothing is.
         served: commands that were answered.
@@ -57,9 +62,9 @@ class ScipServer:
             "QT": self._quit,
             "RS": self._reset,
             "TM": self._time,
-            "SS": lambda now_us, command: (self._settings.set_rate(command.parameters), ()),
+            "SS": lambda now_us, command: (self.settings.set_rate(command.parameters), ()),
             "CR": self._speed,
-            "HS": lambda now_us, command: (self._settings.set_sensitivity(command.parameters), ()),
+            "HS": lambda now_us, command: (self.settings.set_sensitivity(command.parameters), ()),
             "VV": lambda now_us, command: _told(version(self.parameters.serial)),
             "PP": lambda now_us, command: (status.OK, URG_04LX.lines),
             "II": lambda now_us, command: _told(self._state(now_us)),
@@ -69,25 +74,31 @@ class ScipServer:
     def power_up(self, now_us: int) -> None:
         """Begin as after power-up."""
         self.served = self.scans = 0
+        self._switched = self.parameters.scip == "2.0"
         self._begin(now_us)
+        if not self._switched:
+            self._classic = self.light(now_us)
 
     def _begin(self, now_us: int) -> None:
         self.rotation = Rotation(URG_04LX.speed_rpm)
         self.rotation.began_us = self._zero_us = now_us
-        self._adjusting, self._settings = False, Settings()
+        self._adjusting, self.settings = False, Settings()
         self.stop()
 
     def stop(self) -> None:
         """Switch the laser off and forget what was asked for."""
         self.laser, self.due_us = False, NEVER
+        self._classic = False  # nobody has asked for anything since power-up
         self._running: Stream | None = None
-        self._waiting: Stream | None = None
+        self._waiting: Stream | Capture | None = None
         self._latest: View | None = None
 
     def obey(self, now_us: int, line: bytes) -> bytes:
         """Return what is answered to a line at once."""
-        command = Command.parse(line)
         self.served += 1
+        if not self._switched:
+            return first_protocol.obey(self, now_us, line)
+        command = Command.parse(line)
         code = refusal(command, adjusting=self._adjusting)
         if code:
             return Reply(command.echo, code).encode()
@@ -101,7 +112,7 @@ class ScipServer:
         self.trouble = code
         waiting = [stream for stream in (self._waiting, self._running) if stream]
         self.stop()
-        return b"".join(Reply(stream.command.echo, code).encode() for stream in waiting)
+        return b"".join(stream.refuse(code) for stream in waiting)
 
     def end_scan(self, pose: Pose, world: World) -> bytes:
         """End the scan that was measured; return what is sent of it."""
@@ -112,16 +123,36 @@ class ScipServer:
         self.scans, self._latest = self.scans + 1, view
         sent = b""
         if (waiting := self._waiting) is not None:
-            sent, self._waiting = waiting.reply(view, status.OK, waiting.command.echo), None
+            sent, self._waiting = waiting.answer(view), None
         if (running := self._running) is not None:
             sent += running.take(ended_us, view)
             if not (running.left or running.endless):
                 self.stop()
         return sent
 
-    def _light(self, now_us: int) -> None:
-        if not self.laser:
+    @property
+    def serial(self) -> str:
+        """The serial number."""
+        return self.parameters.serial
+
+    def light(self, now_us: int) -> bool:
+        """Switch the laser on, unless there is trouble; return whether it is on."""
+        if not self.laser and not self.trouble:
             self.laser, self.due_us = True, self.rotation.whole_end_us(now_us)
+        return self.laser
+
+    def switch(self) -> None:
+        """Go on in SCIP 2.0; nothing else changes."""
+        self._switched = True
+
+    def measure(self, capture: Stream | Capture) -> bytes | None:
+        """Answer with the latest scan, later with the first one; None if there will be none."""
+        if not self.laser or self._waiting is not None:
+            return None
+        if self._latest is not None:
+            return capture.answer(self._latest)
+        self._waiting = capture
+        return b""
 
     def _single(self, now_us: int, command: Command) -> bytes:
         code = flaw(command) or self.trouble
@@ -131,11 +162,7 @@ class ScipServer:
             code = status.REPEATED
         if code:
             return Reply(command.echo, code).encode()
-        stream = Stream(command, now_us)
-        if self._latest is not None:
-            return stream.reply(self._latest, status.OK, command.echo)
-        self._waiting = stream
-        return b""
+        return self.measure(Stream(command, now_us)) or b""
 
     def _stream(self, now_us: int, command: Command) -> Answer:
         code = flaw(command) or self.trouble
@@ -143,7 +170,8 @@ class ScipServer:
             code = status.REPEATED
         if code:
             return code, ()
-        self._light(now_us)
+        self.light(now_us)
+        self._classic = False
         begins_us = self.rotation.whole_end_us(now_us)
         self._running = Stream(command, begins_us, int(command.fields[-1]))
         return status.OK, ()
@@ -153,7 +181,7 @@ class ScipServer:
             return "01", ()
         if self.laser:
             return "02", ()
-        self._light(now_us)
+        self.light(now_us)
         return status.OK, ()
 
     def _quit(self, now_us: int, command: Command) -> Answer:
@@ -202,11 +230,18 @@ class ScipServer:
             "MODL": URG_04LX.model,
             "LASR": "ON" if self.laser else "OFF",
             "SCSP": self.rotation.text,
-            "MESM": self._settings.mode if self.laser else "IDLE",
-            "SBPS": self._settings.rate_text,
+            "MESM": self._mode,
+            "SBPS": self.settings.rate_text,
             "TIME": f"{self._timer(now_us):06X}",
             "STAT": CONDITION[self.trouble],
         }
+
+    @property
+    def _mode(self) -> str:
+        """How it measures, as II tells it."""
+        if not self.laser:
+            return "IDLE"
+        return "CLASSIC" if self._classic else self.settings.mode
 
 
 def _told(values: Mapping[str, str]) -> Answer:

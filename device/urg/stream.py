@@ -42,6 +42,14 @@ class Stream:
         numbers = [min(n, WIDEST[width]) for n in view.distances(first, last, cluster)]
         return Reply(echo, code, encode_scan(view.time_ms, numbers, width)).encode()
 
+    def answer(self, view: View) -> bytes:
+        """Return the scan of GD or GS."""
+        return self.reply(view, status.OK, self.command.echo)
+
+    def refuse(self, code: str) -> bytes:
+        """Return why there will be no scan."""
+        return Reply(self.command.echo, code).encode()
+
     def take(self, ended_us: int, view: View) -> bytes:
         """Return what is sent of a scan of MD or MS."""
         if ended_us < self.begins_us:

@@ -49,14 +49,15 @@ class View:
     parameters: UrgParameters
 
     def distances(self, first: int, last: int, cluster: int) -> tuple[int, ...]:
-        """Return a number for each `cluster` steps: the least distance of them in mm.
+        """Return a number for each whole `cluster` of steps: the least distance in mm.
 
-        Where none has a distance, it is the code of the first.
+        Where none has a distance, it is the code of the first. Steps behind the last whole
+        cluster have no number (DECISION U11).
         """
         numbers = self._numbers(range(first, last + 1))
         if cluster <= 1:
             return tuple(numbers)
-        places = range(0, len(numbers), cluster)
+        places = range(0, len(numbers) - cluster + 1, cluster)
         return tuple(self._least(numbers[at : at + cluster]) for at in places)
 
     def _least(self, numbers: Sequence[int]) -> int:

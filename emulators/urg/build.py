@@ -13,7 +13,10 @@ from tickrig.emulators.trace import Config
 
 NAME: Final = "urg"
 
-SETTINGS: Final = ("serial", "noise", "noise_seed", "walls", "posts")
+SETTINGS: Final = ("serial", "noise", "noise_seed", "scip", "walls", "posts")
+OLD_SCIP: Final = "2.0"
+"""The protocol at the start of traces that name none."""
+
 DEFAULTS: Final = UrgParameters()
 
 
@@ -23,6 +26,7 @@ def config_to_trace(parameters: UrgParameters, world: World) -> Config:
         "serial": parameters.serial,
         "noise": parameters.noise,
         "noise_seed": parameters.seed,
+        "scip": parameters.scip,
         "walls": _text(world.walls),
         "posts": _text(world.posts),
     }
@@ -44,7 +48,8 @@ def build_urg(config: Config) -> Urg:
     serial = str(settings.get("serial", DEFAULTS.serial))
     walls = [parse_wall(text) for text in str(settings.get("walls", "")).split()]
     posts = [parse_post(text) for text in str(settings.get("posts", "")).split()]
-    parameters = UrgParameters(serial=serial, noise=noise, seed=seed)
+    scip = str(settings.get("scip", OLD_SCIP))
+    parameters = UrgParameters(serial=serial, noise=noise, seed=seed, scip=scip)
     return Urg(parameters, World(tuple(walls), tuple(posts)))
 
 

@@ -29,6 +29,12 @@ _WORLD: Final = add_options(
     help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
 )
 @click.option(
+    "--scip",
+    type=click.Choice(["1.1", "2.0"]),
+    default="1.1",
+    help="Protocol after power-up: 1.1 as the URG-04LX, 2.0 as the URG-04LX-UG01.  [1.1]",
+)
+@click.option(
     "--baud",
     type=click.IntRange(1_200, USB_BAUD),
     default=USB_BAUD,
@@ -37,8 +43,10 @@ _WORLD: Final = add_options(
 @_WORLD
 @line_options("flip, drop, dup, cut")
 @click.pass_context
-def main(context: click.Context, /, serial: str, noise: float, baud: int, **options: Any) -> None:
-    """Emulate a scanning range finder URG-04LX (SCIP 2.0) on a pseudo-terminal.
+def main(
+    context: click.Context, /, serial: str, noise: float, scip: str, baud: int, **options: Any
+) -> None:
+    """Emulate a scanning range finder URG-04LX (SCIP 1.1 and 2.0) on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
     as fast as it goes, with the same transcript each time, exit status 1 if
@@ -49,7 +57,7 @@ def main(context: click.Context, /, serial: str, noise: float, baud: int, **opti
     urg-emu --link /tmp/urg --control /tmp/urg.ctl --room 4,3 --post 1,0.5,0.1
     tickrig ctl /tmp/urg.ctl set pose 0.5 0 1.57
     tickrig ctl /tmp/urg.ctl set post 1 0 0.2
-    printf '0 send VV\\n1ms expect 00P within 10ms' | urg-emu --scenario -
+    printf '0 send SCIP2.0\\n1ms send VV\\n1ms expect 00P within 10ms' | urg-emu --scenario -
 
     \b
     Completion of options in the shell:
@@ -58,4 +66,4 @@ def main(context: click.Context, /, serial: str, noise: float, baud: int, **opti
     with loading():
         from tickrig.emulators.urg.emulate import emulate  # noqa: PLC0415 - slow
 
-    context.exit(emulate(serial, noise, baud, options))
+    context.exit(emulate(serial, noise, scip, baud, options))

@@ -31,15 +31,15 @@ BUFFER_BYTES: Final = 16_384
 """Room for several whole scans at once."""
 
 
-def emulate(serial: str, noise: float, baud: int, options: dict[str, Any]) -> int:
+def emulate(serial: str, noise: float, scip: str, baud: int, options: dict[str, Any]) -> int:
     """Run a range finder as the command line says, and return the exit status."""
     try:
-        parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"])
+        parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"], scip=scip)
         world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
     except ValueError as error:
         raise Refused(str(error)) from None
     line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
-    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=_talk)
+    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=partial(_talk, scip))
     config = config_to_trace(parameters, world)
     return SerialRun(kind, Urg(parameters, world), config, Options(**options)).run()
 
@@ -53,8 +53,9 @@ def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> Worl
     return World(around.walls + more, tuple(parse_post(text) for text in posts))
 
 
-def _talk(link: str, baud: int) -> str:
-    return by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud)
+def _talk(scip: str, link: str, baud: int) -> str:
+    switch = " The line SCIP2.0 switches it to SCIP 2.0." if scip == "1.1" else ""
+    return by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud) + switch
 
 
 def _is_event(line: WireLine) -> bool:

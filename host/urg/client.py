@@ -13,6 +13,7 @@ from tickrig.wire.scip.command import Command
 from tickrig.wire.scip.description import Specification
 from tickrig.wire.scip.reply import Reply, ReplySplitter
 from tickrig.wire.scip.scan import WIDTHS, parse_scan
+from tickrig.wire.scip.scip1 import SWITCH
 
 SILENCE_US: Final = 500_000
 """How long there may be no good scan: five turns; more where scans are left out."""
@@ -24,9 +25,9 @@ LEAVE_ADJUST: Final = "2"
 class UrgClient:
     """Reads what kind of sensor it is, lets it measure without end, and takes its scans.
 
-    It begins with TM2 and QT, so that a sensor which still does something for somebody
-    before is quiet. After the time of five scans without a good one it begins again. A scan
-    that came garbled is left out.
+    It begins with SCIP2.0 for a sensor that speaks SCIP 1.1, and with TM2 and QT, so that one
+    which still does something for somebody before is quiet. After the time of five scans
+    without a good one it begins again. A scan that came garbled is left out.
 
     Args:
         link: the line.
@@ -77,7 +78,8 @@ class UrgClient:
     def _begin(self) -> None:
         self._splitter, self._heard_us = ReplySplitter(), self._link.now_us
         asked = (Command("TM", LEAVE_ADJUST), Command("QT"), Command("PP"))
-        self._link.send(b"".join(command.encode() for command in asked))
+        switch = SWITCH + b"\n"
+        self._link.send(switch + b"".join(command.encode() for command in asked))
 
     def _take(self, reply: Reply) -> list[Scan]:
         command = Command.parse(reply.echo)

@@ -56,7 +56,8 @@ def relay(listener: socket.socket, fd: int) -> None:
 
 @pytest.fixture
 def laser() -> Iterator[HokuyoLX]:
-    with running("tickrig.emulators.urg.cli", *ROOM) as child, relayed(child.link) as address:
+    words = (*ROOM, "--scip", "2.0")  # it does not switch
+    with running("tickrig.emulators.urg.cli", *words) as child, relayed(child.link) as address:
         found = HokuyoLX(activate=False, tsync=False, addr=address, convert_time=False)
         yield found
         found.close()

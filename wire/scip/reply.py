@@ -13,6 +13,7 @@ from typing import Final
 
 from tickrig.wire.errors import FramingError, WireError
 from tickrig.wire.scip.encoding import with_sum, without_sum
+from tickrig.wire.scip.scip1 import OK, SWITCH
 
 END: Final = b"\n\n"
 STATUS_BYTES: Final = 2
@@ -49,6 +50,8 @@ class Reply:
         echo, *rest = data.split(b"\n")
         if not rest:
             raise FramingError(f"{data!r} has no status")
+        if (echo, rest) == (SWITCH, [OK]):
+            return cls(echo, OK.decode())  # the last answer in SCIP 1.1
         status = without_sum(rest[0])
         if len(status) != STATUS_BYTES or not status.isascii():
             raise FramingError(f"status {status!r} has not 2 characters")

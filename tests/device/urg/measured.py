@@ -14,9 +14,15 @@ class Measured:
     """A sensor that is ticked each millisecond, or only when it is due."""
 
     def __init__(
-        self, world: World | None = None, *, dense: bool = True, noise: float = 0.0, seed: int = 0
+        self,
+        world: World | None = None,
+        *,
+        dense: bool = True,
+        noise: float = 0.0,
+        seed: int = 0,
+        scip: str = "2.0",
     ) -> None:
-        self.urg = Urg(UrgParameters(noise=noise, seed=seed), world)
+        self.urg = Urg(UrgParameters(noise=noise, seed=seed, scip=scip), world)
         self.now_us, self._dense = 0, dense
         self.sent: list[tuple[int, bytes]] = []
 

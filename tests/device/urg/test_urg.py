@@ -172,8 +172,19 @@ def test_what_is_no_distance_is_a_code_below_20() -> None:
 
 def test_a_cluster_gives_its_least_distance() -> None:
     measured = Measured(World(posts=(Post(1, 0, 0.001),)))
-    assert measured.scan("GD0382038603") == (999, 1)
-    assert measured.scan("GD0380038199") == (1,)
+    assert measured.scan("GD0382038703") == (999, 1)
+
+
+@pytest.mark.parametrize(
+    ("command", "count"), [("GD0044072510", 68), ("GD0044004699", 0), ("MS0044072504", 170)]
+)
+def test_steps_behind_the_last_whole_cluster_have_no_number(command: str, count: int) -> None:
+    measured = Measured(AHEAD)  # hokuyoaist takes (end - start + 1) // cluster for an error if not
+    if command.startswith("G"):
+        assert len(measured.scan(command)) == count
+    else:
+        *_, reply = measured.replies(210, f"{command}001\n".encode())
+        assert len(parse_scan(reply.lines, 2)[1]) == count
 
 
 def test_two_characters_carry_4095_at_most() -> None:
@@ -369,7 +380,11 @@ def test_it_is_a_device_of_a_millisecond_with_named_ends() -> None:
 
 @pytest.mark.parametrize(
     ("settings", "told"),
-    [({"noise": 2.0}, "noise 2.0 is not in 0..1"), ({"serial": "a b"}, "serial 'a b' is not")],
+    [
+        ({"noise": 2.0}, "noise 2.0 is not in 0..1"),
+        ({"serial": "a b"}, "serial 'a b' is not"),
+        ({"scip": "3"}, "scip '3' is not one of 1.1, 2.0"),
+    ],
 )
 def test_parameters_that_cannot_be_are_refused(settings: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):

@@ -12,6 +12,7 @@ lines = st.sampled_from(
         *("BM", "QT", "RS", "TM0", "TM1", "TM2", "VV", "PP", "II", "CR05", "CR99", "HS1"),
         *("GD0380038801", "GS0380038803", "MD0384038401000", "MD0384038601102", "MS0384038401003"),
         *("XX", "MD03", "SS115200"),
+        *("SCIP2.0", "V", "L0", "L1", "G38038603", "S1152000000000"),
     ]
 ).map(lambda line: line.encode() + b"\n")
 touches = st.tuples(
@@ -24,12 +25,12 @@ steps = st.lists(
 
 
 @settings(max_examples=60)
-@given(steps)
+@given(steps, st.sampled_from(["1.1", "2.0"]))
 def test_idle_ticks_are_not_visible(
-    played: list[tuple[bytes | tuple[str, int], int]],
+    played: list[tuple[bytes | tuple[str, int], int]], scip: str
 ) -> None:
     world = World(posts=(Post(2, 0, 0.5),))
-    dense, sparse = (Measured(world, dense=dense, noise=0.5) for dense in (True, False))
+    dense, sparse = (Measured(world, dense=dense, noise=0.5, scip=scip) for dense in (True, False))
     for what, pause_ms in played:
         for measured in (dense, sparse):
             if isinstance(what, tuple):

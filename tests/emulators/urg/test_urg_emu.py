@@ -7,9 +7,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.emulators.cli import main as tickrig
+from tickrig.emulators.urg.build import build_urg
 from tickrig.emulators.urg.cli import main as urg_emu
 
 SCENARIO = """
+0 send SCIP2.0
 0 send VV
 1ms expect SERI:H0000001;6 within 10ms
 10ms set pose 0.5 0 0.25
@@ -40,7 +42,7 @@ def test_a_scenario_is_played_in_virtual_time() -> None:
 
 
 def test_whole_scans_at_once_find_room_on_the_line() -> None:
-    text = "0 send BM\n1ms send GD0000076800\n2ms send MD0000076800001\n300ms end"
+    text = "0 send SCIP2.0\n0 send BM\n1ms send GD0000076800\n2ms send MD0000076800001\n300ms end"
     assert emu("--scenario", "-", text=text).stderr == "ran 0.300 s; bytes lost: 0\n"
 
 
@@ -69,6 +71,17 @@ def test_an_impossible_world_is_one_line(words: tuple[str, ...], told: str) -> N
     assert result.exit_code == 2
     assert result.stderr.startswith(f"Error: {told}")
     assert result.stderr.count("\n") == 1
+
+
+def test_it_starts_in_the_protocol_that_is_asked_for() -> None:
+    text = "0 send VV\n10ms end"
+    assert " < E\n" in emu("--scenario", "-", text=text).stdout
+    assert " < 00P\n" in emu("--scip", "2.0", "--scenario", "-", text=text).stdout
+
+
+def test_a_trace_of_before_starts_in_scip_2() -> None:
+    assert build_urg({"serial": "H1"}).parameters.scip == "2.0"
+    assert build_urg({"scip": "1.1"}).parameters.scip == "1.1"
 
 
 @pytest.mark.parametrize(

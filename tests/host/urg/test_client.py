@@ -34,6 +34,12 @@ def test_it_measures_ten_times_a_second() -> None:
     assert {len(scan.distances_mm) for scan in scans} == {682}
 
 
+def test_a_sensor_that_has_just_started_is_switched_to_scip_2() -> None:
+    bench = SensorBench()
+    bench.run(300)
+    assert (bench.urg.parameters.scip, bench.client.garbled, bench.client.restarts) == ("1.1", 0, 0)
+
+
 def test_points_are_in_radians_and_metres() -> None:
     points = dict(SensorBench().run(300)[0].points())
     assert points[0.0] == 2.0
@@ -52,7 +58,7 @@ def test_clusters_and_intervals_make_less_of_it() -> None:
     scans = SensorBench(cluster=10, interval=1).run(1_000)
     assert len(scans) == 4
     points = list(scans[0].points())
-    assert len(points) == 69
+    assert len(points) == 68
     assert all(distance <= hypot(2, 1.5) for _, distance in points)
     assert scans[0].angle_rad(34) == pytest.approx(4.5 * 2 * pi / 1_024)
 

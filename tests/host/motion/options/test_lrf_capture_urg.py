@@ -49,7 +49,7 @@ def test_clusters_make_less_of_it() -> None:
     bench = CaptureBench()
     bench.period(20)
     found = bench.taken("ranges")[0]
-    assert len(found.ranges) == 171
+    assert len(found.ranges) == 170
     assert found.config.angularRes == pytest.approx(4 * tau / 1_024)
 
 
