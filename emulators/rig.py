@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, Protocol
 
-from tickrig.device.core import NEVER, Device, W
+from tickrig.device.core import NEVER, Device, NonCopyable, W
 from tickrig.emulators.agenda import Agenda
 from tickrig.emulators.clock import Clock, VirtualClock
 from tickrig.emulators.coupling import Coupling
@@ -63,7 +63,7 @@ class Station(Generic[W]):
         return _next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
 
 
-class Rig:
+class Rig(NonCopyable):
     """Stations that share a clock.
 
     A step has two phases, as registers on one clock line have: first every

@@ -7,6 +7,7 @@ from math import cos, pi, sin
 from typing import Final, NamedTuple
 
 from tickrig.device.body.pose import Pose
+from tickrig.device.core import NonCopyable
 
 STEP_S: Final = 1e-3
 
@@ -70,7 +71,7 @@ class OmniParameters:
 
 
 @dataclass(slots=True)
-class OmniBody:
+class OmniBody(NonCopyable):
     """Three wheels that follow their commands with a time constant, without slip.
 
     Not emulated: rollers, slip, mass, encoders, the driver.

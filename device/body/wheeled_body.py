@@ -8,6 +8,7 @@ from typing import Final
 
 from tickrig.device.body.contact import Contact
 from tickrig.device.body.pose import Pose
+from tickrig.device.core import NonCopyable
 
 STEP_S: Final = 1e-3
 """Length of a step; drives tick as often."""
@@ -58,7 +59,7 @@ class BodyParameters:
         return (*left, *right)
 
 
-class WheeledBody:
+class WheeledBody(NonCopyable):
     """A differential drive, or a skid steer whose sides move as the mean of their wheels.
 
     It goes as far as its wheels have turned since the step before, on an exact

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self
 
+from tickrig.device.core import NonCopyable
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
@@ -18,7 +19,7 @@ ALIVE = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 
 
-class Service:
+class Service(NonCopyable):
     """One communication service: SDO server, PDOs, SYNC, ...
 
     A service finds its objects in the dictionary when it is made and hangs its

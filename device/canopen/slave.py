@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.service import Handler, Service
-from tickrig.device.core import NEVER
+from tickrig.device.core import NEVER, NonCopyable
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
@@ -27,7 +27,7 @@ _can_id = itemgetter(0)
 ServiceMaker = Callable[["CanopenSlave", int], Service]
 
 
-class CanopenSlave:
+class CanopenSlave(NonCopyable):
     """A `Device[Frames]` that is a CANopen slave (CiA 301).
 
     Frames of a tick are handled in the order in which they came over the wire.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from tickrig.device.core import NEVER
+from tickrig.device.core import NEVER, NonCopyable
 from tickrig.device.modbus.registers import Registers
 from tickrig.wire.errors import WireError
 from tickrig.wire.modbus.requests import (
@@ -22,7 +22,7 @@ from tickrig.wire.modbus.rtu import (
 )
 
 
-class ModbusSlave:
+class ModbusSlave(NonCopyable):
     """Answers a master on an RTU line.
 
     A frame ends with silence; it is served then, and the answer leaves at once. What is

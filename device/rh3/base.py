@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from tickrig.device.core import NonCopyable
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
@@ -19,7 +20,7 @@ LOOK_US: Final = 10_000
 """How often the world looks at it."""
 
 
-class Rh3Base:
+class Rh3Base(NonCopyable):
     """The base of Reference Hardware 3 as a Modbus RTU slave; a `Device[bytes]`.
 
     The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NEVER
+from tickrig.device.core import NEVER, NonCopyable
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
@@ -36,7 +36,7 @@ MOVES: Final[dict[type[cmd.Command], Move]] = {
 
 
 @dataclass(slots=True)
-class Rrc:
+class Rrc(NonCopyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
     Not emulated: the traffic on the VR2 bus itself, how fast the vehicle drives

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NEVER
+from tickrig.device.core import NEVER, NonCopyable
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
@@ -30,7 +30,7 @@ TIMED: Final = (State.ACTIVE, State.ERROR)
 
 
 @dataclass(slots=True)
-class RtcLiteNode:
+class RtcLiteNode(NonCopyable):
     """A PIC with an RTC-Lite component (Suzuki et al., RSJ 2007); a `Device[bytes]`.
 
     In each tick: bytes from the line, time-outs, requests in order, timer. A

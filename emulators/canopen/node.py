@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.canopen.application import Application
 from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.device.core import NEVER
+from tickrig.device.core import NEVER, NonCopyable
 from tickrig.device.physical import Output
 from tickrig.emulators.can_end import Accepted
 from tickrig.emulators.can_wire import CanWire
@@ -41,7 +41,7 @@ NODE_OUTPUTS: Final = (
 )
 
 
-class Node:
+class Node(NonCopyable):
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
     Without power it neither sends nor hears, and begins anew when power is back.

@@ -55,7 +55,7 @@ def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> Worl
 
 def _talk(scip: str, link: str, baud: int) -> str:
     switch = " The line SCIP2.0 switches it to SCIP 2.0." if scip == "1.1" else ""
-    return by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud) + switch
+    return switch + by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud)
 
 
 def _is_event(line: WireLine) -> bool:

@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import Any, ClassVar, Final
 
 from tickrig.device.canopen.device_rtc.ports import Port
+from tickrig.device.core import NonCopyable
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
 from tickrig.wire.rtc_canopen.profile import RtcProfile
@@ -30,7 +31,7 @@ Result = ReturnCode | None
 """What a callback returns; nothing means that all went well."""
 
 
-class Component:
+class Component(NonCopyable):
     """A component on a CANopen device; a subclass says what it is and does.
 
     Ports are declared as attributes of the class; each component has its own, with

@@ -1,0 +1,146 @@
+"""No device can be copied: what it is made of would still act on the original."""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import pickle
+import pkgutil
+from collections.abc import Callable, Iterator
+from typing import Final
+
+import pytest
+
+import tickrig.device
+from tests.device.canopen.profile_objects import DRIVE, make_dictionary
+from tickrig.device.body.omni_body import OmniBody, OmniParameters
+from tickrig.device.body.pose import Pose
+from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
+from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.relays import Echo
+from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
+from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig.device.canopen.service import Service
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.stack import make_slave
+from tickrig.device.core import NonCopyable
+from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.physical import Input, Output
+from tickrig.device.rh3.base import Rh3Base
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rtc_lite.component import Component
+from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.sensor import Urg
+from tickrig.device.urg.world import Post, World, room
+from tickrig.wire.can import CanFrame
+
+WHEELS: Final = BodyParameters(kind="differential", wheel_radius_m=0.1, tread_m=0.4)
+
+
+class Blink(Component):
+    type_name = "Blink"
+
+
+def lite_node() -> RtcLiteNode:
+    node = RtcLiteNode(Blink)
+    node.tick(1_000, b"")
+    return node
+
+
+def slave() -> CanopenSlave:
+    return make_slave(make_dictionary(()), 5)
+
+
+DEVICES: Final[dict[str, Callable[[], object]]] = {
+    "RRC": Rrc,
+    "RTC-Lite node": lite_node,
+    "its component": lambda: lite_node().component,
+    "RH3 base": Rh3Base,
+    "Modbus slave": lambda: Rh3Base().slave,
+    "URG": Urg,
+    "CANopen slave": slave,
+    "CiA 402 drive": lambda: make_slave(make_dictionary({DRIVE}), 5, application=Ds402),
+    "EPOS": lambda: make_slave(epos.dictionary(), 5, application=epos.make),
+    "f-palette": lambda: make_slave(f_palette.dictionary(), 5, application=f_palette.make),
+    "motor core unit": lambda: make_slave(
+        motor_core_unit.dictionary(), 5, application=MotorCoreUnit
+    ),
+    "DeviceRTC": lambda: make_device_rtc(Echo, 5),
+    "application": lambda: Application.of(slave()),
+    "wheeled body": lambda: WheeledBody(WHEELS),
+    "omni body": OmniBody,
+}
+
+WAYS: Final[dict[str, Callable[[object], object]]] = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "deepcopy within": lambda device: copy.deepcopy({"rig": [device]}),
+    **{
+        f"pickle {protocol}": lambda device, protocol=protocol: pickle.dumps(device, protocol)  # type: ignore[misc]
+        for protocol in range(pickle.HIGHEST_PROTOCOL + 1)
+    },
+}
+
+
+@pytest.mark.parametrize("make", DEVICES.values(), ids=DEVICES)
+def test_no_device_is_copied(make: Callable[[], object]) -> None:
+    device = make()
+    for way, copied in WAYS.items():
+        with pytest.raises(TypeError) as caught:
+            copied(device)
+        text = str(caught.value)
+        assert "cannot be copied or pickled" in text, way
+        assert "\n" not in text, way
+
+
+def test_the_error_names_what_came_and_what_to_do() -> None:
+    with pytest.raises(TypeError) as caught:
+        copy.deepcopy(Rrc())
+    assert str(caught.value) == (
+        "Rrc cannot be copied or pickled: the copy would act on the original; make a new one"
+    )
+
+
+def test_the_objects_of_a_slave_are_not_copied_with_what_acts_on_it() -> None:
+    with pytest.raises(TypeError, match="cannot be copied"):
+        copy.deepcopy(slave().dictionary)
+
+
+def classes() -> Iterator[type]:
+    """Give every class of device/."""
+    package = tickrig.device
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        for value in vars(importlib.import_module(module.name)).values():
+            if isinstance(value, type) and value.__module__ == module.name:
+                yield value
+
+
+def is_machine(kind: type) -> bool:
+    is_device = all(hasattr(kind, name) for name in ("tick", "reset", "due_us"))
+    is_body = ".body." in kind.__module__ and hasattr(kind, "step")
+    return is_device or is_body or issubclass(kind, Service)
+
+
+def test_every_type_of_device_refuses() -> None:
+    machines = {kind for kind in classes() if is_machine(kind) and kind.__name__ != "Device"}
+    assert {Rrc, Urg, CanopenSlave, WheeledBody, OmniBody, ModbusSlave} <= machines
+    assert [kind for kind in machines if not issubclass(kind, NonCopyable)] == []
+
+
+FROZEN: Final = (
+    *(RrcConfig(), NodeConfig(), UrgParameters(), BaseParameters(), WHEELS, OmniParameters()),
+    *(World(posts=(Post(1, 0, 0.2),)), room(4, 3), Pose(1, 2, 3), EPOS_WHEEL),
+    *(Input("lamp", "lamp"), Output("state", "state"), CanFrame.parse("123#00")),
+)
+
+
+@pytest.mark.parametrize("value", FROZEN, ids=lambda value: type(value).__name__)
+def test_values_are_copied(value: object) -> None:
+    assert copy.copy(value) == copy.deepcopy(value) == pickle.loads(pickle.dumps(value)) == value
