@@ -158,7 +158,7 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]:
     from tickrig.host.monitor.check.column_check import check_columns  # noqa: PLC0415 - numpy
 
-    return check_columns(log.columns, rules, bit_rate, log.words())
+    return check_columns(log.columns, rules, bit_rate, log.losses())
 
 
 def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int | None) -> None:
@@ -171,7 +171,7 @@ def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int
 
     with until_interrupted():
         listen(source, take, span_us)
-    lost = source.words()
+    lost = source.losses()
     verdict.take(checker.end(watch.now_us if source.live else watch.latest_us, lost))
 
 

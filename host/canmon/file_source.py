@@ -70,6 +70,11 @@ class FileSource:
         named = zip(self._names, self._readers, strict=True)
         return [word for name, reader in named for word in reader.tally.words(name)]
 
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        named = zip(self._names, self._readers, strict=True)
+        return [word for name, reader in named for word in reader.tally.losses(name)]
+
     def close(self) -> None:
         """Read no more."""
         self._ended = True

@@ -115,7 +115,12 @@ class LiveSource(Generic[Item]):
 
     def words(self) -> list[str]:
         """Say what was no frame or got lost."""
-        said = [word for reader in self._readers for word in reader.tally.words(reader.name)]
+        remarks = (word for one in self._readers for word in one.tally.remarks(one.name))
+        return [*self.losses(), *remarks]
+
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        said = [word for reader in self._readers for word in reader.tally.losses(reader.name)]
         said += [
             f"{one.name}: its driver lost {one.lost} frames" for one in self._readers if one.lost
         ]

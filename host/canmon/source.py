@@ -74,6 +74,10 @@ class AnySource(Protocol[Taken_co]):
         """Say what was no frame or got lost, one line each."""
         ...
 
+    def losses(self) -> list[str]:
+        """Say what of it got lost or could not be taken: not what is no frame by its nature."""
+        ...
+
     def close(self) -> None:
         """Give back what it holds; closing twice is no error."""
         ...

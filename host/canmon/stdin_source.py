@@ -59,6 +59,10 @@ class StdinSource:
         """Say what was no frame or got lost."""
         return self._lines.tally.words("standard input")
 
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        return self._lines.tally.losses("standard input")
+
     def close(self) -> None:
         """Read no more; the descriptor is not ours."""
         self._ended = True

@@ -52,6 +52,10 @@ class WholeLog:
         """Say what was no frame or got lost, one line each."""
         return self.columns.tally.words(self._name)
 
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        return self.columns.tally.losses(self._name)
+
     def snapshot(self) -> Snapshot:
         """Return the statistics of all frames."""
         from tickrig.host.monitor.column_traffic import snapshot_of  # noqa: PLC0415 - numpy

@@ -75,7 +75,21 @@ class Tally:
 
     def words(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if all was returned."""
-        said = self.bad_lines.words(name)
-        said += [f"{name}: {count} {what} passed over" for what, count in self.passed_over.items()]
-        said += [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
+        return self.losses(name) + self.remarks(name)
+
+    def losses(self, name: str) -> list[str]:
+        """Say what was lost or could not be taken."""
+        said = self.bad_lines.words(name) + self._passed_over(name, no_frames=False)
         return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])
+
+    def remarks(self, name: str) -> list[str]:
+        """Say what else there is to know of the log."""
+        untimed = [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
+        return self._passed_over(name, no_frames=True) + untimed
+
+    def _passed_over(self, name: str, *, no_frames: bool) -> list[str]:
+        return [
+            f"{name}: {count} {what} passed over"
+            for what, count in self.passed_over.items()
+            if (what in NO_FRAMES) is no_frames
+        ]

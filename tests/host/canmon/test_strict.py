@@ -75,3 +75,16 @@ def test_what_is_no_frame_by_its_nature_is_no_loss(log: Path) -> None:
     log.write_text(text, "ascii")
     result = canmon(["dump"], log)
     assert (result.exit_code, "lines of a serial port passed over" in result.stderr) == (0, True)
+
+
+@pytest.mark.parametrize("small_bytes", [0, 1 << 20])
+def test_what_is_no_frame_by_its_nature_breaks_no_loss_neither(
+    small_bytes: int, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(whole_log, "SMALL_BYTES", small_bytes)
+    log.write_text("  can0  705   [1]  7F\n  ttyS0  <  SA:64\n", "ascii")
+    result = canmon(["check", "--no-loss"], log)
+    assert (result.exit_code, result.stdout) == (0, "")
+    log.write_text("  can0  705   [1]  7F\nnoise\n", "ascii")
+    result = canmon(["check", "--no-loss"], log)
+    assert "no-loss" in result.stdout

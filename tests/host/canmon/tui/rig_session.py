@@ -36,6 +36,9 @@ class RigSource:
     def words(self) -> list[str]:
         return []
 
+    def losses(self) -> list[str]:
+        return []
+
     def close(self) -> None:
         """There is nothing to close."""
 
