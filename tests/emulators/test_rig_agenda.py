@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import can
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.emulators.canopen.dimmer import Dimmer
 from tests.emulators.lamp import Lamp
@@ -26,6 +29,7 @@ from tickrig.emulators.player import Player
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rig_clock import RigClock
 from tickrig.emulators.scenario import ScenarioParser
+from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
 from tickrig.emulators.sim_network import SimNetwork
 from tickrig.emulators.transcript import Transcript
@@ -193,3 +197,25 @@ def test_an_action_that_fails_is_over() -> None:
     assert emulator.touch_us == 7_000
     emulator.rig.run_to(10_000)
     assert emulator.touch_us == 11_000
+
+
+@given(st.lists(st.tuples(st.integers(0, 20_000), st.sampled_from(["lamp", "key", "dead"]))))
+def test_dense_and_sparse_runs_are_the_same_whatever_is_done(
+    touches: list[tuple[int, str]],
+) -> None:
+    def heard(*, dense: bool) -> list[tuple[int, bytes]]:
+        line, lamp = SerialLine(), Lamp()
+        rig = Rig(Station(lamp, line.a), dense=dense)
+        link, lines = SimLink(rig, line.b), list[tuple[int, bytes]]()
+
+        def toggle(name: str, now_us: int) -> None:
+            lamp.inputs.set(name, 1 - lamp.inputs[name])
+
+        for number, (at_us, name) in enumerate(touches):
+            rig.agenda.put(number, at_us, partial(toggle, name))
+        while link.now_us < 30_000:
+            link.send(b"x")
+            lines.append((link.now_us, link.receive(3_000)))
+        return lines
+
+    assert heard(dense=True) == heard(dense=False)
