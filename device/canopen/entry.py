@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from tickrig.device.canopen.abort import SdoAbort
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access
+
+TRUTH: Final = (0, 1)
 
 __all__ = ["MAX_VARIABLE_BYTES", "Access", "Entry"]
 
@@ -88,6 +91,12 @@ class Entry:
         return twin
 
     @property
+    def takes_all(self) -> bool:
+        """Whether every value of the right size is taken, and nobody acts on it."""
+        free = self.low is None and self.high is None and self.data_type is not DataType.BOOLEAN
+        return free and self.guard is None and self.written is None
+
+    @property
     def key(self) -> int:
         """Index and sub-index in one number."""
         return self.index << 8 | self.sub
@@ -146,6 +155,8 @@ class Entry:
         value = self.data_type.decode(data)
         if isinstance(value, int | float):
             self._check_limits(value)
+        if self.data_type is DataType.BOOLEAN and value not in TRUTH:
+            raise SdoAbort(AbortCode.VALUE_RANGE)
         if self.guard is not None:
             self.guard(value)
         self.assign(data)

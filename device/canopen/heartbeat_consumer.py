@@ -19,6 +19,7 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 
 CONSUMER_HEARTBEAT_TIME: Final = 0x1016
 MAX_NODES: Final = 127
+RESERVED: Final = 0xFF00_0000
 
 
 class Watch(Enum):
@@ -84,7 +85,8 @@ class HeartbeatConsumer(Service):
     manufacturer-specific byte is the node-ID, and a communication error (1029h).
     The error is cleared when a heartbeat comes again, or when its entry is
     changed. An entry with time 0 or a node-ID that is not 1..127 is not used. A
-    second one for the same node-ID is refused with 0604 0043h.
+    second one for the same node-ID is refused with 0604 0043h, reserved bits with
+    0609 0030h.
 
     Attributes:
         monitors: the entries that are used.
@@ -139,6 +141,8 @@ class HeartbeatConsumer(Service):
     def _guard(self, entry: Entry) -> Callable[[Value], None]:
         def guard(value: Value) -> None:
             number = value if isinstance(value, int) else 0
+            if number & RESERVED:
+                raise SdoAbort(AbortCode.VALUE_RANGE)
             others = (other.number for other in self._entries if other is not entry)
             if _is_used(number) and any(
                 _is_used(other) and _node_id(other) == _node_id(number) for other in others

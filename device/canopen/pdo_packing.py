@@ -82,8 +82,7 @@ def make_write(entry: Entry) -> Unpack:
     A value that its limits or its owner refuse is not taken, and nobody is told:
     a PDO has no answer. It is the straight way if nobody judges the entry.
     """
-    judged = entry.guard or entry.written or entry.low is not None or entry.high is not None
-    if not judged or not entry.writable:
+    if entry.takes_all or not entry.writable:
         return entry.assign
 
     def write(data: bytes) -> None:

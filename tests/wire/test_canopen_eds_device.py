@@ -137,6 +137,10 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
             "DefaultValue=0x12ul is no number of CiA 306: 0x12 is taken",
         ),
         (f"{U8}HighLimit=0099\n", "HighLimit=0099 is no number of CiA 306: 99 is taken"),
+        (
+            "ParameterName=x\nDataType=1\nAccessType=rw\nDefaultValue=0xFF\n",
+            "DefaultValue=0xFF is no BOOLEAN: 1 is taken",
+        ),
         (f"{U8}Factor=0\n", "Factor=0 is no factor: 1 is taken"),
         (f"{U8}Factor=big\n", "Factor=big is no factor: 1 is taken"),
         (

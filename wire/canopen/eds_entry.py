@@ -14,6 +14,7 @@ from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, Object
 
 SIMPLE_TYPES: Final = range(0x1C)
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
+TRUTH: Final = (0, 1)
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
 
 
@@ -163,6 +164,8 @@ def _value(file: EdsFile, section: str, key: str, kind: DataType) -> tuple[bytes
         if kind in ASCII_TEXTS and not text.isascii():
             return _foreign_text(file, section, key, kind), False
         value, relative = parse_value(kind, text)
+        if kind is DataType.BOOLEAN and value not in TRUTH:
+            file.warn(section, f"{key}={shorten(text)} is no BOOLEAN: 1 is taken")
         return kind.encode(value), relative
     except (ValueError, OverflowError):
         file.refuse(section, f"{key}={shorten(text)} is no {kind.name}")

@@ -15,7 +15,7 @@ from tickrig.device.canopen.ds402.fault_memory import FaultMemory
 from tickrig.device.canopen.ds402.faults import ErrorCode
 from tickrig.device.canopen.ds402.limits import Limits
 from tickrig.device.canopen.ds402.mode import Mode
-from tickrig.device.canopen.ds402.modes import MODES, supported
+from tickrig.device.canopen.ds402.modes import MODES, offered, supported
 from tickrig.device.canopen.ds402.motor import IdealMotor, Motor
 from tickrig.device.canopen.ds402.parameters import Parameters
 from tickrig.device.canopen.ds402.reference import Control, Reference
@@ -99,6 +99,9 @@ class Ds402(Application):
         self._servo = servo
         motor: Motor = servo or IdealMotor()
         self.parameters = Parameters(node.dictionary)
+        listed = self.parameters.number(indices.SUPPORTED_MODES)
+        self.offered = offered(self.modes, listed)
+        self._supported = listed or supported(self.offered)
         self.settings = read_settings(self.parameters, motor.counts_per_turn)
         self.axis = Axis(motor, self.settings)
         self.motor, self.reference, self.switches = motor, self.axis.reference, Switches()
@@ -124,7 +127,7 @@ class Ds402(Application):
         parameters.watch((indices.MODES_OF_OPERATION,), self._change_mode)
         parameters.watch((*TARGETS, *self.more_targets), self._refresh)
         parameters.watch(CONFIGURATION, self._outdate)
-        guard_values(self.node.dictionary, self.modes)
+        guard_values(self.node.dictionary, self.offered)
         self.node.on_sync.append(self._sync)
 
     @property
@@ -204,7 +207,7 @@ class Ds402(Application):
         self.connection.lost.clear()
         self.automaton.restart()
         self.controlword = self.parameters.number(indices.CONTROLWORD)
-        self.parameters.write(indices.SUPPORTED_MODES, supported(self.modes))
+        self.parameters.write(indices.SUPPORTED_MODES, self._supported)
         self._outdate()
         self._change_mode()
 
@@ -296,7 +299,7 @@ class Ds402(Application):
 
     def _change_mode(self) -> None:
         number = self.parameters.number(indices.MODES_OF_OPERATION)
-        if number in self.modes:
+        if number in self.offered:
             self.mode_number = number
             self.parameters.write(indices.MODES_OF_OPERATION_DISPLAY, number)
             if self.enabled:

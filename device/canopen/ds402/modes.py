@@ -27,6 +27,15 @@ MODES: Final[dict[int, type[Mode]]] = {
 """Of any drive; a model may have more of its own, with negative numbers."""
 
 
+def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[Mode]]:
+    """Return the modes that a dictionary lists in its 6502h, all if it lists none.
+
+    >>> sorted(offered(MODES, 0b101))
+    [0, 1, 3]
+    """
+    return {n: mode for n, mode in modes.items() if n <= 0 or not listed or listed >> n - 1 & 1}
+
+
 def supported(modes: Mapping[int, type[Mode]]) -> int:
     """Return 6502h: bit n - 1 for mode n.
 

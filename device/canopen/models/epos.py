@@ -127,7 +127,7 @@ def _add_control(objects: Objects) -> None:
     objects.variable(0x6061, "Modes of operation display", I8, ROT)
     objects.variable(0x60FD, "Digital inputs", U32, ROT)
     objects.variable(0x6402, "Motor type", U16, RO, 1)
-    objects.variable(0x6502, "Supported drive modes", U32, RO)
+    objects.variable(0x6502, "Supported drive modes", U32, RO, modes.supported(modes.MODES))
 
 
 def _add_options(objects: Objects) -> None:
@@ -189,9 +189,9 @@ def _add_torque(objects: Objects) -> None:
 def _add_profile(objects: Objects) -> None:
     objects.variable(0x607F, "Max profile velocity", U32, RW, 25_000)
     objects.variable(0x6080, "Max motor speed", U32, RW, 25_000)
-    objects.variable(0x6081, "Profile velocity", U32, RW, 1_000)
-    objects.variable(0x6083, "Profile acceleration", U32, RW, 10_000)
-    objects.variable(0x6084, "Profile deceleration", U32, RW, 10_000)
+    objects.variable(0x6081, "Profile velocity", U32, RWW, 1_000)
+    objects.variable(0x6083, "Profile acceleration", U32, RWW, 10_000)
+    objects.variable(0x6084, "Profile deceleration", U32, RWW, 10_000)
     objects.variable(0x6085, "Quick stop deceleration", U32, RW, 10_000)
     objects.variable(0x6086, "Motion profile type", I16, RW)
 

@@ -151,3 +151,10 @@ def test_the_own_heartbeat_carries_the_new_state_at_once() -> None:
     bus.run(99)
     assert bus.step("000#0105", "707#05") == ["705#05"]
     assert bus.run(200) == ["705#05", LOST, "705#7F"]
+
+
+def test_reserved_bits_are_refused() -> None:
+    bus = booted(errors(), array(0x1016, 0))
+    for bit in range(24, 32):
+        assert write(bus, 0x1016, NODE_7_200_MS | 1 << bit, 1) == AbortCode.VALUE_RANGE
+    assert bus.slave.dictionary[0x1016, 1].number == 0

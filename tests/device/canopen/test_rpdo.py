@@ -8,7 +8,7 @@ from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.pdo_consumer import PdoConsumer
 from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.datatypes import DataType, Value
 
 
 @pytest.fixture
@@ -363,3 +363,16 @@ def test_an_rpdo_without_objects_ignores_what_comes(running: PdoBench) -> None:
     running.must_write((0x1402, 1, 0x405))
     running.step("405#00")
     assert running.emergencies == []
+
+
+def test_a_boolean_takes_only_0_and_1() -> None:
+    bench = PdoBench(Entry(0x2100, 0, "on", DataType.BOOLEAN, RW | RPDO))
+    bench.must_write((0x1400, 1, OFF | 0x205))
+    bench.map(0x1600, 0x2100_0008)
+    bench.set_rpdo1(255)
+    bench.operational()
+    seen = []
+    for data in ("01", "02", "FF", "00"):
+        bench.step(f"205#{data}")
+        seen.append(bench.slave.dictionary[0x2100, 0].number)
+    assert seen == [1, 1, 1, 0]

@@ -87,3 +87,13 @@ def test_every_data_type_goes_there_and_back(kind: DataType) -> None:
         client.download(0x2000, data)
     assert bus.slave.dictionary[0x2000, 0].data == data
     assert client.upload(0x2000) == data
+
+
+def test_a_boolean_is_0_or_1() -> None:
+    bus = make_bus([Entry(0x2100, 0, "on", DataType.BOOLEAN, Access.READ | Access.WRITE)])
+    bus.step()
+    for value, answer in (("01", "60"), ("02", "80"), ("FF", "80"), ("00", "60")):
+        (sent,) = bus.step(f"605#2F002100{value}000000")
+        assert sent.startswith(f"585#{answer}002100")
+        assert sent.endswith("30000906" if answer == "80" else "00000000")
+    assert bus.slave.dictionary[0x2100, 0].value == 0

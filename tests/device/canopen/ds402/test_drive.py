@@ -9,7 +9,7 @@ from tickrig.device.canopen.abort import SdoAbort
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.ds402.state import DriveState
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.entry import Access, Entry
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.core import NEVER
 
@@ -310,6 +310,17 @@ def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
 def test_the_supported_modes_are_shown() -> None:
     bench = Bench(Entry(0x6502, 0, "Supported drive modes", U32, RW))
     assert bench.read(0x6502) == 0x3ED
+
+
+def test_the_modes_that_an_eds_lists_are_those_that_it_has() -> None:
+    listed = Entry(0x6502, 0, "Supported drive modes", U32, Access.READ, default=0b111)
+    bench = Bench(listed)
+    assert bench.read(0x6502) == 0b111  # mode 2 is listed, but no drive here has it
+    bench.write(0x6060, 3)
+    assert bench.read(0x6061) == 3
+    for mode in (2, 4):
+        with pytest.raises(SdoAbort, match="VALUE_RANGE"):
+            bench.write(0x6060, mode)
 
 
 def test_a_limit_switch_stops_a_plain_drive_without_a_fault(bench: Bench) -> None:

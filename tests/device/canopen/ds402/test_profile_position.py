@@ -353,3 +353,15 @@ def test_the_demand_never_jumps_and_ends_where_a_set_point_was(
         wheel.control(READY)
     arrive(wheel)
     assert wheel.read(0x606B) == 0
+
+
+@pytest.mark.parametrize("index", [0x6081, 0x6083, 0x6084])
+def test_the_profile_of_a_move_comes_in_a_pdo(wheel: Wheel, index: int) -> None:
+    for at, sub, value in (
+        *((0x1400, 1, 1 << 31 | 0x201), (0x1600, 0, 0), (0x1600, 1, index << 16 | 32)),
+        *((0x1600, 0, 1), (0x1400, 1, 0x201)),
+    ):
+        wheel.write(at, value, sub)
+    wheel.step("000#0101")
+    wheel.step("201#2C010000")
+    assert wheel.read(index) == 300
