@@ -22,7 +22,7 @@ def refusal(command: Command, *, adjusting: bool) -> str:
     if len(command.parameters) != wanted:
         return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
     if adjusting and command.symbol not in ("TM", "RS"):
-        return status.NO_REPLY
+        return status.UNKNOWN  # by which the vendor's urg_library knows the mode
     return ""
 
 

@@ -8,7 +8,6 @@ OK: Final = "00"
 DATA: Final = "99"
 """Behind the echo of a scan that was asked for with MD or MS."""
 
-NO_REPLY: Final = "0A"
 REPEATED: Final = "0B"
 TOO_SHORT: Final = "0C"
 TOO_LONG: Final = "0D"

@@ -261,9 +261,9 @@ def test_the_timer_is_told_in_adjust_mode_alone() -> None:
     measured.ask("BM")
     assert [measured.ask("TM0"), measured.ask("TM0")] == ["00", "02"]
     assert measured.urg.read("laser") == 0
-    assert measured.ask("BM") == "0A"
+    assert [measured.ask("BM"), measured.run(1, b"QT\n")] == ["0E", b"QT\n0Ee\n\n"]
     (reply,) = measured.replies(1, b"TM1\n")
-    assert parse_number(reply.lines[0][:-1]) == 5
+    assert parse_number(reply.lines[0][:-1]) == 6
     assert [measured.ask("TM2"), measured.ask("BM")] == ["00", "00"]
 
 
