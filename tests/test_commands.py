@@ -1,8 +1,9 @@
-"""Every console command, in an environment without extras."""
+"""Every console command: without extras, interrupted while it loads, unable to print."""
 
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import tomllib
@@ -147,3 +148,46 @@ def test_what_needs_no_extra_works(said: dict[str, Result], line: str) -> None:
     code, out, err = said[line]
     assert (code, "Traceback" in err) == (0, False)
     assert GOOD[line] in out
+
+
+LOADING = [
+    f"{count} {SCRIPTS[line.split()[0]]} {line}"
+    for count in (20, 90)
+    for line in [f"{script} {words}" for script, (words, _) in BAD.items()]
+]
+
+
+def test_ctrl_c_while_it_loads_shows_no_traceback(tmp_path: Path) -> None:
+    process = subprocess.run(
+        [sys.executable, ROOT / "tests" / "interrupted.py"],
+        input="".join(f"{line}\n" for line in LOADING),
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=True,
+    )
+    answers = list(map(json.loads, process.stdout.splitlines()))
+    for line, (code, text) in zip(LOADING, answers, strict=True):
+        assert "Traceback" not in text, f"{line}: {text}"
+        assert code in {-signal.SIGINT, 1, 2}, f"{line}: {code} {text}"  # 1, 2: after loading
+    assert sum(code == -signal.SIGINT for code, _ in answers) > len(SCRIPTS)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("words", ["--help", "--version"])
+def test_a_full_disk_is_one_line(words: str) -> None:
+    with Path("/dev/full").open("w", encoding="ascii") as full:
+        process = subprocess.run(
+            [sys.executable, "-m", "tickrig", words],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert process.stderr == "Error: standard output: No space left on device\n"
+    assert process.returncode == 3
+
+
+def test_the_package_is_the_command() -> None:
+    words = [sys.executable, "-m", "tickrig", "--version"]
+    assert subprocess.check_output(words, text=True) == f"tickrig (tickrig) {__version__}\n"

@@ -40,7 +40,12 @@ def test_wheel_holds_one_top_level_name_and_all_modules(tmp_path: Path) -> None:
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*.py")
     }
-    assert packed == sources | {"tickrig/__init__.py", "tickrig/py.typed"}
+    assert packed == sources | {
+        "tickrig/__init__.py",
+        "tickrig/__main__.py",
+        "tickrig/commands.py",
+        "tickrig/py.typed",
+    }
 
 
 def test_a_checkout_without_links_is_refused_with_the_line_that_mends_it(tmp_path: Path) -> None:

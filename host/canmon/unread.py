@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
 
 from tickrig.host.canmon.failure import SourceFailed
-
-FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What a full disk says, and a terminal that is gone."""
+from tickrig.host.cli.start import FULL
 
 
 @contextmanager

@@ -1,12 +1,49 @@
-"""Begin a command: Ctrl-C ends it while it loads, too, and no traceback is seen."""
+"""Begin and end a command: no Ctrl-C and no full disk shows a traceback."""
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Any
+from typing import Any, Final
+
+INTERRUPTED: Final = 128 + signal.SIGINT
+"""Exit status that shells give a program which Ctrl-C ended."""
+
+FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What a full disk says, and a terminal that is gone."""
+
+UNWRITTEN: Final = 3
+"""Exit status where standard output takes nothing more."""
+
+
+def start(name: str, path: str) -> None:
+    """Run a command as a console script.
+
+    Args:
+        name: what people call it.
+        path: where it is, as `MODULE:NAME`.
+    """
+    command = load(path)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # `tickrig.commands` has seen to it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        command(prog_name=name)
+    except KeyboardInterrupt:  # before or behind where click looks for it
+        sys.exit(INTERRUPTED)
+    except OSError as error:  # of printing: whoever opens a file tells its name
+        if error.filename is not None or error.errno not in FULL:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"Error: standard output: {error.strerror or error}", file=sys.stderr)
+        sys.exit(UNWRITTEN)
+    finally:
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to be tidied up
 
 
 def load(path: str) -> Any:

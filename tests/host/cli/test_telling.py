@@ -9,9 +9,12 @@ import pytest
 from tickrig.host.cli.telling import warnings_told
 
 
-def test_the_library_is_silent_unless_somebody_listens() -> None:
-    program = "import logging, tickrig; logging.getLogger('tickrig.host').warning('beware')"
-    process = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+@pytest.mark.parametrize("part", ["host", "emulators"])
+def test_the_library_is_silent_unless_somebody_listens(part: str) -> None:
+    program = "import logging, tickrig.{0}; logging.getLogger('tickrig.{0}').warning('beware')"
+    process = subprocess.run(
+        [sys.executable, "-c", program.format(part)], capture_output=True, check=True
+    )
     assert process.stderr == b""
 
 

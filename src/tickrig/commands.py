@@ -1,0 +1,75 @@
+"""The console commands; what each needs is imported when it is called.
+
+Ctrl-C must end them from the first moment: this module imports nothing before that is so.
+"""
+
+from _signal import (  # type: ignore[import-not-found] # signal itself takes milliseconds
+    SIG_DFL,
+    SIGINT,
+    default_int_handler,
+    getsignal,
+    signal,
+)
+
+
+def _start(name: str, module: str) -> None:
+    if getsignal(SIGINT) is default_int_handler:
+        signal(SIGINT, SIG_DFL)
+    from tickrig.host.cli.start import start  # noqa: PLC0415
+
+    start(name, f"{module}:main")
+
+
+def tickrig() -> None:
+    """Call `tickrig`."""
+    _start("tickrig", "tickrig.emulators.cli")
+
+
+def rrc_emu() -> None:
+    """Call `rrc-emu`."""
+    _start("rrc-emu", "tickrig.emulators.rrc.cli")
+
+
+def rtc_lite_emu() -> None:
+    """Call `rtc-lite-emu`."""
+    _start("rtc-lite-emu", "tickrig.emulators.rtc_lite.cli")
+
+
+def canmon() -> None:
+    """Call `canmon`."""
+    _start("canmon", "tickrig.host.canmon.cli")
+
+
+def rh3() -> None:
+    """Call `rh3`."""
+    _start("rh3", "tickrig.emulators.rh3.motion_cli")
+
+
+def rh3_emu() -> None:
+    """Call `rh3-emu`."""
+    _start("rh3-emu", "tickrig.emulators.rh3.cli")
+
+
+def urg_emu() -> None:
+    """Call `urg-emu`."""
+    _start("urg-emu", "tickrig.emulators.urg.cli")
+
+
+def canopen_slave_emu() -> None:
+    """Call `canopen-slave-emu`."""
+    _start("canopen-slave-emu", "tickrig.emulators.canopen.cli")
+
+
+def rtc_canopen_server() -> None:
+    """Call `rtc-canopen-server`."""
+    _start("rtc-canopen-server", "tickrig.host.rtc_canopen.commands.server")
+
+
+def rtc_canopen_builder() -> None:
+    """Call `rtc-canopen-builder`."""
+    _start("rtc-canopen-builder", "tickrig.host.rtc_canopen.commands.builder")
+
+
+def rtc_canopen_editor() -> None:
+    """Call `rtc-canopen-editor`."""
+    _start("rtc-canopen-editor", "tickrig.host.rtc_canopen.commands.editor")
