@@ -98,6 +98,7 @@ class Rrc(NonCopyable):
             "state": self.state.value,
             "vr2_power": int(self.state in POWERED_ON),
             "error_led": int(self.state is RrcState.POWER_OFF_BY_OTHERS),
+            "stick_drives": int(self._drive.by_stick),
             "out_v_pct": self._drive.out_pct[0],
             "out_w_pct": self._drive.out_pct[1],
             "speed_mode": self._settings.speed_mode,

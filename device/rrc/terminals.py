@@ -50,6 +50,7 @@ OUTPUTS: Final = {
         Output("state", "state of the RRC"),
         Output("vr2_power", "1 while VR2 runs"),
         Output("error_led", "1 while the controller's LED blinks an error"),
+        Output("stick_drives", "1 while the stick drives, 0 while it waits or the host drives"),
         Output("out_v_pct", "translation to the power module", "%"),
         Output("out_w_pct", "rotation to the power module", "%"),
         Output("speed_mode", "speed mode of VR2, 1 to 5"),

@@ -3,34 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar, Final
+from typing import ClassVar, Final, NamedTuple
 
 from rich.text import Text
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
-from textual.widgets import Footer, Static
+from textual.widgets import Static
 
 from tickrig.emulators.inbox import EmulatorEnded
 from tickrig.emulators.requests import VERSION, Object
-from tickrig.emulators.rrc import panel_text
+from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
 from tickrig.emulators.trace import Mark
 from tickrig.host.cli.duration import format_time
+from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui.key_footer import KeyFooter
 
+Values = dict[str, int | str]
 Ask = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Makes requests of an emulator, those of the control socket, and brings the answers."""
 
 REFRESH_S: Final = 0.1
 STEP_PCT: Final = 10
 KEPT_LINES: Final = 60
+REPORT_US: Final = 500_000
+"""So long the latest SA line stands; one comes each 10 ms while the status is on."""
+
+HELP: Final = """\
+arrows  move the stick by 10 %; it stays where it is
+space   let the stick go
+p       power button: VR2 on, off, out of a forced stop
+a       alarm button: in Standby the stick drives then,
+        plainly; with D held without backing, with U with
+        gears, with both it also backs towards the stick
+u d     press a speed button
+U D     hold a speed button, or let it go
+1-6     let a fault come, or go; 6 cuts the line
+F1 ?    this help; Esc leaves it
+q       end the emulator"""
+
+LEAST: Final = (60, 15)
+ROOMY: Final = (80, 24)
+"""Columns and lines: with fewer than the first there is no panel, with the second all of it."""
 
 
-class RrcPanel(App[None]):
+class RrcPanel(FramedApp):
     """Stick, buttons, faults and lamps of an RRC and its VR2.
 
     A terminal tells no key-up: arrows move the stick and leave it there, a
     button key is a pulse of 100 ms, and capitals hold the speed buttons.
+
+    Below 80 x 24 it draws no square for the stick and no frames; 60 x 15 is the least.
 
     Args:
         ask: reaches the emulator.
@@ -38,6 +62,9 @@ class RrcPanel(App[None]):
     """
 
     ENABLE_COMMAND_PALETTE = False
+    # Textual's names, never changed: classes of the screen from so many columns and lines on.
+    HORIZONTAL_BREAKPOINTS = [(0, "-tiny"), (LEAST[0], "-small"), (ROOMY[0], "-roomy")]  # noqa: RUF012
+    VERTICAL_BREAKPOINTS = [(0, "-tiny"), (LEAST[1], "-small"), (ROOMY[1], "-roomy")]  # noqa: RUF012
     CSS = """
     #top { height: 14; }
     #stick { width: 27; }
@@ -46,7 +73,19 @@ class RrcPanel(App[None]):
     #controls { height: 6; }
     #wire { height: 1fr; }
     .pane { border: round $primary; padding: 0 1; }
-    #status { height: 1; background: $boost; }
+    #status, #report { height: 1; }
+    #status { background: $boost; }
+    .-small #stick { display: none; }
+    .-small #top { height: 8; }
+    .-small #outputs { height: 5; }
+    .-small #controls { height: 3; }
+    .-small .pane { border: none; }
+    #help { display: none; padding: 0 1; }
+    .-helps #panel { display: none; }
+    .-helps #help { display: block; }
+    #tiny { display: none; }
+    .-tiny #panel, .-tiny #help, .-tiny #keys { display: none; }
+    .-tiny #tiny { display: block; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "stick(1,0)", "forward", show=False, priority=True),
@@ -56,15 +95,14 @@ class RrcPanel(App[None]):
         Binding("space", "centre", "centre"),
         Binding("p", "press('power_button')", "power"),
         Binding("a", "press('alarm_button')", "alarm"),
-        Binding("u", "press('speed_up_button')", "speed", key_display="u d"),
-        Binding("d", "press('speed_down_button')", show=False),
-        Binding("U", "hold('speed_up_button')", "hold", key_display="U D"),
-        Binding("D", "hold('speed_down_button')", show=False),
+        Binding("u", "press('speed_up_button')", "speed", key_display="u d U D"),
+        Binding("d", "press('speed_down_button')", "speed down", show=False),
+        Binding("U", "hold('speed_up_button')", "hold speed up", show=False),
+        Binding("D", "hold('speed_down_button')", "hold speed down", show=False),
         *[
             Binding(key, f"fault('{name}')", "faults", show=key == "1", key_display="1-6")
             for key, name in FAULT_KEYS.items()
         ],
-        Binding("q,ctrl+c", "quit", "quit", key_display="q"),
     ]
 
     def __init__(self, ask: Ask, ready: Callable[[], None] = lambda: None) -> None:
@@ -72,18 +110,38 @@ class RrcPanel(App[None]):
         self._ask, self._when_ready = ask, ready
         self.view = View()
         self._seen = 0  # number of the latest line
+        self._report = Line(0, -REPORT_US, "", "")  # the latest SA
         self._shown: dict[str, Text] = {}  # what each pane shows: drawing is dear
 
     def compose(self) -> ComposeResult:
         """Lay out the panes."""
-        with Horizontal(id="top"):
-            yield _pane("stick", "stick")
-            with Vertical(id="right"):
-                yield _pane("outputs", "RRC and VR2")
-                yield _pane("controls", "buttons and faults")
-        yield _pane("wire", "wire")
-        yield Static(id="status")
-        yield Footer(compact=True)
+        with Vertical(id="panel"):
+            with Horizontal(id="top"):
+                yield _pane("stick", "stick")
+                with Vertical(id="right"):
+                    yield _pane("outputs", "RRC and VR2")
+                    yield _pane("controls", "buttons and faults")
+            yield _pane("wire", "wire")
+            yield Static(id="report")
+            yield Static(id="status")
+        yield Static(HELP, id="help", markup=False)
+        yield Static(id="tiny")
+        yield KeyFooter()
+
+    @property
+    def helps(self) -> bool:
+        """Whether help is on the screen; Textual's own has no room beside the panel."""
+        return bool(self.screen_stack and self.screen.has_class("-helps"))
+
+    def action_show_help_panel(self) -> None:
+        """Show what the keys do."""
+        self.screen.add_class("-helps")
+        self.refresh_bindings()
+
+    def action_hide_help_panel(self) -> None:
+        """Show the panel again."""
+        self.screen.remove_class("-helps")
+        self.refresh_bindings()
 
     def on_ready(self) -> None:
         """Begin to look at the emulator."""
@@ -138,36 +196,56 @@ class RrcPanel(App[None]):
             return []
 
     def _take(self, values: Object, status: Object, lines: Object) -> None:
-        fresh = [line for line in _lines(lines) if line[0] > self._seen]
-        self._seen = fresh[-1][0] if fresh else self._seen
-        reports = [text for _, _, mark, text in fresh if _is_report(mark, text)]
-        events = [line[1:] for line in fresh if not _is_report(*line[2:])]
+        fresh = [line for line in _lines(lines) if line.number > self._seen]
+        self._seen = fresh[-1].number if fresh else self._seen
+        now, present = _values(status), _values(values["values"])
+        for line in fresh:
+            if line.is_report:
+                self._report = line
+        events = [(format_time(x.at_us), x.mark, x.text) for x in fresh if not x.is_report]
         self.view = View(
-            _values(values["values"]),
-            _values(status),
+            present,
+            now,
             (*self.view.lines, *events)[-KEPT_LINES:],
-            reports[-1] if reports else self.view.report,
+            self._report.text if self._reports(now, present) else "",
         )
 
+    def _reports(self, status: Values, values: Values) -> bool:
+        """Whether SA lines come: VR2 runs, and the latest one is fresh."""
+        fresh = self._report.at_us + REPORT_US > int(status["now_us"])
+        return fresh and bool(values["vr2_power"])
+
     def _show(self) -> None:
-        view = self.view
+        view, roomy = self.view, self.size.width >= ROOMY[0] and self.size.height >= ROOMY[1]
+        panes = panel_text if roomy else small_panel_text
         pad = panel_text.stick_pad(view.number("stick_v_pct"), view.number("stick_w_pct"))
-        wire = self.query_one("#wire", Static)
-        wire.border_subtitle = view.report
+        self.query_one("#stick").border_subtitle = panel_text.stick_hint(view)
         for name, text in (
             ("stick", pad),
-            ("outputs", panel_text.outputs_pane(view)),
-            ("controls", panel_text.controls_pane(view)),
-            ("wire", panel_text.wire_pane(view, wire.content_size.height)),
+            ("outputs", panes.outputs_pane(view)),
+            ("controls", panes.controls_pane(view)),
+            ("wire", panel_text.wire_pane(view, self.query_one("#wire").content_size.height)),
+            ("report", panes.report_line(view)),
             ("status", panel_text.status_line(view)),
+            ("tiny", small_panel_text.too_small(self.size, LEAST)),
         ):
             if self._shown.get(name) != text:
                 self._shown[name] = text
                 self.query_one(f"#{name}", Static).update(text)
 
 
-def _is_report(mark: str, text: str) -> bool:
-    return mark == Mark.FROM_DEVICE and text.startswith("SA:")
+class Line(NamedTuple):
+    """A line on the wire."""
+
+    number: int
+    at_us: int
+    mark: str
+    text: str
+
+    @property
+    def is_report(self) -> bool:
+        """Whether it is one of a stream of SA lines."""
+        return self.mark == Mark.FROM_DEVICE and self.text.startswith("SA:")
 
 
 def _pane(name: str, title: str) -> Static:
@@ -180,14 +258,14 @@ def _request(do: str, **fields: object) -> Object:
     return {"v": VERSION, "do": do, **fields}
 
 
-def _values(answer: object) -> dict[str, int | str]:
+def _values(answer: object) -> Values:
     if not isinstance(answer, dict):
         return {}
     return {name: value for name, value in answer.items() if isinstance(value, int | str)}
 
 
-def _lines(answer: Object) -> list[tuple[int, str, str, str]]:
+def _lines(answer: Object) -> list[Line]:
     lines = answer["lines"]
     if not isinstance(lines, list):
         return []
-    return [(x["number"], format_time(x["at_us"]), x["mark"], x["text"]) for x in lines]
+    return [Line(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]

@@ -8,6 +8,9 @@ from typing import Final
 
 from rich.text import Text
 
+from tickrig.wire.errors import WireError
+from tickrig.wire.rrc.replies import StatusA, parse_reply
+
 Value = int | str
 
 FAULT_KEYS: Final = {
@@ -60,9 +63,36 @@ class View:
         return value if isinstance(value, int) else 0
 
     @property
+    def decoded(self) -> StatusA | None:
+        """What the SA line says; None if there is none."""
+        try:
+            reply = parse_reply(self.report.encode())
+        except WireError:
+            return None
+        return reply if isinstance(reply, StatusA) else None
+
+    @property
     def faults(self) -> tuple[str, ...]:
         """Names of the faults that are present."""
         return tuple(str(self.status.get("faults", "")).split())
+
+
+STICK_HINTS: Final = {
+    "Off": "the RRC has no power",
+    "Standby": "waits for limit, or a",
+    "Limit": "drives, within limits",
+    "Output": "the host drives",
+    "PowerOffByButton": "waits: VR2 goes off",
+    "PowerOffByOthers": "waits for p: stopped",
+}
+
+
+def stick_hint(view: View) -> str:
+    """Say whether the stick drives, and what it waits for if it does not; at most 21 columns."""
+    state = str(view.values.get("state", ""))
+    if state == "Standby" and view.number("stick_drives"):
+        return "drives"
+    return STICK_HINTS.get(state, "waits for p: VR2 off")
 
 
 def stick_pad(v_pct: int, w_pct: int) -> Text:
@@ -76,10 +106,11 @@ def stick_pad(v_pct: int, w_pct: int) -> Text:
             else:
                 text.append("┼" if (y, x) == (5, 10) else _axis(y, x), style=DIM)
         text.append("\n")
-    return text.append(f"v {_signed(v_pct)} %     w {_signed(w_pct)} %")
+    return text.append(f"v {signed(v_pct)} %     w {signed(w_pct)} %")
 
 
-def _signed(percent: int) -> str:
+def signed(percent: int) -> str:
+    """Write -100..100 in four columns."""
     return f"{percent:+4}" if percent else "   0"
 
 
@@ -100,7 +131,7 @@ def bar(percent: int) -> Text:
         "│",
         (right, ON),
         ("░" * (HALF - len(right)), DIM),
-        f" {_signed(percent)} %",
+        f" {signed(percent)} %",
     )
 
 
@@ -114,21 +145,30 @@ def lamp(label: str, value: Value, style: str) -> Text:
     return Text.assemble(("● ", style) if value else ("○ ", DIM), label)
 
 
-def outputs_pane(view: View) -> Text:
-    """Show what the RRC does."""
-    state = str(view.values.get("state", "?"))
-    lamps = [
+def lamps(view: View) -> list[Text]:
+    """Draw the three lamps."""
+    return [
         lamp("VR2 runs", view.number("vr2_power"), "bold green"),
         lamp("error LED", view.number("error_led"), "bold red"),
         lamp("buzzer", view.number("buzzer"), ON),
     ]
+
+
+def state_of(view: View) -> Text:
+    """Show the state in its colour."""
+    state = str(view.values.get("state", "?"))
+    return Text(f" {state} ", STATE_STYLES.get(state, "bold reverse"))
+
+
+def outputs_pane(view: View) -> Text:
+    """Show what the RRC does."""
     rows = [
-        Text.assemble("state  ", (f" {state} ", STATE_STYLES.get(state, "bold reverse"))),
+        Text.assemble("state  ", state_of(view)),
         Text.assemble("drive  v ", bar(view.number("out_v_pct"))),
         Text.assemble("       w ", bar(view.number("out_w_pct"))),
         Text.assemble("speed  ", scale(view.number("speed_mode"), 5), "   gear "),
         Text.assemble("gauge  ", scale(view.number("gauge"), 10)),
-        Text.assemble("       ", Text("   ").join(lamps)),
+        Text.assemble("       ", Text("   ").join(lamps(view))),
     ]
     rows[3].append(str(view.values.get("gear", "?")), style="bold")
     return Text("\n").join(rows)
@@ -136,18 +176,39 @@ def outputs_pane(view: View) -> Text:
 
 def controls_pane(view: View) -> Text:
     """Show which buttons are pressed and which faults are present."""
-    buttons = [
+    rows = [Text(" ").join(faults(view, 22)[at : at + 2]) for at in range(0, len(FAULT_KEYS), 2)]
+    return Text("\n").join([buttons(view), *rows])
+
+
+def buttons(view: View) -> Text:
+    """Show which buttons are pressed."""
+    return Text(" ").join(
         Text(f" {label} ", style="bold black on yellow" if view.number(name) else "reverse dim")
         for label, name in BUTTONS.items()
-    ]
-    faults = [
+    )
+
+
+def faults(view: View, width: int) -> list[Text]:
+    """Show each fault and its key, in so many columns."""
+    return [
         Text.assemble(
-            (f"{key} {name}", FAULT if name in view.faults else ""), " " * (20 - len(name))
+            (shown := f"{key} {name}", FAULT if name in view.faults else ""),
+            " " * (width - len(shown)),
         )
         for key, name in FAULT_KEYS.items()
     ]
-    rows = [Text(" ").join(faults[at : at + 2]) for at in range(0, len(faults), 2)]
-    return Text("\n").join([Text(" ").join(buttons), *rows])
+
+
+def report_line(view: View) -> Text:
+    """Show what the latest SA line says, with its raw text."""
+    if (sa := view.decoded) is None:
+        return Text(view.report)
+    return Text(
+        f" stick {sa.in_v_pct:+} {sa.in_w_pct:+}  out {sa.out_v_pct:+} {sa.out_w_pct:+}"
+        f"  gauge {sa.gauge}  speed {sa.speed_mode}"
+        f"  up {sa.speed_up_count} down {sa.speed_down_count} alarm {sa.alarm_count}",
+        style=DIM,
+    )
 
 
 def wire_pane(view: View, height: int) -> Text:

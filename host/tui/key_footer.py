@@ -61,7 +61,7 @@ class KeyFooter(Widget):
     def _bound(self, screen: Screen[object]) -> None:
         if self.is_attached and screen is self.screen:
             self.keys = list(self._bound_here())
-            self.refresh(layout=True)
+            self.call_later(self.refresh, layout=True)  # at once is forgotten at the start
 
     def _bound_here(self) -> Iterator[Key]:
         """Give a key for each action of each owner, then that of the commands by name."""

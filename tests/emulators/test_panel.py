@@ -11,8 +11,9 @@ from tickrig.emulators.control import Control
 from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.inbox import EmulatorEnded, Inbox
 from tickrig.emulators.requests import Object
-from tickrig.emulators.rrc import panel_text
-from tickrig.emulators.rrc.panel import RrcPanel
+from tickrig.emulators.rrc import panel as rrc_panel
+from tickrig.emulators.rrc import panel_text, small_panel_text
+from tickrig.emulators.rrc.panel import HELP, RrcPanel
 from tickrig.emulators.rrc.panel_picture import picture
 from tickrig.emulators.rrc.panel_run import run_panel
 from tickrig.emulators.rrc.panel_text import View
@@ -35,7 +36,9 @@ def on_panel(act: Act, size: tuple[int, int] = (80, 24)) -> None:
             await panel.look()
             await act(panel, emulator, pilot)
 
-    asyncio.run(main())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rrc_panel, "REFRESH_S", 3_600.0)  # it looks when it is told to
+        asyncio.run(main())
 
 
 def pass_time(emulator: Emulator, duration_us: int) -> None:
@@ -169,18 +172,144 @@ def test_it_ends_with_its_emulator() -> None:
     asyncio.run(main())
 
 
-@pytest.mark.parametrize("size", [(40, 10), (200, 60)])
-def test_it_lives_in_small_and_large_terminals(size: tuple[int, int]) -> None:
+def on_screen(panel: RrcPanel) -> list[str]:
+    """Return what stands on the screen, line by line."""
+    return [
+        "".join(segment.text for segment in line).rstrip()
+        for line in panel.screen._compositor.render_strips()
+    ]
+
+
+def drive_in_limit_mode(emulator: Emulator) -> None:
+    emulator.operator.press(emulator.touch_us, "power_button", 100_000)
+    pass_time(emulator, 500_000)
+    emulator.operator.set("stick", -100, -100)
+    emulator.send(emulator.rig.now_us, b"statusA1\nlimit6464ffffff\n")
+    pass_time(emulator, 100_000)
+
+
+@pytest.mark.parametrize("size", [(60, 15), (60, 40), (79, 24), (200, 23)])
+def test_in_60_columns_and_15_lines_all_is_there(size: tuple[int, int]) -> None:
     async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        drive_in_limit_mode(emulator)
+        await pilot.pause()
+        await panel.look()
+        await pilot.pause()
+        text = "\n".join(on_screen(panel))
+        for words in (
+            *("Limit", "● VR2 runs", "○ error LED", "○ buzzer", "stick drives, within limits"),
+            *("v stick -100  out", "w stick -100  out", "█│░░░░░░░░░░░░░░░ -100 %"),
+            *(
+                "speed ■□□□□ 1  gear N  gauge ■■■■■■■■■■ 10",
+                "power   alarm   speed up",
+            ),
+            *("3 power_module_fault", "6 cut", "< OK:limit", "F1 help", "q quit", "1-6 faults"),
+            *("in -100 -100 out -100 -100 gauge 10 speed 1 keys 0 0 0", "/tmp/rrc"),
+        ):
+            assert words in text
+
+    on_panel(act, size)
+
+
+@pytest.mark.parametrize("size", [(59, 15), (60, 14), (20, 3)])
+def test_a_terminal_that_is_too_small_is_told(size: tuple[int, int]) -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        await pilot.pause()
+        assert "v stick" in "\n".join(on_screen(panel))
         await pilot.resize_terminal(*size)
         await panel.look()
+        await pilot.pause()
+        shown = " ".join(line.strip() for line in on_screen(panel)).split()
+        assert shown == f"terminal too small: {size[0]} x {size[1]}, at least 60 x 15".split()
+        await pilot.resize_terminal(80, 24)
+        await panel.look()
+        await pilot.pause()
+        assert "─ stick ─" in "\n".join(on_screen(panel))
 
-    on_panel(act, (80, 24))
+    on_panel(act, (60, 15))
+
+
+def test_it_lives_in_a_large_terminal() -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        await pilot.pause()
+        assert "─ stick ─" in "\n".join(on_screen(panel))
+
+    on_panel(act, (200, 60))
+
+
+@pytest.mark.parametrize("size", [(60, 15), (80, 24)])
+def test_f1_explains_the_keys_and_escape_leaves_the_help(size: tuple[int, int]) -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        for leave in ("escape", "f1", "question_mark"):
+            await pilot.press("f1")
+            await pilot.pause()
+            lines = [line.strip() for line in on_screen(panel)]
+            assert {line.strip() for line in HELP.splitlines()} <= set(lines)
+            await pilot.press(leave)
+            await pilot.pause()
+            assert "q       end the emulator" not in on_screen(panel)
+            assert "○ VR2 runs" in "\n".join(on_screen(panel))
+
+    on_panel(act, size)
+
+
+def test_the_sa_line_is_told_in_words_and_goes_with_the_stream() -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        drive_in_limit_mode(emulator)
+        emulator.operator.press(emulator.touch_us, "alarm_button", 20_000)
+        pass_time(emulator, 50_000)
+        await panel.look()
+        told = "stick -100 -100  out -100 -100  gauge 10  speed 1  up 0 down 0 alarm 2"
+        assert shown(panel, "report").strip() == told
+        emulator.send(emulator.rig.now_us, b"statusA0\n")
+        pass_time(emulator, 600_000)
+        await panel.look()
+        assert not shown(panel, "report")
+
+    on_panel(act)
+
+
+def test_the_sa_line_goes_at_once_when_vr2_does() -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        drive_in_limit_mode(emulator)
+        await panel.look()
+        assert shown(panel, "report")
+        emulator.send(emulator.rig.now_us, b"poweroff\n")
+        pass_time(emulator, 30_000)
+        await panel.look()
+        assert not shown(panel, "report")
+
+    on_panel(act)
+
+
+@pytest.mark.parametrize(
+    ("state", "drives", "hint"),
+    [
+        ("Off", 0, "the RRC has no power"),
+        ("WaitPowerOn", 0, "waits for p: VR2 off"),
+        ("Standby", 0, "waits for limit, or a"),
+        ("Standby", 1, "drives"),
+        ("Limit", 1, "drives, within limits"),
+        ("Output", 0, "the host drives"),
+        ("PowerOffByButton", 0, "waits: VR2 goes off"),
+        ("PowerOffByOthers", 0, "waits for p: stopped"),
+    ],
+)
+def test_what_the_stick_waits_for_is_told(state: str, drives: int, hint: str) -> None:
+    view = View({"state": state, "stick_drives": drives})
+    assert panel_text.stick_hint(view) == hint
+    assert len(hint) <= 21
+
+
+def test_an_sa_line_that_cannot_be_read_is_shown_as_it_is() -> None:
+    for panes in (panel_text, small_panel_text):
+        assert panes.report_line(View(report="SA:nonsense")).plain == "SA:nonsense"
+        assert panes.report_line(View()).plain == ""
 
 
 def test_the_picture_is_the_panel() -> None:
     svg = picture().replace("&#160;", " ")
-    for text in ("Limit", "hold", "statusA1", "ER:CommandUnknown"):
+    for text in ("Limit", "within limits", "stick +80 -30", "hello", "ER:CommandUnknown"):
         assert text in svg
 
 

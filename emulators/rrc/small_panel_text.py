@@ -1,0 +1,55 @@
+"""The operator panel where there is little room: 60 columns, 15 lines."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tickrig.emulators.rrc import panel_text
+from tickrig.emulators.rrc.panel_text import DIM, View, bar, scale, signed
+
+
+def outputs_pane(view: View) -> Text:
+    """Show what the RRC does, and the stick beside what becomes of it."""
+    rows = [
+        Text(" ").join([panel_text.state_of(view), *panel_text.lamps(view)]),
+        Text(f"stick {panel_text.stick_hint(view)}", style="bold"),
+        *(
+            Text.assemble(f"{axis} stick {signed(view.number(f'stick_{axis}_pct'))}  out ", shown)
+            for axis, shown in (
+                ("v", bar(view.number("out_v_pct"))),
+                ("w", bar(view.number("out_w_pct"))),
+            )
+        ),
+        Text.assemble(
+            "speed ",
+            scale(view.number("speed_mode"), 5),
+            f"  gear {view.values.get('gear', '?')}  gauge ",
+            scale(view.number("gauge"), 10),
+        ),
+    ]
+    return Text("\n").join(rows)
+
+
+def controls_pane(view: View) -> Text:
+    """Show which buttons are pressed and which faults are present."""
+    shown = panel_text.faults(view, 0)
+    rows = [Text("  ").join(shown[at : at + 3]) for at in range(0, len(shown), 3)]
+    return Text("\n").join([panel_text.buttons(view), *rows])
+
+
+def report_line(view: View) -> Text:
+    """Show what the latest SA line says; the counters are those of speed up, down and alarm."""
+    if (sa := view.decoded) is None:
+        return Text(view.report)
+    return Text(
+        f"in {sa.in_v_pct:+} {sa.in_w_pct:+} out {sa.out_v_pct:+} {sa.out_w_pct:+}"
+        f" gauge {sa.gauge} speed {sa.speed_mode}"
+        f" keys {sa.speed_up_count} {sa.speed_down_count} {sa.alarm_count}",
+        style=DIM,
+    )
+
+
+def too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
+    """Say that the terminal is too small, in columns and lines."""
+    have, need = (f"{columns} x {lines}" for columns, lines in (size, least))
+    return Text(f"terminal too small: {have}, at least {need}")
