@@ -124,3 +124,21 @@ def test_a_rig_is_not_copied() -> None:
     rig = Rig(Station(Echo(), SerialLine().a))
     with pytest.raises(TypeError, match="Rig cannot be copied or pickled"):
         copy.copy(rig)
+
+
+@pytest.mark.parametrize(("late_us", "late_steps"), [(1_000, 0), (1_001, 3)])
+def test_a_step_is_late_beyond_a_millisecond(late_us: int, late_steps: int) -> None:
+    rig = Rig(Station(Echo(period_us=10_000), SerialLine().a), clock=SlowClock(late_us))
+    rig.run_for(30_000)
+    assert rig.late_steps == late_steps
+
+
+def test_time_without_work_passes_on_the_clock_and_on_the_bus() -> None:
+    wire, clock, heard = CanWire(), SlowClock(late_us=0), list[int]()
+    wire.observers.append(lambda at_us, frame: heard.append(at_us))
+    rig, end = Rig(clock=clock), wire.end()
+    wire.end()
+    rig.move_on(wire)
+    end.send(0, frames("123#"))
+    rig.run_to(700)
+    assert (clock.asked, heard, rig.now_us) == ([700], [45], 700)
