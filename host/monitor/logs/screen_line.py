@@ -21,6 +21,9 @@ from tickrig.wire.errors import WireError
 HEAD: Final = 1 << 13
 """Bytes of a text by which it is told what its stamps are."""
 
+LATE_US: Final = 10_000
+"""Frames of several buses are shown out of order by less."""
+
 _STAMP: Final = (
     r"\((?:(-?)([0-9]{1,12})|([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}))"
     r"\.([0-9]{1,9})\)\s+"
@@ -53,11 +56,11 @@ class ScreenClock:
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
-        """Return the clock of a text: of deltas, where its first spans fall again and again."""
+        """Return the clock of a text: of deltas, where its first spans fall often or by much."""
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
-        falls = sum(after < before for before, after in pairwise(spans))
-        return cls(falls * 4 > len(spans))
+        falls = [before - after for before, after in pairwise(spans) if after < before]
+        return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > LATE_US)
 
     def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
         """Return the time of a stamp; of the frame before, where there is none.

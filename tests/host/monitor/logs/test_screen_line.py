@@ -99,8 +99,14 @@ def test_stamps_from_frame_to_frame_are_added_up(at_once: bool, tmp_path: Path) 
 
 
 def test_times_that_go_back_a_little_are_no_gaps() -> None:
-    text = "".join(f" (00{n}.{n % 2}00000)  can0  705   [1]  7F\n" for n in (1, 2, 3, 5, 4, 6))
-    assert [one.at_us // 1_000_000 for one in read(text)[0]] == [1, 2, 3, 5, 4, 6]
+    text = "".join(f" (000.00{n}000)  can0  705   [1]  7F\n" for n in (1, 2, 3, 5, 4, 6))
+    assert [one.at_us // 1_000 for one in read(text)[0]] == [1, 2, 3, 5, 4, 6]
+
+
+def test_one_stamp_that_falls_by_much_counts_from_the_frame_before() -> None:
+    spans = ("000.000000", "000.250447", "000.355153", "000.290342", "000.380701")
+    text = "".join(f" ({span})  vcan0  705   [1]  05\n" for span in spans)
+    assert [one.at_us for one in read(text)[0]][2:] == [605_600, 895_942, 1_276_643]
 
 
 def test_lines_of_serial_ports_are_counted() -> None:
