@@ -88,7 +88,7 @@ class LineView(ScrollView, can_focus=True):
             self.virtual_size = size
         self._shown_rows = self.rows
         changed = [
-            number - self.top
+            number
             for number in range(self.top, self.top + self.rows)
             if _at(before, number - was) != _at(self.lines, number - begin)
         ]

@@ -30,6 +30,7 @@ class CursorView(LineView, Generic[T]):
     Attributes:
         rows_shown: the rows.
         cursor: the number of the row under the cursor.
+        title: stands in the frame above.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -60,7 +61,7 @@ class CursorView(LineView, Generic[T]):
         super().__init__(id)
         self.rows_shown: list[Row[T]] = []
         self.cursor = 0
-        self._cut = ""
+        self.title, self._framed = id, ("", "")
 
     @property
     def row(self) -> Row[T] | None:
@@ -90,7 +91,7 @@ class CursorView(LineView, Generic[T]):
             line = lines[self.cursor]
             cut = line[-1][0].strip() if line_width(line) > self._columns else ""
             lines[self.cursor] = self._under_cursor(line)
-        self._tell_cut(cut)
+        self._frame(cut)
         self.show(lines)
 
     @property
@@ -136,10 +137,12 @@ class CursorView(LineView, Generic[T]):
         """Show that the keys go elsewhere."""
         self.paint()
 
-    def _tell_cut(self, text: str) -> None:
-        if text != self._cut:  # each time paints the whole view again
-            self._cut = text
-            self.border_subtitle = Content(text) if text else None
+    def _frame(self, below: str) -> None:
+        """Write on the frame what changed: it paints the whole view again."""
+        if (self.title, below) != self._framed:
+            self._framed = self.title, below
+            self.border_title = Content(self.title)
+            self.border_subtitle = Content(below) if below else None
 
     def _under_cursor(self, line: Line) -> Line:
         style = FOCUSED if self.has_focus else ELSEWHERE

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from textual.content import Content
-
 from tickrig.host.monitor.decode.eds_objects import EdsObjects, Entry, read_eds
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.node_objects import NodeObjects
@@ -50,7 +48,7 @@ class ObjectsPane(CursorView[Entry]):
     def look(self, view: ServerView) -> None:
         """Read those in view; the server waits meanwhile."""
         if (objects := self.objects) is None:
-            self.border_title = "objects"
+            self.title = "objects"
             return
         node = view.node(objects.node_id)
         if node.phase is not Phase.READY:
@@ -58,7 +56,7 @@ class ObjectsPane(CursorView[Entry]):
         answers = node.phase is Phase.READY and node.nmt_state != "STOPPED"
         objects.look(view, [row.item for row in self.in_view], answers=answers)
         live = ", live" if objects.live else ""
-        self.border_title = Content(f"objects of {node.node_id} {node.name}{live}")
+        self.title = f"objects of {node.node_id} {node.name}{live}"
 
     def paint_objects(self) -> None:
         """Show what is known of them."""

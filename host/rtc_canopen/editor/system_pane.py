@@ -41,7 +41,6 @@ class SystemPane(CursorView[Item]):
 
     def __init__(self) -> None:
         super().__init__("system")
-        self.border_title = "system"
         self.forget()
 
     def forget(self) -> None:

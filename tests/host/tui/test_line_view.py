@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 from rich.style import Style
+from textual.app import App, ComposeResult
 
-from tickrig.host.tui.line_view import line_strip, rounded_up
+from tests.host.canmon.tui.pilot import screen_text
+from tickrig.host.tui.line_view import LineView, line_strip, plain, rounded_up
 
 LINE = (("185 ", "bold"), ("37 02", ""))
 
@@ -22,6 +26,30 @@ def test_pieces_keep_their_style_on_the_ground_of_the_widget() -> None:
     first, second = list(line_strip(LINE, ground, 0, 9))
     assert first.style == ground + Style(bold=True)
     assert second.style == ground
+
+
+@pytest.mark.parametrize("top", [0, 3, 50, 92])
+def test_a_line_that_changed_is_painted_wherever_the_view_is(top: int) -> None:
+    class Lines(App[None]):
+        def compose(self) -> ComposeResult:
+            yield LineView()
+
+    async def main() -> None:
+        app = Lines()
+        async with app.run_test(size=(20, 8)) as pilot:
+            view = app.query_one(LineView)
+            lines = [plain(f"line {number}") for number in range(100)]
+            view.show(lines)
+            await pilot.pause()
+            view.scroll_to(y=top)
+            await pilot.pause()
+            for row in (0, 4, 7):
+                lines[top + row] = plain(f"other {row}")
+                view.show(lines)
+                await pilot.pause()
+                assert f"other {row}" in screen_text(app)
+
+    asyncio.run(main())
 
 
 def test_a_height_is_never_too_low_and_at_most_one_part_in_32_too_high() -> None:
