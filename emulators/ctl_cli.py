@@ -11,8 +11,8 @@ import click
 
 from tickrig.emulators.ask import ask
 from tickrig.emulators.requests import Object
-from tickrig.host.cli.duration import format_time, parse_time_us
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.duration_option import time_us
 from tickrig.host.cli.setting import parse_setting
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
@@ -73,10 +73,7 @@ def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> Non
 @click.pass_obj
 def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
     """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
-    try:
-        duration_us = parse_time_us(duration)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    duration_us = time_us("--for", duration)
     _show(ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
 
 

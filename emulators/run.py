@@ -19,7 +19,7 @@ from tickrig.emulators.scenario import Line, ScenarioParser
 from tickrig.emulators.serving_clock import ServingClock
 from tickrig.emulators.signals import stopped_by_signals
 from tickrig.emulators.workbench import Workbench
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.telling import warnings_told
 
 RECORDING_ENDED: Final = 3
@@ -102,10 +102,11 @@ class EmulatorRun(ABC):
     def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
         """Read all that can be wrong before anything is opened."""
         bench, parser = self._rehearsal()
-        try:
+        with refused_at("--fault"):
             faults = [parse_fault_spec(text) for text in self._shared.faults]
             for spec in faults:
                 bench.operator.check_fault(spec)
+        try:
             return faults, parser.parse(*_read(self._shared.scenario))
         except ValueError as error:
             raise Refused(str(error)) from None

@@ -49,4 +49,10 @@ def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
     try:
         return parameters_of({name: v for name, v in options.items() if v is not None})
     except ValueError as error:
-        raise Refused(str(error)) from None
+        raise Refused(_by_option(str(error))) from None
+
+
+def _by_option(message: str) -> str:
+    """Name the option, where a message begins with the parameter."""
+    name, blank, rest = message.partition(" ")
+    return f"--{name.replace('_', '-')}{blank}{rest}" if name in (*NAMES, "address") else message

@@ -8,7 +8,7 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.rh3.base_options import base_options
-from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
+from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
 from tickrig.host.cli.start import loading
 
 COORDINATES: Final = {"ignore_unknown_options": True}
@@ -33,7 +33,7 @@ _SHARED: Final[Decorator] = add_options(
     ),
     click.option(
         "--pace",
-        type=click.FloatRange(0.01, 1_000),
+        type=NumberRange(0.01, 1_000),
         metavar="X",
         help="Speed of virtual time, 1 is real time; else as fast as it goes.",
     ),
@@ -107,7 +107,7 @@ def along_path(file: Path, **options: Any) -> None:
 @click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
 @click.option(
     "--side",
-    type=click.FloatRange(0.2, 100),
+    type=NumberRange(0.2, 100),
     metavar="M",
     help="Of the squares.  [4]",
 )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import click
 
 from tickrig.emulators.rh3.outing import Outing, Watcher, watched
+from tickrig.host.cli.options import NumberRange
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.motion.dead_reckoning import Wheels
 from tickrig.host.motion.drive import Ride, stop
@@ -76,7 +77,7 @@ class Squares:
             return ride.pose
         with self._watcher.asking():
             x_mm, y_mm = (
-                click.prompt(f"Measured {axis} of the cart from its start, mm", type=float)
+                click.prompt(f"Measured {axis} of the cart from its start, mm", type=NumberRange())
                 for axis in ("x", "y")
             )
         return Pose(x_mm / 1e3, y_mm / 1e3)

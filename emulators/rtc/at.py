@@ -11,9 +11,7 @@ import click
 from tickrig.emulators.ask import refused_by
 from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.requests import Object
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import PATH, Decorator
-from tickrig.host.cli.refused import Refused
 
 SYSTEM: Final = "system"
 VARIABLE: Final = "TICKRIG_RTC"
@@ -44,14 +42,6 @@ def ask_system(socket: Path, do: str, /, **fields: object) -> Any:
     """Ask a running system and return its answer; Refused if it gives none, or an error."""
     with refused_by(socket, SYSTEM), ControlClient(socket) as client:
         return client.ask(do, **fields)
-
-
-def time_us(word: str) -> int:
-    """Read a time of the command line; Refused if it is none."""
-    try:
-        return parse_time_us(word)
-    except ValueError as error:
-        raise Refused(str(error)) from None
 
 
 def components(socket: Path, *names: str) -> list[Any]:

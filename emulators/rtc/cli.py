@@ -6,11 +6,12 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.rtc.at import VARIABLE, default_path, time_us
+from tickrig.emulators.rtc.at import VARIABLE, default_path
 from tickrig.emulators.rtc.conf_cli import conf
 from tickrig.emulators.rtc.print_cli import print_
 from tickrig.emulators.rtc.verbs_cli import VERBS
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.duration_option import time_us
+from tickrig.host.cli.options import PATH, NumberRange
 from tickrig.host.cli.start import loading
 
 
@@ -61,7 +62,9 @@ def rtc() -> None:
 @click.option(
     "--lite-boot", default="0s", metavar="TIME", help="Silence once a line is open, as 3s."
 )
-@click.option("--rate", "rate_hz", type=float, metavar="HZ", help="Rate of all components.")
+@click.option(
+    "--rate", "rate_hz", type=NumberRange(1e-6, 1e6), metavar="HZ", help="Rate of all components."
+)
 @click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
 @click.option("--console", is_flag=True, help="Numbers typed here go to each ConsoleIn.")
 def run(lite_boot: str, **options: Any) -> None:
@@ -81,7 +84,7 @@ def run(lite_boot: str, **options: Any) -> None:
     with loading():
         from tickrig.emulators.rtc.run import SystemOptions, run_system  # noqa: PLC0415 - slow
 
-    run_system(SystemOptions(lite_boot_us=time_us(lite_boot), **options))
+    run_system(SystemOptions(lite_boot_us=time_us("--lite-boot", lite_boot), **options))
 
 
 for _command in (*VERBS, conf, print_):

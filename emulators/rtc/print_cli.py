@@ -12,9 +12,10 @@ import click
 
 from tickrig.emulators.ask import refused_by
 from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.rtc.at import SYSTEM, at, time_us
+from tickrig.emulators.rtc.at import SYSTEM, at
 from tickrig.emulators.rtc.completion import complete_port
 from tickrig.emulators.rtc.texts import value_line
+from tickrig.host.cli.duration_option import time_us
 
 POLL_S: Final = 0.02
 
@@ -34,7 +35,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
     tickrig rtc print ConsoleIn0.out
     tickrig rtc print SeqOut0.Long -n 10 --json
     """  # noqa: D301 - click wants the backspace
-    until_s = time.monotonic() + time_us(duration) / 1e6 if duration else None
+    until_s = time.monotonic() + time_us("--for", duration) / 1e6 if duration else None
     try:
         for value in _values(at, port, count, until_s):
             click.echo(json.dumps(value) if as_json else value_line(value))

@@ -8,11 +8,12 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, components, time_us
+from tickrig.emulators.rtc.at import ask_system, at, components
 from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
 from tickrig.emulators.rtc.settle import settle
 from tickrig.emulators.rtc.texts import component_lines, component_row
-from tickrig.host.cli.options import PATH, add_options
+from tickrig.host.cli.duration_option import time_us
+from tickrig.host.cli.options import PATH, NumberRange, add_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 
@@ -65,7 +66,7 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
 @click.command()
 @click.argument("type_name", metavar="TYPE", shell_complete=complete_type)
 @click.argument("name", default="")
-@click.option("--rate", "rate_hz", type=float, help="In Hz.  [1000]")
+@click.option("--rate", "rate_hz", type=NumberRange(1e-6, 1e6), help="In Hz.  [1000]")
 @at
 def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
     """Create a component of TYPE, and print its name, such as ConsoleIn0."""
@@ -189,7 +190,7 @@ def stop(at: Path) -> None:
 
 
 def _move(socket: Path, verb: str, names: tuple[str, ...], wanted: str, wait: str) -> None:
-    wait_us = time_us(wait)
+    wait_us = time_us("--wait", wait)
     for name in names:
         ask_system(socket, verb, name=name)
     for name in names:

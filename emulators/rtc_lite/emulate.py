@@ -16,7 +16,7 @@ from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
 from tickrig.emulators.serial_run import Kind, Options, SerialRun
 from tickrig.emulators.wire_log import WireLine
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.cli.user_file import told
 from tickrig.wire.rtc_lite.codes import Command, ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
@@ -39,11 +39,10 @@ def emulate(  # noqa: PLR0913, PLR0917 - the command line
 ) -> int:
     """Run a node as the command line says, and return the exit status."""
     ec = ContextType.TIMER if timer_hz else ContextType.PROXY
-    try:
+    with refused_at("--checksum"):
         config = NodeConfig(Framing(framing), Checksum(checksum), ec, timer_hz or DEFAULT_RATE_HZ)
+    with refused_at("--node"):
         device = RtcLiteNode(find_component(node), config)
-    except ValueError as error:
-        raise Refused(str(error)) from None
     kind = Kind(
         NAME,
         f"RTC-Lite node {device.component.type_name}",

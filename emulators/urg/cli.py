@@ -7,7 +7,7 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.serial_options import line_options
-from tickrig.host.cli.options import add_options
+from tickrig.host.cli.options import NumberRange, add_options
 from tickrig.host.cli.start import loading
 
 USB_BAUD: Final = 12_000_000
@@ -24,7 +24,7 @@ _WORLD: Final = add_options(
 @click.option("--serial", default="H0614967", metavar="TEXT", help="Serial number.  [H0614967]")
 @click.option(
     "--noise",
-    type=click.FloatRange(0, 1),
+    type=NumberRange(0, 1),
     default=0.0,
     help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
 )

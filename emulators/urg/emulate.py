@@ -22,7 +22,7 @@ from tickrig.emulators.urg.build import (
 )
 from tickrig.emulators.urg.cli import USB_BAUD
 from tickrig.emulators.wire_log import WireLine
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.refused import refused_at
 
 USUAL_BAUD: Final = 115_200
 """What a host sets, which means nothing on USB."""
@@ -33,11 +33,9 @@ BUFFER_BYTES: Final = 16_384
 
 def emulate(serial: str, noise: float, scip: str, baud: int, options: dict[str, Any]) -> int:
     """Run a range finder as the command line says, and return the exit status."""
-    try:
+    with refused_at("--serial"):
         parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"], scip=scip)
-        world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
     line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
     kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=partial(_talk, scip))
     config = config_to_trace(parameters, world)
@@ -47,10 +45,13 @@ def emulate(serial: str, noise: float, scip: str, baud: int, options: dict[str, 
 def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
     around = World()
     if size is not None:
-        width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
-        around = room(width_m, depth_m)
-    more = tuple(parse_wall(text) for text in walls)
-    return World(around.walls + more, tuple(parse_post(text) for text in posts))
+        with refused_at("--room"):
+            width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
+            around = room(width_m, depth_m)
+    with refused_at("--wall"):
+        more = tuple(parse_wall(text) for text in walls)
+    with refused_at("--post"):
+        return World(around.walls + more, tuple(parse_post(text) for text in posts))
 
 
 def _talk(scip: str, link: str, baud: int) -> str:

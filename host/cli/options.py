@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +25,19 @@ def add_options(*options: Decorator) -> Decorator:
         return command
 
     return decorate
+
+
+class NumberRange(click.FloatRange):
+    """Numbers of a range; NaN, which compares with nothing, is none of them."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Read a number."""
+        number: float = super().convert(value, param, ctx)
+        if isnan(number):
+            self.fail(f"{value} is no number.", param, ctx)
+        return number
 
 
 def version_option() -> Decorator:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final, NoReturn
 
 import click
@@ -17,6 +19,15 @@ class Refused(click.ClickException):
 
 class BusUnavailable(Refused):
     """A bus that is named well and cannot be opened."""
+
+
+@contextmanager
+def refused_at(option: str) -> Iterator[None]:
+    """Raise Refused, with the name of the option, in place of a ValueError."""
+    try:
+        yield
+    except ValueError as error:
+        raise Refused(f"{option}: {error}") from None
 
 
 def refuse_path(what: str, error: OSError) -> NoReturn:

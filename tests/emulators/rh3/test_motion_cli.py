@@ -154,7 +154,7 @@ def test_odometry_conf_is_used(tmp_path: Path) -> None:
         (["goto", "nan", "0", "0"], "nan 0 0 is no pose: metres, metres, radians"),
         (["goto", "1e9", "0", "0"], "1e+09 0 0 is beyond 1000 m"),
         (["goto", "-800", "800", "0"], "-800 800 0 is beyond 1000 m"),
-        (["goto", "1", "0", "0", "--tread-m", "-1"], "tread_m -1.0 is not above 0"),
+        (["goto", "1", "0", "0", "--tread-m", "-1"], "--tread-m -1.0 is not above 0"),
         (["goto", "1", "0", "0", "--plot", "t.jpg"], "--plot t.jpg: the name ends in .png,"),
         (["goto", "1", "0", "0", "--plot", "/nowhere/t.svg"], "no directory /nowhere"),
         (["goto", "1", "0", "0", "--device", "/dev/nothing"], "cannot open '/dev/nothing'"),

@@ -68,7 +68,7 @@ def test_a_mistake_in_a_scenario_is_one_line(line: str, told: str) -> None:
 
 def test_an_impossible_parameter_is_one_line() -> None:
     result = emu("--address", "300")
-    assert (result.exit_code, result.stderr) == (2, "Error: address 300 is not in 1..247\n")
+    assert (result.exit_code, result.stderr) == (2, "Error: --address 300 is not in 1..247\n")
 
 
 @pytest.mark.parametrize(

@@ -59,11 +59,11 @@ def test_a_recorded_scenario_replays_identically(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--room", "4"), "a room is WIDTH,DEPTH in m, got '4'"),
-        (("--room", "0,1"), "a room has a width and a depth above 0, got 0.0, 1.0"),
-        (("--wall", "1,2,3,x"), "a wall is X1,Y1,X2,Y2 in m, got '1,2,3,x'"),
-        (("--post", "1,2,-3"), "a post has a place and a radius of 0 or more, got"),
-        (("--serial", "a b"), "serial 'a b' is not letters and digits"),
+        (("--room", "4"), "--room: a room is WIDTH,DEPTH in m, got '4'"),
+        (("--room", "0,1"), "--room: a room has a width and a depth above 0, got 0.0, 1.0"),
+        (("--wall", "1,2,3,x"), "--wall: a wall is X1,Y1,X2,Y2 in m, got '1,2,3,x'"),
+        (("--post", "1,2,-3"), "--post: a post has a place and a radius of 0 or more, got"),
+        (("--serial", "a b"), "--serial: serial 'a b' is not letters and digits"),
     ],
 )
 def test_an_impossible_world_is_one_line(words: tuple[str, ...], told: str) -> None:
