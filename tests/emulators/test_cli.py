@@ -7,10 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from click import Command
 from click.testing import CliRunner, Result
 
 from tickrig.emulators.cli import main as tickrig
+from tickrig.emulators.rh3.cli import main as rh3_emu
 from tickrig.emulators.rrc.cli import main as rrc_emu
+from tickrig.emulators.rtc_lite.cli import main as rtc_lite_emu
+from tickrig.emulators.urg.cli import main as urg_emu
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "golden" / "scenario"
@@ -68,6 +72,30 @@ def test_a_missed_expectation_is_exit_status_1() -> None:
 def test_the_power_on_event_may_be_that_of_the_manual() -> None:
     scenario = "0.1 press power_button\n+0s expect EV:PowerOn within 50ms"
     assert rrc("--scenario", "-", "--power-on-event", "PowerOn", text=scenario).exit_code == 0
+
+
+MINITERM = "python -m serial.tools.miniterm --eol LF -e"
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    ("command", "words", "talk"),
+    [
+        (rrc_emu, (), f"{MINITERM} LINK 115200"),
+        (urg_emu, (), f"{MINITERM} LINK 115200"),
+        (urg_emu, ("--baud", "230400"), f"{MINITERM} LINK 230400"),
+        (rh3_emu, ("--baud", "57600"), "rh3 goto 1 0 0 --device LINK --baud 57600"),
+        (rtc_lite_emu, (), "tickrig rtc run SYSTEM.toml --lite NAME=LINK@57600"),
+    ],
+)
+def test_a_greeting_says_how_to_talk_at_the_own_rate(
+    command: Command, words: tuple[str, ...], talk: str, tmp_path: Path
+) -> None:
+    link = str(tmp_path / "tty")
+    words = (*words, "--link", link, "--scenario", "-")
+    result = CliRunner().invoke(command, words, input="0.02 end\n")
+    assert f"\n  {talk.replace('LINK', link)}\n" in result.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_faults_of_the_command_line_are_those_of_scenarios() -> None:
