@@ -136,7 +136,6 @@ class Dialogue:
                 self._go_on(None)
 
     def _next(self) -> None:
-        self.job, self._step, self.due_us = None, None, NEVER
         if self._jobs:
             self.job = self._jobs.popleft()
             self._go_on(None)

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
-from tickrig.host.canopen.script import SDO_TIMEOUT_US, Command, Pause, Script
+from tickrig.host.canopen.script import SDO_TIMEOUT_US, Await, Command, Pause, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
-from tickrig.wire.canopen.nmt import NmtCommand
+from tickrig.host.link import NEVER
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 Exchange = tuple[str, str]
 """What is sent, and the answer; an empty one where there is none."""
@@ -195,3 +196,129 @@ def test_an_abort_of_no_object_ends_what_is_under_way() -> None:
     talk = Talk(upload(0x1000, 0))
     talk.answer(1, "8000000001000405")
     assert str(talk.failure).startswith("1000h:00")
+
+
+def steps(*waits: Await | Pause) -> Script[None]:
+    yield from waits
+
+
+def idle() -> Dialogue:
+    return Dialogue(5, lambda can_id, data: None)
+
+
+def job(script: Script[Any], ended: list[str], what: str = "", *, moves: bool = True) -> Job:
+    """A job that notes how it ended."""
+
+    def note(how: str) -> None:
+        ended.append(f"{what}{how}")
+
+    def fail(failure: Failure) -> None:
+        note(str(failure))
+
+    return Job(what, script, lambda _: note("done"), fail, lambda: note("dropped"), moves)
+
+
+def test_without_a_job_nothing_is_due_and_nothing_moves() -> None:
+    dialogue = idle()
+    dialogue.tick(NEVER - 1)
+    dialogue.clear()
+    dialogue.hear_state(0, NmtState.OPERATIONAL)
+    dialogue.hear_sdo(0, bytes(8))
+    assert (dialogue.due_us, dialogue.job, dialogue.moves) == (NEVER, None, False)
+
+
+def test_a_state_that_is_awaited_ends_the_wait_and_no_other_does() -> None:
+    dialogue, ended = idle(), list[str]()
+    dialogue.start(0, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))
+    dialogue.hear_state(10, NmtState.PRE_OPERATIONAL)
+    dialogue.hear_sdo(20, bytes.fromhex("4300100091010700"))
+    assert ended == []
+    dialogue.hear_state(30, NmtState.OPERATIONAL)
+    assert ended == ["done"]
+    assert (dialogue.due_us, dialogue.job) == (NEVER, None)
+
+
+def test_a_state_is_nothing_to_who_awaits_an_answer_or_pauses() -> None:
+    for script in (upload(0x1000, 0), steps(Pause(300))):
+        dialogue, ended = idle(), list[str]()
+        dialogue.start(0, job(script, ended))
+        dialogue.hear_state(10, NmtState.OPERATIONAL)
+        assert ended == []
+
+
+def test_a_state_that_does_not_come_in_time_fails() -> None:
+    dialogue, ended = idle(), list[str]()
+    dialogue.start(1_000, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))
+    assert dialogue.due_us == 1_300
+    dialogue.tick(1_299)
+    assert ended == []
+    dialogue.tick(1_300)
+    assert ended == ["OPERATIONAL was not reported"]
+
+
+def test_each_wait_begins_when_the_one_before_has_ended() -> None:
+    wait = Await(NmtState.OPERATIONAL, 300)
+    dialogue = idle()
+    dialogue.start(1_000, job(steps(Pause(50), wait, Pause(70)), []))
+    assert dialogue.due_us == 1_050
+    dialogue.tick(1_060)
+    assert dialogue.due_us == 1_360
+    dialogue.hear_state(1_100, NmtState.OPERATIONAL)
+    assert dialogue.due_us == 1_170
+
+
+def test_an_answer_begins_the_next_wait() -> None:
+    def reading_on() -> Script[None]:
+        yield from upload(0x1000, 0)
+        yield Pause(70)
+
+    dialogue = idle()
+    dialogue.start(0, job(reading_on(), []))
+    dialogue.hear_sdo(100, bytes.fromhex("4300100091010700"))
+    assert dialogue.due_us == 170
+
+
+def test_a_wait_that_is_deferred_lasts_longer() -> None:
+    dialogue, ended = idle(), list[str]()
+    dialogue.defer(1_000)
+    assert dialogue.due_us == NEVER
+    dialogue.start(0, job(steps(Pause(50)), ended))
+    dialogue.defer(1_000)
+    dialogue.tick(1_049)
+    assert ended == []
+    dialogue.tick(1_050)
+    assert ended == ["done"]
+
+
+def test_all_jobs_that_are_forgotten_are_told_and_closed() -> None:
+    closed = list[str]()
+
+    def closing() -> Script[None]:
+        try:
+            yield Pause(50)
+        finally:
+            closed.append("closed")
+
+    dialogue, ended = idle(), list[str]()
+    script = closing()
+    dialogue.start(0, job(script, ended, "first "))
+    dialogue.start(0, job(steps(Pause(50)), ended, "second "))
+    dialogue.clear()
+    assert ended == ["first dropped", "second dropped"]
+    assert (closed, dialogue.job, dialogue.due_us) == (["closed"], None, NEVER)
+    dialogue.tick(NEVER - 1)
+    dialogue.start(0, job(steps(Pause(50)), ended, "third "))
+    dialogue.tick(50)
+    assert ended == ["first dropped", "second dropped", "third done"]
+    assert dialogue.job is None
+
+
+def test_a_job_moves_the_node_unless_it_says_otherwise() -> None:
+    dialogue, ended, moves = idle(), list[str](), list[bool]()
+    dialogue.start(0, job(steps(Pause(50)), ended, moves=False))
+    moves.append(dialogue.moves)
+    dialogue.start(0, Job("", steps(Pause(50)), ended.append, lambda _: None))
+    for now_us in (0, 50, 100):
+        dialogue.tick(now_us)
+        moves.append(dialogue.moves)
+    assert moves == [False, True, True, False]
