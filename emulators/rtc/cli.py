@@ -10,6 +10,7 @@ from tickrig.emulators.rtc.at import VARIABLE, default_path
 from tickrig.emulators.rtc.conf_cli import conf
 from tickrig.emulators.rtc.print_cli import print_
 from tickrig.emulators.rtc.verbs_cli import VERBS
+from tickrig.emulators.rtc.whole_cli import WHOLE
 from tickrig.host.cli.duration_option import time_us
 from tickrig.host.cli.options import PATH, NumberRange
 from tickrig.host.cli.start import loading
@@ -31,7 +32,7 @@ def rtc() -> None:
     tickrig rtc inject ConsoleOut0.in 5
 
     Exit status 0; 1 where a component did not get to the state that was asked
-    for; 2 with one line where something was refused.
+    for, and where check found something; 2 with one line where something was refused.
     """  # noqa: D301 - click wants the backspace
 
 
@@ -87,5 +88,5 @@ def run(lite_boot: str, **options: Any) -> None:
     run_system(SystemOptions(lite_boot_us=time_us("--lite-boot", lite_boot), **options))
 
 
-for _command in (*VERBS, conf, print_):
+for _command in (*VERBS, *WHOLE, conf, print_):
     rtc.add_command(_command)

@@ -40,8 +40,13 @@ def component_lines(component: Any, *, long: bool) -> Iterator[str]:
     yield from configuration_lines(component["configuration"], long=long)
 
 
+def port_line(port: Any) -> str:
+    """Write what a port is: its kind, name and data type."""
+    return f"  {port['kind']:<14}{port['name']}  {_short_type(port['data_type'])}".rstrip()
+
+
 def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
-    yield f"  {port['kind']:<14}{port['name']}  {_short_type(port['data_type'])}".rstrip()
+    yield port_line(port)
     for interface in port["interfaces"]:
         yield f"    {interface['polarity'].lower()} {interface['name']} ({interface['type']})"
     for connector in port["connectors"]:

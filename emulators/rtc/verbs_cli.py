@@ -11,7 +11,7 @@ import click
 from tickrig.emulators.rtc.at import ask_system, at, components
 from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
 from tickrig.emulators.rtc.settle import settle
-from tickrig.emulators.rtc.texts import component_lines, component_row
+from tickrig.emulators.rtc.texts import component_lines, component_row, port_line
 from tickrig.host.cli.duration_option import time_us
 from tickrig.host.cli.options import PATH, NumberRange, add_options
 from tickrig.host.cli.refused import Refused
@@ -32,9 +32,10 @@ moving = add_options(
 @click.command()
 @some_names
 @click.option("-l", "--long", is_flag=True, help="Show state, ports, rate and type, too.")
+@click.option("-R", "--recursive", is_flag=True, help="Show the ports of each component, too.")
 @as_json
 @at
-def ls(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
+def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: bool) -> None:
     """List the components NAMES, all if none is named.
 
     With -l a line is: state, ports/those connected, rate, type, name.
@@ -45,6 +46,8 @@ def ls(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
         return
     for component in described:
         click.echo(component_row(component) if long else component["name"])
+        for port in component["ports"] if recursive else ():
+            click.echo(port_line(port))
 
 
 @click.command()

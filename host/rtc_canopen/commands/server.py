@@ -42,6 +42,7 @@ ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 @click.option("--for", "span", metavar="TIME", help="End after 90s, 500ms; else at Ctrl-C.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
 @click.option("--check", is_flag=True, help="Read FILE and its EDS files, and end.")
+@click.option("--dot", is_flag=True, help="Draw FILE as a graph for Graphviz, and end.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not tell the events on standard error.")
 @version_option()
 def main(file: Path, span: str | None, **options: Any) -> None:
@@ -57,12 +58,18 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     rtc-canopen-server robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
     rtc-canopen-server robot.yaml --component Logger0=parts.py:Logger
     rtc-canopen-server robot.yaml --check
+    rtc-canopen-server robot.yaml --dot | dot -Tsvg -o robot.svg
     """  # noqa: D301 - click wants the backspace
     span_us = _span_us(span)
     server = read_server(file, options.pop("components"))
     definition = server.definition
     if options.pop("check"):
         _check(file, server)
+        return
+    if options.pop("dot"):
+        from tickrig.host.rtc_canopen.paper_dot import draw_on_paper  # noqa: PLC0415
+
+        click.echo(draw_on_paper(server))
         return
     log, quiet, start = (options.pop(name) for name in ("log", "quiet", "start"))
     with warnings_told(), ExitStack() as stack:

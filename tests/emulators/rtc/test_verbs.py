@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,9 @@ from tests.emulators.rtc.served import Served
 from tests.host.rtc.spy import ERROR
 from tickrig.emulators.cli import main
 from tickrig.host.rtc import Provider, ServicePort
+from tickrig.host.rtc.compare import differences
 from tickrig.host.rtc.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system import describe
+from tickrig.host.rtc.system import System, describe
 from tickrig.host.rtc.system_toml import parse_toml
 
 
@@ -267,3 +269,64 @@ def test_without_a_system_the_shell_completes_nothing(tmp_path: Path) -> None:
         "COMP_CWORD": "3",
     }
     assert CliRunner().invoke(main, [], env=env, prog_name="tickrig").output.strip() == ""
+
+
+def test_ls_r_shows_the_ports_of_each_component(system: Served) -> None:
+    assert system.rtc("ls", "-R", "ConsoleIn0", "ConsoleOut0").splitlines() == [
+        "ConsoleIn0",
+        "  DataOutPort   ConsoleIn0.out  TimedLong",
+        "ConsoleOut0",
+        "  DataInPort    ConsoleOut0.in  TimedLong",
+    ]
+    assert system.rtc("ls", "-lR", "ConsoleIn0").splitlines()[0].startswith("Active")
+
+
+@pytest.mark.parametrize("ending", [".toml", ".xml"])
+def test_check_tells_what_the_system_lacks_of_a_file(
+    system: Served, tmp_path: Path, ending: str
+) -> None:
+    file = str(tmp_path / f"system{ending}")
+    system.rtc("save", file)
+    assert system.rtc("check", file) == ""
+    system.rtc("exit", "SeqOut0")
+    system.rtc("dis", "ConsoleIn0")
+    system.rtc("conf", "set", "ConfigSample0", "int_param0", "7")
+    told = system.rtc("check", file, exit_code=1).splitlines()
+    assert "SeqOut0 is not there" in told
+    assert "ConfigSample0: int_param0 of the set default is 7, not 0" in told
+    assert "ConsoleIn0.out and ConsoleOut0.in are not connected" in told
+
+
+def test_check_looks_at_types_rates_states_sets_and_properties(
+    system: Served, tmp_path: Path
+) -> None:
+    file = tmp_path / "system.toml"
+    system.rtc("save", str(file))
+    wanted = parse_toml(file.read_text("utf-8"))
+    system.rtc("deact", "ConsoleIn0")
+    system.rtc("dis", "ConsoleIn0")
+    system.rtc("con", "ConsoleOut0.in", "ConsoleIn0.out", "-p", "buffer.length=3")
+    text = file.read_text("utf-8").replace('"SeqOut"', '"SeqIn"')
+    file.write_text(text, "utf-8")
+    told = system.rtc("check", str(file), exit_code=1).splitlines()
+    assert "ConsoleIn0 is not Active" in told
+    assert "SeqOut0 is a SeqOut, not a SeqIn" in told
+    first, *rest = wanted.components
+    changed = replace(first, rate_hz=5.0, active=False, configuration_set="fast")
+    found = System((changed, *rest), wanted.connections)
+    assert list(differences(wanted, found)) == [
+        "ConsoleIn0 runs at 5 Hz, not at 1000 Hz",
+        "ConsoleIn0 is not Active",
+        "ConsoleIn0 has the set fast, not default",
+    ]
+    (connection,) = wanted.connections
+    asked = replace(connection, properties={"dataport.buffer.length": "4"})
+    (line,) = differences(System((), (asked,)), describe(system.manager))
+    assert line.endswith("ConsoleOut0.in: dataport.buffer.length is 3, not 4")
+
+
+def test_dot_draws_the_system(system: Served) -> None:
+    lines = system.rtc("dot").splitlines()
+    assert lines[0] == "digraph system {"
+    assert '  "ConsoleOut0" [label="{<in> in}|ConsoleOut0\\nConsoleOut\\ Active"];' in lines
+    assert lines[-2:] == ['  "ConsoleIn0":"out" -> "ConsoleOut0":"in";', "}"]

@@ -121,3 +121,11 @@ def test_a_port_that_is_not_there_is_told_of_once() -> None:
     bench.run_ms(100)
     assert len(bench.events(EventKind.CONNECTION_REFUSED)) == 1
     assert [entry.source for entry in bench.server.connections.wanted] == ["Palette0.ai"]
+
+
+def test_a_definition_is_drawn_with_its_links_dashed() -> None:
+    result = CliRunner().invoke(main, [str(SYSTEMS / "fig120.yaml"), "--dot"])
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert any(line.startswith('  "Motor0" [label="{<angle> angle}|Motor0') for line in lines)
+    assert lines[-2:] == ['  "Palette0":"ai" -> "Motor0":"angle" [style=dashed];', "}"]
