@@ -220,10 +220,10 @@ class ServedNode:
     def _take(self, state: NmtState, *, changed: bool) -> None:
         """See to a state that was reported just now."""
         self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
+        if self._judge():
+            return
         if state is NmtState.INITIALISING:
             self._booted_up()
-        elif self._judge():
-            pass
         elif self.phase is Phase.ABSENT:
             self._found()
         elif self.phase is Phase.READY:
