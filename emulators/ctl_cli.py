@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from tickrig.emulators.ask import ask
+from tickrig.emulators.ctl_completion import buttons, complete, faults, seen, settable
 from tickrig.emulators.requests import Object
 from tickrig.host.cli.duration import format_time
 from tickrig.host.cli.duration_option import time_us
@@ -43,7 +44,7 @@ def describe(socket: Path, as_json: bool) -> None:
 
 
 @ctl.command()
-@click.argument("names", nargs=-1)
+@click.argument("names", nargs=-1, shell_complete=complete(seen))
 @as_json
 @click.pass_obj
 def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
@@ -53,7 +54,7 @@ def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
 
 
 @ctl.command("set", context_settings={"ignore_unknown_options": True})
-@click.argument("name")
+@click.argument("name", shell_complete=complete(settable))
 @click.argument("values", nargs=-1, required=True)
 @as_json
 @click.pass_obj
@@ -67,7 +68,7 @@ def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> Non
 
 
 @ctl.command()
-@click.argument("name")
+@click.argument("name", shell_complete=complete(buttons))
 @click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
 @as_json
 @click.pass_obj
@@ -78,7 +79,7 @@ def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
 
 
 @ctl.command()
-@click.argument("spec")
+@click.argument("spec", shell_complete=complete(faults))
 @as_json
 @click.pass_obj
 def fault(socket: Path, spec: str, as_json: bool) -> None:
@@ -87,7 +88,7 @@ def fault(socket: Path, spec: str, as_json: bool) -> None:
 
 
 @ctl.command()
-@click.argument("name")
+@click.argument("name", shell_complete=complete(faults))
 @as_json
 @click.pass_obj
 def clear(socket: Path, name: str, as_json: bool) -> None:

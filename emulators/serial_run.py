@@ -26,7 +26,7 @@ from tickrig.host.cli.refused import Refused, refuse_path
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options(RunOptions):
-    """What the command lines of all serial emulators share (`serial_options`)."""
+    """What the command lines of all serial emulators share (`line_options`)."""
 
     link: Path | None = None
     panel: bool = False

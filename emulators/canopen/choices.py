@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 MODELS: Final = ("f-palette", "motor-core-unit", "epos", "rtc-echo")
@@ -10,3 +11,12 @@ MODELS: Final = ("f-palette", "motor-core-unit", "epos", "rtc-echo")
 AUTO: Final = "auto"
 PROFILES: Final = (AUTO, "none", "401", "402")
 """`AUTO`, and names of `profiles.PROFILES`."""
+
+NODE_FAULTS: Final = ("power_off", "unplugged")
+_DRIVE: Final = ("short_circuit", "encoder_unplugged", "shaft_blocked", "motor_phase_open")
+MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
+    "f-palette": ("internal_failure", "input_overcurrent", "output_overload"),
+    "motor-core-unit": _DRIVE,
+    "epos": _DRIVE,
+}
+"""Physical faults by the name of the model, beside those of every node."""

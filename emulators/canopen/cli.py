@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
+from tickrig.emulators.canopen.choices import AUTO, MODEL_FAULTS, MODELS, NODE_FAULTS, PROFILES
 from tickrig.emulators.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, bus_options
 from tickrig.host.cli.options import PATH
@@ -26,6 +26,11 @@ def complete_node(
     ids, equals, start = word.rpartition("=")
     models = [f"{ids}{equals}{name}" for name in MODELS if name.startswith(start)]
     return [*map(CompletionItem, models), CompletionItem(word, type="file")]
+
+
+def device_faults(context: click.Context) -> tuple[str, ...]:
+    """Give the faults of the node, those of its model too where --model is given."""
+    return (*NODE_FAULTS, *MODEL_FAULTS.get(context.params.get("model") or "", ()))
 
 
 @click.command(cls=BusCommand)
@@ -74,7 +79,7 @@ def complete_node(
     help="What the strings and domains of a node hold together, as 4096, 64k, 16M.  [64M]",
 )
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
-@run_options("drop, corrupt, duplicate, delay, babble, short")
+@run_options("drop, corrupt, duplicate, delay, babble, short", device_faults)
 @click.pass_context
 def main(
     context: click.Context,

@@ -20,7 +20,7 @@ from tickrig.host.cli.start import loading
 )
 @click.option("--address", type=int, metavar="1..247", help="Modbus address.  [1]")
 @base_options
-@line_options("flip, drop, dup, cut")
+@line_options("flip, drop, dup, cut", "tickrig.device.rh3.terminals")
 @click.pass_context
 def main(context: click.Context, /, baud: int, **options: Any) -> None:
     """Emulate the base of Reference Hardware 3, a Modbus RTU slave, on a pseudo-terminal.

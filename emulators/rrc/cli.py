@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.serial_options import serial_options
+from tickrig.emulators.serial_options import line_options
 from tickrig.host.cli.start import loading
 
 
@@ -17,7 +17,8 @@ from tickrig.host.cli.start import loading
     default="PowerOnTrigger",
     help="Name of the power-on event, as in the field or as in the manual.",
 )
-@serial_options
+@click.option("--panel", is_flag=True, help="Show an operator panel in this terminal.")
+@line_options("flip, drop, dup, cut", "tickrig.device.rrc.terminals")
 @click.pass_context
 def main(context: click.Context, /, power_on_event: str, **options: Any) -> None:
     """Emulate an RRC, with the VR2 wheelchair around it, on a pseudo-terminal.

@@ -51,7 +51,7 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
     default=Checksum.SUM8.value,
     help="How frames are summed up.  [sum8]",
 )
-@line_options("flip, drop, dup, cut, noise, ping")
+@line_options("flip, drop, dup, cut, noise, ping", "tickrig.device.rtc_lite.terminals")
 @click.pass_context
 def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     context: click.Context,

@@ -41,7 +41,7 @@ _WORLD: Final = add_options(
     help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
 )
 @_WORLD
-@line_options("flip, drop, dup, cut")
+@line_options("flip, drop, dup, cut", "tickrig.device.urg.terminals")
 @click.pass_context
 def main(
     context: click.Context, /, serial: str, noise: float, scip: str, baud: int, **options: Any
