@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TypeGuard
 
 from tickrig.host.canmon.source_word import FileWord, parse_source
 from tickrig.host.canmon.workspace import SettingError, Workspace
@@ -101,15 +101,20 @@ def _folder(workspace: Workspace) -> Path:
     return Path() if workspace.path is None else workspace.path.parent
 
 
+def _is_text(value: object) -> TypeGuard[str]:
+    """Say whether a value is a text as a command line may have it: without NUL."""
+    return isinstance(value, str) and "\0" not in value
+
+
 def _check(bus: Mapping[str, Any]) -> None:
     for name, value in bus.items():
         if name in _LISTS:
-            if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
+            if not isinstance(value, list) or not all(map(_is_text, value)):
                 raise SettingError((name,), "is no array of texts")
         elif name in _WHOLE:
             if type(value) is not int or value < 1:
                 raise SettingError((name,), f"{value!r} is not a number of bit/s")
-        elif name in _OPTIONS and not isinstance(value, str):
+        elif name in _OPTIONS and not _is_text(value):
             raise SettingError((name,), f"{value!r} is no text")
 
 
@@ -118,7 +123,7 @@ def _eds(nodes: Mapping[str, Any]) -> Sequence[tuple[str, str]]:
     for key, settings in nodes.items():
         _node(key)
         path = settings.get("eds", "") if isinstance(settings, dict) else None
-        if not isinstance(path, str):
+        if not _is_text(path):
             raise SettingError((key,), 'is no table with eds = "FILE"')
         found += [(key, path)] if path else []
     return found

@@ -54,6 +54,8 @@ def test_the_command_line_goes_before(tmp_path: Path) -> None:
     [
         ("[bus]\nsource = 'can0'\n", "line 2: bus.source: is no array of texts"),
         ("[bus]\n\nbitrate = 'fast'\n", "line 3: bus.bitrate: 'fast' is not a number of bit/s"),
+        ('[bus]\nsource = ["a\\u0000"]\n', "line 2: bus.source: is no array of texts"),
+        ('[nodes.3]\neds = "a\\u0000"\n', 'nodes.3: is no table with eds = "FILE"'),
         ("[bus]\ninterface = 3\n", "line 2: bus.interface: 3 is no text"),
         ("[nodes.3]\n[nodes.200]\neds = ''\n", "line 2: nodes.200: is not a node-ID 1..127"),
         ("[nodes]\nx = {}\n", "line 2: nodes.x: is not a node-ID 1..127"),
