@@ -181,6 +181,17 @@ def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:
     bench.boot()
 
 
+def test_twins_that_boot_together_and_differ_in_their_serial_number_alone_are_found() -> None:
+    bench = Bench(cast={16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
+    bench.devices[1016].slave.dictionary[0x1018, 4].value = 2
+    bench.run_ms(500)
+    assert bench.events(EventKind.DUPLICATE_NODE) == [
+        "DuplicateNode 16 both are stopped: 1018h:04 is 00000001h and 00000002h"
+    ]
+    assert [bench.devices[n].read("state") for n in (16, 1016)] == ["Stopped", "Stopped"]
+    assert bench.state(32) is INACTIVE
+
+
 def test_an_emergency_is_told_of_and_noise_is_not() -> None:
     bench = running()
     foreign(
