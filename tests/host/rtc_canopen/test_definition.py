@@ -209,6 +209,7 @@ def definitions(draw: st.DrawFn) -> SystemDefinition:
             draw(st.integers(1, 0xFFFF)),
             draw(st.dictionaries(st.just("tpdo1"), words)),
             draw(st.dictionaries(st.just("rpdo512"), pdos)),
+            draw(st.integers(0, 0xFFFF)),
         )
         for node_id in ids
     )
