@@ -22,6 +22,7 @@ from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.tui.app import Monitor
@@ -78,8 +79,9 @@ def command(
 def _monitor(path: Path | None, said: BenchSetup) -> Monitor:
     """Make the program, its panels with the settings of the workspace."""
     try:
-        from tickrig.host.canmon.tui.app import Monitor  # noqa: PLC0415 - an extra
-        from tickrig.host.canmon.tui.panels import PANELS  # noqa: PLC0415
+        with loading():
+            from tickrig.host.canmon.tui.app import Monitor  # noqa: PLC0415 - an extra
+            from tickrig.host.canmon.tui.panels import PANELS  # noqa: PLC0415
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.canmon.tui.bench import Bench  # noqa: PLC0415 - an extra

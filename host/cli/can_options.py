@@ -17,6 +17,7 @@ from click.shell_completion import CompletionItem
 from tickrig.host.cli.options import Decorator, add_options
 from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.setting import parse_setting
+from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
     import can
@@ -97,7 +98,8 @@ def _complete_interface(
 
 
 def _interfaces() -> list[str]:
-    import can  # noqa: PLC0415 - slow
+    with loading():
+        import can  # noqa: PLC0415 - slow
 
     return sorted(can.VALID_INTERFACES)
 
@@ -141,8 +143,9 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     Raises:
         Refused: none is named; BusUnavailable: it cannot be opened.
     """
-    import can  # noqa: PLC0415 - slow
-    from can.util import load_config  # noqa: PLC0415
+    with loading():
+        import can  # noqa: PLC0415 - slow
+        from can.util import load_config  # noqa: PLC0415
 
     from tickrig.host.multicast_group import keep_to_group  # noqa: PLC0415
 

@@ -13,6 +13,7 @@ import click
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
 from tickrig.host.errors import LinkClosed
 from tickrig.host.rtc_canopen.commands.opening import (
     STANDARD_OUTPUT,
@@ -49,7 +50,8 @@ def main(
     rtc-canopen-editor robot.yaml --component Logger0=parts.py:Logger
     """  # noqa: D301 - click wants the backspace
     try:
-        from tickrig.host.rtc_canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
+        with loading():
+            from tickrig.host.rtc_canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.rtc_canopen.editor.session import Session  # noqa: PLC0415

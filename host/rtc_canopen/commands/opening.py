@@ -14,6 +14,7 @@ from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
+from tickrig.host.cli.start import loading
 from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.stamped_link import StampedLink
@@ -52,7 +53,8 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
     What is wrong in its EDS files, and not used, is told on standard error.
     """
     try:
-        from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - canopen is slow
+        with loading():
+            from tickrig.host.rtc_canopen.serve import open_server  # noqa: PLC0415 - slow
     except ModuleNotFoundError:
         raise Refused(NEEDS_YAML) from None
     try:
