@@ -4,26 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.requests import Object
 from tickrig.host.cli.refused import Refused
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 EMULATOR: Final = "emulator"
 
 _NOBODY: Final = (FileNotFoundError, ConnectionRefusedError)
 
 
-def ask(socket: Path, do: str, /, **fields: object) -> Object:
+def ask(socket: Path | str, do: str, /, **fields: object) -> Object:
     """Ask an emulator and return its answer; Refused if it gives none, or an error."""
     with refused_by(socket, EMULATOR), ControlClient(socket) as client:
         return client.ask(do, **fields)
 
 
 @contextmanager
-def refused_by(socket: Path, whom: str) -> Iterator[None]:
+def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
     """Raise Refused in place of what a `ControlClient` raises.
 
     Args:

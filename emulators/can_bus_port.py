@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from typing import Final
 
@@ -10,12 +9,13 @@ import can
 
 from tickrig.device.core import NEVER
 from tickrig.host.can_message import to_frame, to_message
+from tickrig.host.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 
 FRAMES_A_POLL: Final = 1_024
 """So that a bus that never falls silent cannot stop the clock."""
 
-_logger = logging.getLogger(__name__)
+_logger = log_of(__name__)
 
 
 class CanBusPort:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
+from tickrig.host.log import log_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.candump import LogLine
 
-_logger = logging.getLogger(__name__)
+_logger = log_of(__name__)
 
 
 class CandumpFile:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
-from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from tickrig.emulators.requests import VERSION, Object
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import TracebackType
 
 TIMEOUT_S: Final = 5.0
 
@@ -28,7 +30,7 @@ class ControlClient:
         OSError: nobody listens there, or nobody answers.
     """
 
-    def __init__(self, path: Path, timeout_s: float = TIMEOUT_S) -> None:
+    def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
         self._socket = socket.socket(socket.AF_UNIX)
         self._socket.settimeout(timeout_s)
         self._received = b""

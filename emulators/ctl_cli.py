@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import click
@@ -20,9 +19,9 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer
 
 
 @click.group()
-@click.argument("socket", type=click.Path(path_type=Path))
+@click.argument("socket", type=click.Path())
 @click.pass_context
-def ctl(context: click.Context, /, socket: Path) -> None:
+def ctl(context: click.Context, /, socket: str) -> None:
     """Touch and watch the emulator whose control socket is SOCKET.
 
     \b
@@ -38,7 +37,7 @@ def ctl(context: click.Context, /, socket: Path) -> None:
 @ctl.command()
 @as_json
 @click.pass_obj
-def describe(socket: Path, as_json: bool) -> None:
+def describe(socket: str, as_json: bool) -> None:
     """List inputs, groups, outputs and faults."""
     _show(ask(socket, "describe"), _describe, as_json)
 
@@ -47,7 +46,7 @@ def describe(socket: Path, as_json: bool) -> None:
 @click.argument("names", nargs=-1, shell_complete=complete(seen))
 @as_json
 @click.pass_obj
-def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
+def get(socket: str, names: tuple[str, ...], as_json: bool) -> None:
     """Show inputs and outputs by NAME, all if none is named."""
     fields = {"names": list(names)} if names else {}
     _show(ask(socket, "get", **fields), _values, as_json)
@@ -58,7 +57,7 @@ def get(socket: Path, names: tuple[str, ...], as_json: bool) -> None:
 @click.argument("values", nargs=-1, required=True)
 @as_json
 @click.pass_obj
-def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> None:
+def set_(socket: str, name: str, values: tuple[str, ...], as_json: bool) -> None:
     """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
     _show(
         ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
@@ -72,7 +71,7 @@ def set_(socket: Path, name: str, values: tuple[str, ...], as_json: bool) -> Non
 @click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
 @as_json
 @click.pass_obj
-def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
+def press(socket: str, name: str, duration: str, as_json: bool) -> None:
     """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
     duration_us = time_us("--for", duration)
     _show(ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
@@ -82,7 +81,7 @@ def press(socket: Path, name: str, duration: str, as_json: bool) -> None:
 @click.argument("spec", shell_complete=complete(faults))
 @as_json
 @click.pass_obj
-def fault(socket: Path, spec: str, as_json: bool) -> None:
+def fault(socket: str, spec: str, as_json: bool) -> None:
     """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
     _show(ask(socket, "fault", spec=spec), _nothing, as_json)
 
@@ -91,7 +90,7 @@ def fault(socket: Path, spec: str, as_json: bool) -> None:
 @click.argument("name", shell_complete=complete(faults))
 @as_json
 @click.pass_obj
-def clear(socket: Path, name: str, as_json: bool) -> None:
+def clear(socket: str, name: str, as_json: bool) -> None:
     """Let the fault NAME go."""
     _show(ask(socket, "clear", name=name), _nothing, as_json)
 
@@ -100,7 +99,7 @@ def clear(socket: Path, name: str, as_json: bool) -> None:
 @click.option("--since", type=int, default=0, help="Only those after the line of this number.")
 @as_json
 @click.pass_obj
-def lines(socket: Path, since: int, as_json: bool) -> None:
+def lines(socket: str, since: int, as_json: bool) -> None:
     """Show the latest lines on the wire, at most 100."""
     _show(ask(socket, "lines", since=since), _lines, as_json)
 
@@ -108,7 +107,7 @@ def lines(socket: Path, since: int, as_json: bool) -> None:
 @ctl.command()
 @as_json
 @click.pass_obj
-def status(socket: Path, as_json: bool) -> None:
+def status(socket: str, as_json: bool) -> None:
     """Show how the run is going: time, late ticks, lost bytes, faults."""
     _show(ask(socket, "status"), _status, as_json)
 
@@ -116,7 +115,7 @@ def status(socket: Path, as_json: bool) -> None:
 @ctl.command()
 @as_json
 @click.pass_obj
-def stop(socket: Path, as_json: bool) -> None:
+def stop(socket: str, as_json: bool) -> None:
     """End the emulator."""
     _show(ask(socket, "stop"), _nothing, as_json)
 

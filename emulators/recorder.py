@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,8 +10,9 @@ from tickrig.device.physical import Output
 from tickrig.emulators.emulated import Emulated, Inputs
 from tickrig.emulators.trace import RESET, Header, Mark, Record
 from tickrig.host.cli.setting import Setting
+from tickrig.host.log import log_of
 
-_logger = logging.getLogger(__name__)
+_logger = log_of(__name__)
 
 
 class TraceFile:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -16,10 +15,11 @@ from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.clock import Clock
 from tickrig.emulators.rig import Station
 from tickrig.emulators.without_echo import CountingPort
+from tickrig.host.log import log_of
 
 NAME: Final = "canopen-slave"
 
-_logger = logging.getLogger(__name__)
+_logger = log_of(__name__)
 
 
 def make_bench(  # noqa: PLR0913 - options, by keyword

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
 from collections.abc import Container
 from contextlib import suppress
@@ -15,11 +14,12 @@ from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.entry import Entry
 from tickrig.device.canopen.nonvolatile import Nonvolatile
 from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.host.log import log_of
 
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)
 FORMAT: Final = "tickrig CANopen store 1"
 
-_log = logging.getLogger(__name__)
+_log = log_of(__name__)
 
 
 class StoreError(ValueError):

@@ -9,8 +9,6 @@ from typing import Any, Final
 
 import click
 
-from tickrig import __version__
-
 PATH: Final = click.Path(path_type=Path)
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -38,8 +36,3 @@ class NumberRange(click.FloatRange):
         if isnan(number):
             self.fail(f"{value} is no number.", param, ctx)
         return number
-
-
-def version_option() -> Decorator:
-    """Return a decorator that adds `--version`, in the form that all commands have."""
-    return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -10,6 +9,8 @@ from contextlib import contextmanager
 @contextmanager
 def warnings_told() -> Iterator[None]:
     """Show warnings of the library on standard error, a line each; else it is silent."""
+    import logging  # noqa: PLC0415 - slow, and a TAB needs none
+
     logger, handler = logging.getLogger("tickrig"), logging.StreamHandler()
     handler.setLevel(logging.WARNING)
     logger.addHandler(handler)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 from typing import Final
 
 from tickrig.host.errors import LinkTimeout
 from tickrig.host.link import NEVER, Link
+from tickrig.host.log import log_of
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.exchange import Exchange
 from tickrig.host.rrc.inbox import Answer, Inbox
@@ -20,7 +20,7 @@ from tickrig.wire.rrc.replies import Event, Ok, Refusal
 LINE_US: Final = 5_000
 """The RRC's time for a line in either direction: about two in 10 ms (RRC manual, notes)."""
 
-_log = logging.getLogger(__name__)
+_log = log_of(__name__)
 
 
 class Channel:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import re
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
+from tickrig.host.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.replies import Event, Ok, Refusal, Reply, StatusA, Text, parse_reply
@@ -22,7 +22,7 @@ _ANSWER: Final = re.compile(r"(?![A-Z]{2}:)[ -~]+")
 
 T = TypeVar("T")
 Answer = Ok | Refusal | Text
-_log = logging.getLogger(__name__)
+_log = log_of(__name__)
 
 
 @dataclass(frozen=True, slots=True)

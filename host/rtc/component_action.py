@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, ParamSpec
 
+from tickrig.host.log import log_of
 from tickrig.host.rtc.states import ReturnCode
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 OK: Final = ReturnCode.RTC_OK
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 P = ParamSpec("P")
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
-_LOG: Final = logging.getLogger(__name__)
+from tickrig.host.log import log_of
+
+_LOG: Final = log_of(__name__)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from tickrig.host.link import Link
+from tickrig.host.log import log_of
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
 from tickrig.host.rtc.manager import Manager
@@ -18,7 +18,7 @@ from tickrig.host.rtc_lite.settings import Settings
 RATE_HZ: Final = 10.0
 """A period that two round trips at 57600 bit/s do not fill."""
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 @dataclass(slots=True)

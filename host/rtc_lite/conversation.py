@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.link import Link
+from tickrig.host.log import log_of
 from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
 from tickrig.host.rtc_lite.rtno_link import RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
@@ -49,7 +49,7 @@ _MEANINGS: Final[Mapping[int, str]] = {
     LinkFault.UNKNOWN: "FU: unknown",
 }
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class Conversation:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from tickrig.host.log import log_of
 from tickrig.host.rtc.component_action import guarded
 from tickrig.host.rtc.states import ReturnCode
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class EventKind(StrEnum):

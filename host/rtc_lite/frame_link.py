@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from collections.abc import Callable
 from typing import Final, Protocol
 
 from tickrig.host.errors import LinkError
 from tickrig.host.link import Link
+from tickrig.host.log import log_of
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.frame import Frame
 
@@ -18,7 +18,7 @@ SILENCE_US: Final = 20_000
 KEPT: Final = 8
 """Frames that are kept, for who wants to know what was said last."""
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class FrameDecoder(Protocol):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import replace
 from typing import ClassVar, Final
 
 from tickrig.host.errors import DeviceRefused, LinkError
 from tickrig.host.link import Link
+from tickrig.host.log import log_of
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution_context import ExecutionContext
@@ -43,7 +43,7 @@ _TO_INACTIVE: Final = {
 }
 """What brings a device one step nearer to Inactive, on_reset of the proxy."""
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class RtcLiteProxy(RtComponent):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Final
 
+from tickrig.host.log import log_of
 from tickrig.host.rtc.port import AnyPort
 from tickrig.host.rtc_lite.relay import InRelay, OutRelay
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.messages import PortData, PortProfile
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class Relays:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from typing import ClassVar, Final
 
+from tickrig.host.log import log_of
 from tickrig.host.motion.components.position_input import (
     END_POINT,
     INTERMEDIATE_POINT,
@@ -21,7 +21,7 @@ from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
 NO_WAY: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class OmniTo2WD(RtComponent):

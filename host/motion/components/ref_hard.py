@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from collections.abc import Callable, Mapping
 from math import tau
@@ -10,6 +9,7 @@ from typing import ClassVar, Final, Protocol
 
 from tickrig.host.errors import LinkError
 from tickrig.host.link import Link
+from tickrig.host.log import log_of
 from tickrig.host.modbus.master import Answer, ModbusMaster
 from tickrig.host.motion.base_texts import fault_text, refusal_text
 from tickrig.host.motion.dead_reckoning import wheel_speeds
@@ -48,7 +48,7 @@ _TURN: Final = 2**32  # counts after which a counter begins again
 
 _MODE: Final = Request(READ, (Address.MODE, 1))
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 Opener = Callable[[str], Link[bytes]]
 """Opens the line that DeviceFileName names."""

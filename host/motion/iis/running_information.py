@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from math import cos, sin
 from typing import ClassVar, Final
 
+from tickrig.host.log import log_of
 from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.motion.ports import arrived, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
@@ -16,7 +16,7 @@ from tickrig.wire.rtc_types.extended_2d import Velocity2D
 PERIOD_US: Final = 10_000
 """What IIS recommends at most."""
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class RunningInformation(RtComponent):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 from typing import ClassVar, Final
 
+from tickrig.host.log import log_of
 from tickrig.host.motion.components.ref_hard import RefHard
 from tickrig.host.motion.options.watched_distance import WatchedDistance
 from tickrig.host.rtc import (
@@ -18,7 +18,7 @@ from tickrig.host.rtc import (
 )
 from tickrig.wire.rtc_types.basic import TimedDouble
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class CollisionDetection(RtComponent):

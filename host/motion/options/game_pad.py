@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from typing import ClassVar, Final
 
 from tickrig.host.errors import LinkError
+from tickrig.host.log import log_of
 from tickrig.host.motion.options.evdev_pad import EvdevPad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad
 from tickrig.host.motion.options.pad import Hand, Pad, PadOpener
@@ -16,7 +16,7 @@ from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 KEYBOARD: Final = "keyboard"
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 def open_pad(name: str) -> Pad:

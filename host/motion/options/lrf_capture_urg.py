@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 from math import tau
 from typing import ClassVar, Final
 
 from tickrig.host.errors import DeviceRefused, LinkError
+from tickrig.host.log import log_of
 from tickrig.host.motion.components.ref_hard import Opener
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.serial_link import SerialLink
@@ -15,7 +15,7 @@ from tickrig.host.urg.scan import Scan
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class LrfCaptureUrg(RtComponent):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from typing import ClassVar, Final
 
+from tickrig.host.log import log_of
 from tickrig.host.motion.ports import newest, sound
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class SwitchInput(RtComponent):

@@ -13,9 +13,10 @@ import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.options import PATH, version_option
+from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.telling import warnings_told
+from tickrig.host.cli.version import version_option
 from tickrig.host.errors import LinkClosed
 from tickrig.host.link import NEVER
 from tickrig.host.rtc_canopen.commands.opening import (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 from abc import ABC, abstractmethod
 from typing import Final
 
+from tickrig.host.log import log_of
 from tickrig.host.motion.dead_reckoning import moved, wheel_speeds
 from tickrig.host.motion.geometry import Pose, Twist
 from tickrig.host.motion.ports import arrived, sound, to_pose_2d
@@ -15,7 +15,7 @@ from tickrig.wire.rtc_types.extended_2d import TimedPose2D, TimedVelocity2D
 
 OK: Final = ReturnCode.RTC_OK
 
-_LOG: Final = logging.getLogger(__name__)
+_LOG: Final = log_of(__name__)
 
 
 class WheeledBase(RtComponent, ABC):

@@ -1,0 +1,13 @@
+"""The loggers of the library; silent unless the program that uses it wants to hear them."""
+
+from __future__ import annotations
+
+import logging
+
+
+def log_of(name: str) -> logging.Logger:
+    """Return the logger of a module."""
+    return logging.getLogger(name)
+
+
+logging.getLogger("tickrig").addHandler(logging.NullHandler())
