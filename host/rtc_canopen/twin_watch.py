@@ -14,6 +14,9 @@ from tickrig.wire.errors import WireError
 NEARER: Final = 4
 """So many times nearer to one time than to the other is a heartbeat that belongs to it."""
 
+STEADY: Final = 10
+"""A heartbeat is in time within one part in so many of the producer time."""
+
 APART: Final = 100
 """Times that part by less than one part in so many of the producer time are the same."""
 
@@ -59,13 +62,17 @@ class TwinWatch:
     def __init__(self, period_us: int) -> None:
         self._period_us = period_us
         self.sure_us = NEVER
-        self._old_us = self._booted_us = 0
+        self._booted_us = 0
         self._commanded = Counter[NmtState]()
         self._state: NmtState | None = None
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: something may have been missed."""
+        """Begin anew: something may have been missed, or its producer time was written."""
+        self._old_us, self._steady = 0, False
+        self._clear()
+
+    def _clear(self) -> None:
         self.sign = self.suspicion = ""
         self._strangers, self._doubt_us = 0, -NEVER
         self._identity: dict[tuple[int, int], bytes | None] = {}
@@ -99,7 +106,8 @@ class TwinWatch:
         """
         before, self._state = self._state, state
         if state is NmtState.INITIALISING:
-            self.forget()
+            self._clear()
+            self._steady &= at_us - self._old_us <= self._period_us * 5 // 4
             self._booted_us = at_us
             self.sure_us = at_us + self._period_us * 5 // 4
             return
@@ -107,7 +115,8 @@ class TwinWatch:
         if listening:
             self._judge_time(at_us)
             return
-        self._old_us = at_us
+        late_us = abs(at_us - self._old_us - self._period_us)
+        self._old_us, self._steady = at_us, STEADY * late_us <= self._period_us
         if self._crowd.hear(at_us):
             self.suspicion = f"two heartbeats in each {self._period_us // 1_000} ms"
 
@@ -125,6 +134,8 @@ class TwinWatch:
 
     def _judge_time(self, at_us: int) -> None:
         """See whether a heartbeat is one of before the boot-up."""
+        if not self._steady:  # it was held up: its times say nothing
+            return
         old_us, new_us = self._off_us(at_us - self._old_us), self._off_us(at_us - self._booted_us)
         if APART * new_us >= self._period_us and NEARER * old_us <= new_us:
             self._strangers += 1
