@@ -260,3 +260,55 @@ def test_a_device_hears_of_the_error_state_of_its_controller(dense: bool) -> Non
     wire.reconnect(end)
     rig.run_to(60_000)
     assert (node.state, len(host.poll(60_000))) == (ErrorState.ACTIVE, 7)
+
+
+@pytest.mark.parametrize(("after_us", "ticks"), [(0, [10_000]), (1, [10_000, 11_000])])
+def test_a_frame_that_ends_right_behind_a_tick_is_heard_in_the_next(
+    after_us: int, ticks: list[int]
+) -> None:
+    wire = CanWire()
+    node, host = Node(1, period_us=10_000, accepts=frozenset({0x705})), wire.end()
+    rig = Rig(Station(node, wire.end()))
+    host.send(10_000 - 55 + after_us, frames("705#7F"))
+    rig.run_to(12_000)
+    assert node.ticks == ticks
+
+
+def test_a_device_may_tick_each_microsecond() -> None:
+    wire = CanWire()
+    node = Node(1, tick_us=1, accepts=None, delay_us=0)
+    host, rig = wire.end(), Rig(Station(node, wire.end()))
+    rig.run_to(10)
+    node.answer_us = 11
+    rig.run_to(20)
+    host.send(20, frames("705#7F"))
+    rig.run_to(200)
+    assert node.ticks == [11, 135]
+
+
+@dataclass
+class Belt:
+    """Lets a node send as soon as another has heard something."""
+
+    first: Node
+    second: Node
+    tick_us: int = 1_000
+    due_us: int = NEVER
+
+    def act(self, now_us: int, /) -> None:
+        if self.first.heard:
+            self.first.heard.clear()
+            self.second.answer_us = 0
+
+
+@pytest.mark.parametrize("dense", [False, True])
+def test_no_bus_is_ahead_of_a_tick_that_another_bus_brings(dense: bool) -> None:
+    fast, slow = CanWire(), CanWire(bit_rate=10_000)
+    near, far = Node(1, accepts=frozenset({0x80})), Node(2, accepts=frozenset({0x123}))
+    log, hosts = Log(slow), (fast.end(), slow.end())
+    stations = (Station(near, fast.end()), Station(far, slow.end()))
+    rig = Rig(*stations, couplings=[Belt(near, far)], dense=dense)
+    hosts[0].send(0, frames("080#"))
+    hosts[1].send(0, frames("700# 701# 123#"))
+    rig.run_to(100_000)
+    assert log.text == "700# 202#0100 701# 123# 202#0200"
