@@ -37,7 +37,7 @@ def test_a_value_is_written_as_it_is_read(text: ObjectText, words: str, data: st
         (ObjectText("mode", DataType.INTEGER8), "200", "200 is not in the range of INTEGER8"),
         (ObjectText("mode", DataType.INTEGER8), "1.5", "1.5 is not in the range of INTEGER8"),
         (ObjectText("angle", DataType.INTEGER8, "deg", 0.1), "99", "99 is not in the range"),
-        (ObjectText("angle", DataType.INTEGER8, "deg", 0.1), "inf", "inf is not in the range"),
+        (ObjectText("angle", DataType.INTEGER8, "deg", 0.1), "inf", "is no number"),
         (ObjectText("gain", DataType.REAL32), "1e99", "1e99 is not in the range of REAL32"),
         (ObjectText(), "12 3", "'12 3' is not bytes in hex, as 37 02"),
         (ObjectText("text", DataType.VISIBLE_STRING), "€", "'€' is no VISIBLE_STRING"),
