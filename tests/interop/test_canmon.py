@@ -144,7 +144,7 @@ def test_can_fd_frames_are_counted_and_said(
         assert canmon.end() == 0
         (count,) = re.findall(rf"{vcan.channel}: ([0-9]+) CAN FD frames passed over", canmon.said)
     assert len(canmon.lines) + int(count) == 102
-    assert int(count) > 50
+    assert int(count) >= (1 if "-m" in arguments else 101)  # a mixture is by chance
 
 
 def test_what_our_slave_says_is_decoded(vcan: Bus, tmp_path: Path) -> None:

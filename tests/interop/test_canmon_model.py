@@ -39,6 +39,7 @@ def test_top_counts_what_cangen_sends(vcan: Bus) -> None:
 def test_check_finds_what_canplayer_brings(vcan: Bus, tmp_path: Path) -> None:
     log = log_of(tmp_path, ["705#05"] * 20 + ["085#3081110000000000", "605#8000100002000106"])
     words = ["check", vcan.channel, "--no-emcy", "--no-sdo-abort", "--known", "705,085,605"]
+    words += ["--for", "60s"]
     with listening([*CANMON, *words], tmp_path, "check") as canmon:
         run("canplayer", "-I", log, f"{vcan.channel}=vcan9")
         run("cansend", vcan.channel, "7FF#")
@@ -50,6 +51,7 @@ def test_check_finds_what_canplayer_brings(vcan: Bus, tmp_path: Path) -> None:
 
 def test_check_finds_nothing_wrong_with_our_slave(vcan: Bus, tmp_path: Path) -> None:
     words = ["check", vcan.channel, "--no-emcy", "--no-error-frames", "--nodes", "5"]
+    words += ["--for", "60s"]  # of a bus it takes 5 s, in which a slow machine starts no slave
     with (
         listening([*CANMON, *words, "--known", "585-705"], tmp_path, "check") as canmon,
         running(vcan, "--eds", str(EDS), "--node-id", "5"),
