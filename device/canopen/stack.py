@@ -5,26 +5,26 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.can_error_state import CanErrorState
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.emcy_consumer import EmcyConsumer
-from tickrig.device.canopen.emcy_producer import EmcyProducer
-from tickrig.device.canopen.error_behaviour import ErrorBehaviour
-from tickrig.device.canopen.heartbeat_consumer import HeartbeatConsumer
-from tickrig.device.canopen.heartbeat_producer import HeartbeatProducer
-from tickrig.device.canopen.lss_slave import LssSlave
-from tickrig.device.canopen.nmt_slave import NmtSlave
-from tickrig.device.canopen.node_guarding import NodeGuarding
-from tickrig.device.canopen.nonvolatile import Nonvolatile
-from tickrig.device.canopen.parameter_store import ParameterStore
-from tickrig.device.canopen.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo_producer import PdoProducer
-from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
-from tickrig.device.canopen.sdo_servers import SdoServers
-from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.sync import Sync
-from tickrig.device.canopen.time_stamp import TimeStamp
+from tickrig.device.canopen.bus.lss_slave import LssSlave
+from tickrig.device.canopen.bus.parameter_store import ParameterStore
+from tickrig.device.canopen.bus.sync import Sync
+from tickrig.device.canopen.bus.time_stamp import TimeStamp
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.errors.can_error_state import CanErrorState
+from tickrig.device.canopen.errors.emcy_consumer import EmcyConsumer
+from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
+from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
+from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer
+from tickrig.device.canopen.nmt.heartbeat_producer import HeartbeatProducer
+from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
+from tickrig.device.canopen.nmt.node_guarding import NodeGuarding
+from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
+from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
     NmtSlave,

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from tickrig.device.body.wheeled_body import WheeledBody
-from tickrig.device.canopen.slave import TICK_US
+from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.core import NEVER
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.emulators.canopen.body_inputs import FrictionTouch, PoseTouch

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
-from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.choices import AUTO

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.slave import ServiceMaker
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.wire.canopen.device_info import DeviceInfo
 from tickrig.wire.canopen.eds_finding import Finding
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.predefined import predefined
 from tickrig.host.canopen.eds import open_eds

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.device.canopen.sdo_limits import SdoLimits
+from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
 from tickrig.emulators.canopen.build import describe_device
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.device_rtc.make import application_of, make_dictionary
 from tickrig.device.canopen.device_rtc.relays import Echo
-from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
-from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.wire.canopen.device_info import BIT_RATES, DeviceInfo
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.core import NEVER, NonCopyable
 from tickrig.device.physical import Output
 from tickrig.emulators.can_end import Accepted

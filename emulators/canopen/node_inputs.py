@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.physical import Input, Kind, QuantityBank
 from tickrig.emulators.canopen.touch import Later
 from tickrig.host.cli.setting import Setting

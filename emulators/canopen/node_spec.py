@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.user_file import SUFFIX

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from tickrig.device.canopen.slave import TICK_US
+from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.physical import Input, Kind, Output
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.touch import Touch

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.canopen.choices import AUTO
 
 DEVICE_TYPE: Final = 0x1000

@@ -9,7 +9,7 @@ from typing import Final
 
 import click
 
-from tickrig.device.canopen.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.emulators.can_emulator import CanEmulator
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.candump_file import CandumpFile

@@ -10,10 +10,10 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any, Final
 
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Entry
-from tickrig.device.canopen.nonvolatile import Nonvolatile
-from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.host.log import log_of
 
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, Protocol
 
-from tickrig.device.canopen.abort import SdoAbort
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.physical import Input, Kind
 from tickrig.host.cli.setting import Setting
 from tickrig.wire.canopen.datatypes import DataType, Value

@@ -16,14 +16,14 @@ from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tickrig.device.body.omni_body import OmniBody, OmniParameters
 from tickrig.device.body.pose import Pose
 from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.service import Service
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.device_rtc.make import make_device_rtc
 from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
-from tickrig.device.canopen.service import Service
-from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.core import NonCopyable
 from tickrig.device.modbus.slave import ModbusSlave

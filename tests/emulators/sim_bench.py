@@ -10,10 +10,10 @@ from canopen.profiles.p402 import BaseNode402
 
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tests.emulators.can_bench import Log
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.entry import Access, Entry
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from tests.device.canopen.bus import frames
+from tests.device.canopen.slave_bench import frames
 from tickrig.device.core import NEVER
 from tickrig.emulators.without_echo import ECHO_US, WithoutEcho
 from tickrig.wire.can import Frames

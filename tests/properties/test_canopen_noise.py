@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.reference import NODE_ID, make_dictionary
+from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from benchmarks.canopen_peers import NODE_ID, PEERS, REPLY, REQUEST, Peer, our_slave
 from benchmarks.table import RUNS, rates, row
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Access, Entry
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.eds_cache import EdsCache

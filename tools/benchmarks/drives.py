@@ -10,7 +10,7 @@ from math import cos, pi
 from typing import Final
 
 from benchmarks.table import rates
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire

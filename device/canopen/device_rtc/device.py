@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
 from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
-from tickrig.device.canopen.entry import Entry
-from tickrig.device.canopen.pdo_producer import PdoProducer
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.device.timer import Timer
 from tickrig.wire.canopen.nmt import NmtState
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.device_rtc.component import Component, Result, ReturnCode
 from tickrig.device.canopen.device_rtc.transitions import (
     ACTIVITIES,
@@ -14,7 +15,6 @@ from tickrig.device.canopen.device_rtc.transitions import (
     STRICT_ERROR,
     RtcState,
 )
-from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 

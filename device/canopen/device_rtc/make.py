@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.objects import dictionary_of
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.nonvolatile import Nonvolatile
-from tickrig.device.canopen.objects import dictionary_of
-from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.rtc_canopen.objects import object_table
 

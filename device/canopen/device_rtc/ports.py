@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.wire.rtc_canopen.port_types import PortType
 from tickrig.wire.rtc_canopen.profile import Direction, PortProfile
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import AnalogueObjects, find_number
 from tickrig.device.canopen.ds401.quantity import REAL32_MAX, factor, limits, quantity
-from tickrig.device.canopen.entry import Entry
 
 
 class AnalogueChannel:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import floor
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.event_rule import EventRule
@@ -17,7 +18,6 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.canopen.ds401.quantity import quantity, show
-from tickrig.device.canopen.entry import Entry
 from tickrig.device.physical import Input
 
 DEFAULT_TRIGGER: Final = 7

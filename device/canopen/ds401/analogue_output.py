@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 from math import isfinite, isnan
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import (
@@ -16,7 +17,6 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.canopen.ds401.quantity import limits, quantity
-from tickrig.device.canopen.entry import Entry
 from tickrig.device.physical import Output
 
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.families import (
     SINGLE_BANK_LINES,
     SINGLE_BANKS,
     DigitalObjects,
     elements,
 )
-from tickrig.device.canopen.entry import Entry
 
 
 class View(NamedTuple):

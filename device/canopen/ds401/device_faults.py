@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.device.canopen.error_behaviour import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.errors.error_behaviour import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
 from tickrig.device.physical import Input, Kind, QuantityBank
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 

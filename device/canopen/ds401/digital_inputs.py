@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.bits import Bits
 from tickrig.device.canopen.ds401.families import (
     FILTER_INPUT,
@@ -15,7 +16,6 @@ from tickrig.device.canopen.ds401.families import (
     POLARITY_INPUT,
     READ_INPUT,
 )
-from tickrig.device.canopen.entry import Entry
 from tickrig.device.core import NEVER
 
 FILTER_US: Final = 10_000

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.bits import Bits, View
 from tickrig.device.canopen.ds401.families import (
     ERROR_MODE_OUTPUT,
@@ -11,7 +12,6 @@ from tickrig.device.canopen.ds401.families import (
     POLARITY_OUTPUT,
     WRITE_OUTPUT,
 )
-from tickrig.device.canopen.entry import Entry
 
 
 class DigitalOutputs:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.families import find_number
 from tickrig.device.canopen.ds401.quantity import quantity
-from tickrig.device.canopen.entry import Entry
 
 
 class EventRule:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.families import INTERRUPT_SOURCE, elements
-from tickrig.device.canopen.entry import Entry
 
 BANK_CHANNELS: Final = 32
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tickrig.device.canopen.application import Application, number_of
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.application import Application, number_of
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import terminals
 from tickrig.device.canopen.ds401.analogue_input import AnalogueInput
 from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
@@ -26,9 +28,7 @@ from tickrig.device.canopen.ds401.families import (
     channels,
 )
 from tickrig.device.canopen.ds401.interrupt_source import InterruptSource
-from tickrig.device.canopen.entry import Entry
-from tickrig.device.canopen.pdo_producer import PdoProducer
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.wire.canopen.nmt import NmtState
 
 

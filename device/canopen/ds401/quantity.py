@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, inf
 from typing import Final
 
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.core.entry import Entry
 
 REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
 

@@ -5,27 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.ds402 import indices, terminals
-from tickrig.device.canopen.ds402.allowed import guard_values
-from tickrig.device.canopen.ds402.automaton import Automaton
-from tickrig.device.canopen.ds402.axis import Axis
-from tickrig.device.canopen.ds402.connection import Connection
-from tickrig.device.canopen.ds402.fault_memory import FaultMemory
-from tickrig.device.canopen.ds402.faults import ErrorCode
-from tickrig.device.canopen.ds402.limits import Limits
-from tickrig.device.canopen.ds402.mode import Mode
-from tickrig.device.canopen.ds402.modes import MODES, offered, supported
-from tickrig.device.canopen.ds402.motor import IdealMotor, Motor
-from tickrig.device.canopen.ds402.parameters import Parameters
-from tickrig.device.canopen.ds402.reference import Control, Reference
-from tickrig.device.canopen.ds402.settings import CONFIGURATION, Settings, read_settings
-from tickrig.device.canopen.ds402.state import Controlword, DriveState, command_of
-from tickrig.device.canopen.ds402.stopping import Stopping
-from tickrig.device.canopen.ds402.supervision import Bounds, Supervision
-from tickrig.device.canopen.ds402.switches import Switches
-from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer, Telling
-from tickrig.device.canopen.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
+from tickrig.device.canopen.ds402.motion.axis import Axis
+from tickrig.device.canopen.ds402.motion.limits import Limits
+from tickrig.device.canopen.ds402.motion.motor import IdealMotor, Motor
+from tickrig.device.canopen.ds402.motion.reference import Control, Reference
+from tickrig.device.canopen.ds402.motion.stopping import Stopping
+from tickrig.device.canopen.ds402.motion.switches import Switches
+from tickrig.device.canopen.ds402.objects import indices, terminals
+from tickrig.device.canopen.ds402.objects.allowed import guard_values
+from tickrig.device.canopen.ds402.objects.parameters import Parameters
+from tickrig.device.canopen.ds402.objects.settings import CONFIGURATION, Settings, read_settings
+from tickrig.device.canopen.ds402.objects.telling import MEASURES, Measure, Multiplexer, Telling
+from tickrig.device.canopen.ds402.state.automaton import Automaton
+from tickrig.device.canopen.ds402.state.connection import Connection
+from tickrig.device.canopen.ds402.state.fault_memory import FaultMemory
+from tickrig.device.canopen.ds402.state.faults import ErrorCode
+from tickrig.device.canopen.ds402.state.state import Controlword, DriveState, command_of
+from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
 from tickrig.device.core import NEVER
 from tickrig.wire.canopen.nmt import NmtState
 

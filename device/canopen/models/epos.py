@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.ds402 import maxon, modes
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.objects import CONST, RO, ROT, RW, RWW, Element, Objects
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds402.drive import Ds402
-from tickrig.device.canopen.ds402.faults import ErrorCode
-from tickrig.device.canopen.ds402.mode import Mode
-from tickrig.device.canopen.ds402.statusword import statusword_of
-from tickrig.device.canopen.ds402.supervision import Bounds
-from tickrig.device.canopen.ds402.telling import MEASURES, Measure, Multiplexer
-from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Element, Objects
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.ds402.modes import maxon, modes
+from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.objects.telling import MEASURES, Measure, Multiplexer
+from tickrig.device.canopen.ds402.state.faults import ErrorCode
+from tickrig.device.canopen.ds402.state.statusword import statusword_of
+from tickrig.device.canopen.ds402.state.supervision import Bounds
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.communication_profile import (

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.objects import CONST, RO, ROT, RW, RWW, Objects
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Converter, Ds401
-from tickrig.device.canopen.objects import CONST, RO, ROT, RW, RWW, Objects
-from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.communication_profile import (
     CommunicationProfile,
     Pdo,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.objects import ROT, RW, RWW, Element, Objects
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
-from tickrig.device.canopen.objects import ROT, RW, RWW, Element, Objects
 from tickrig.wire.canopen.communication_profile import (
     OFF,
     U8,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntFlag
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.motor_core_unit.motion import Motion
 from tickrig.device.canopen.motor_core_unit.references import References
 from tickrig.device.canopen.motor_core_unit.shaft import Shaft

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.motor_core_unit.trajectory import MAX_VELOCITY_UDEG_S
-from tickrig.device.canopen.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 
 FULL_SCALE: Final = 0x2010
 ANGLE_OFFSET: Final = 0x2011

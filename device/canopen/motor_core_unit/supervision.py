@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.motor_core_unit.faults import FAULTS, Fault, Signs
-from tickrig.device.canopen.slave import CanopenSlave
 
 
 class Supervision:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.motor_core_unit.display import Display
 from tickrig.device.canopen.motor_core_unit.faults import Signs
 from tickrig.device.canopen.motor_core_unit.motion import ACTS, Act, Motion, mode_of
@@ -14,7 +15,6 @@ from tickrig.device.canopen.motor_core_unit.shaft import Shaft
 from tickrig.device.canopen.motor_core_unit.supervision import Supervision
 from tickrig.device.canopen.motor_core_unit.terminals import INPUTS, OUTPUTS, READINGS, feel
 from tickrig.device.canopen.motor_core_unit.trajectory import CONTROL_US, DEGREE
-from tickrig.device.canopen.slave import TICK_US, CanopenSlave
 from tickrig.device.core import NEVER
 from tickrig.device.servo.presets import MOTOR_CORE_UNIT
 from tickrig.device.servo.servo import Servo

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from tests.emulators.can_bench import Log
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import f_palette, motor_core_unit
-from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.abort import SdoAbort
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Access, Entry
-from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value

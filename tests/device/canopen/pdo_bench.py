@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.reference import NODE_ID, U8, U32, U64, make_dictionary
-from tickrig.device.canopen.abort import SdoAbort
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Access, Entry
-from tickrig.device.canopen.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo_producer import PdoProducer
-from tickrig.device.canopen.service import Service
-from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.device.canopen.sync import Sync
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.bus.sync import Sync
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.service import Service
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
+from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
+from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.wire.canopen.abort import AbortCode
 
 RW = Access.READ | Access.WRITE

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Final
 
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.canopen.datatypes import DataType, Value
 
 RO: Final = Access.READ

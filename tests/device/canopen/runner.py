@@ -11,7 +11,7 @@ from collections import defaultdict, deque
 from enum import Enum
 from typing import Final
 
-from tickrig.device.canopen.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.wire.can import CanFrame
 
 MS_US: Final = 1_000

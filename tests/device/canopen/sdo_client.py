@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.reference import NODE_ID, make_dictionary
-from tickrig.device.canopen.sdo_servers import SdoServers
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.crc import crc16
 from tickrig.wire.canopen.sdo import (

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.entry import Entry
+from tickrig.device.canopen.core.entry import Entry
 
 
 def test_a_copy_has_the_defaults_and_nobodys_rules() -> None:

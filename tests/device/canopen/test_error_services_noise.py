@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.objects import U8, array, errors, make_bus, u8, u16, u32
-from tickrig.device.canopen.slave import TICK_US, UNCONFIGURED
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.slave import TICK_US, UNCONFIGURED
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from tests.device.canopen.fig120 import MEASURED, POTENTIOMETER, SETUP, Demo, look, make_motor
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
 from tickrig.emulators.candump_port import CandumpPort
 from tickrig.emulators.rig import Rig, Station
 from tickrig.wire.candump import parse_log

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.nmt_slave import NmtSlave
-from tickrig.device.canopen.service import Service
-from tickrig.device.canopen.slave import CanopenSlave
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.service import Service
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
 from tickrig.device.core import NEVER
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.objects import make_bus
 from tests.device.canopen.sdo_client import Client, booted
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.sdo import DownloadInitiateRequest
 

@@ -11,8 +11,8 @@ from canopen.objectdictionary import ObjectDictionary
 from canopen.sdo.client import BlockUploadStream, SdoClient
 from canopen.sdo.exceptions import SdoAbortedError
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.sdo_client import booted, offer_blocks_of, pattern
+from tests.device.canopen.slave_bench import Bus
 from tickrig.wire.can import CanFrame
 
 SIZES = [1, 2, 4, 5, 7, 8, 127, 889, 890, 5_000]

@@ -3,9 +3,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.sdo_client import OPEN_SECOND, Client, booted, pattern
-from tickrig.device.canopen.slave import TICK_US
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo import (
     Abort,

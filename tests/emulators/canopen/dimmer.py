@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.physical import Input, Kind, Output
 
 TABLE = (

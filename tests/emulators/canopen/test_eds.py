@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.dictionary import ObjectCode, ObjectInfo
-from tickrig.device.canopen.entry import Access
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.dictionary import ObjectCode, ObjectInfo
+from tickrig.device.canopen.core.entry import Access
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds import describe, read_eds

@@ -10,8 +10,8 @@ from dcf.lint import lint
 from dcf.parse import parse_file
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.wire.canopen.datatypes import DataType

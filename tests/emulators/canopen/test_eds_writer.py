@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.device_info import DeviceInfo

@@ -8,8 +8,8 @@ import canopen
 import pytest
 from canopen.objectdictionary import ODVariable, import_od
 
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.entry import Access, Entry
-from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.node import Node

@@ -14,8 +14,8 @@ from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.test_conformance import every_check, profile
 from tests.emulators.canopen.bus_runner import BusRunner, Unfiltered
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.node import Node

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 
 HEARTBEAT = 0x1017 << 8

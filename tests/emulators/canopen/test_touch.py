@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from tickrig.device.canopen.abort import SdoAbort
-from tickrig.device.canopen.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.physical import Kind
 from tickrig.emulators.canopen.touch import ObjectTouch, find_object, object_name
 from tickrig.wire.canopen.abort import AbortCode

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.device_rtc.bench import Recorder, RtcBench
 from tests.device.canopen.device_rtc.test_life_cycle import GOLDEN
+from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.device import DeviceRtc
 from tickrig.device.canopen.device_rtc.make import make_device_rtc

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.dictionary import Dictionary
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.objects import RWRW, Objects
+from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.objects import RWRW, Objects
-from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.communication_profile import (
     CommunicationProfile,

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.ds401.board import I16, NODE_ID, U8, Board, Row, make_dictionary
-from tickrig.device.canopen.dictionary import Dictionary
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.objects import RW
 from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.entry import Entry
-from tickrig.device.canopen.objects import RW
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import Kind
 from tickrig.wire.canopen.nmt import NmtState

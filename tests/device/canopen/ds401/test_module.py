@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.profile_objects import GENERIC_IO, make_dictionary
-from tickrig.device.canopen.application import Application
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
 from tickrig.device.canopen.stack import make_slave

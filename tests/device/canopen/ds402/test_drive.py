@@ -2,14 +2,14 @@ from __future__ import annotations
 
 import pytest
 
-from tests.device.canopen.bus import Bus
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tests.device.canopen.reference import I16, RW, U32
-from tickrig.device.canopen.abort import SdoAbort
-from tickrig.device.canopen.dictionary import Dictionary
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.ds402.state import DriveState
-from tickrig.device.canopen.entry import Access, Entry
+from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.core import NEVER
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.abort import SdoAbort
+from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.models import epos
 
 PROFILE = [

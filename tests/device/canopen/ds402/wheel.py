@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.ds402.state import DriveState
-from tickrig.device.canopen.entry import Access, Entry
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo

@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.objects import RO, ROT, RW, RWW
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.objects import RO, ROT, RW, RWW
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.device.canopen.bus import Bus
-from tickrig.device.canopen.application import Application
-from tickrig.device.canopen.entry import Access
+from tests.device.canopen.slave_bench import Bus
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.entry import Access
 from tickrig.device.canopen.models import f_palette
 from tickrig.device.canopen.stack import make_slave
 

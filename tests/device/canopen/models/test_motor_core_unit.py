@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.entry import Access
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access
+from tickrig.device.canopen.core.objects import RO, ROT, RW, RWW
 from tickrig.device.canopen.models import motor_core_unit
-from tickrig.device.canopen.objects import RO, ROT, RW, RWW
 from tickrig.wire.canopen.datatypes import DataType
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32

@@ -9,7 +9,7 @@ import canopen
 import pytest
 
 from tests.device.canopen.fig120 import make_motor
-from tickrig.device.canopen.application import Application
+from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import motor_core_unit
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station

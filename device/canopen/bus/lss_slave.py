@@ -1,0 +1,197 @@
+"""LSS slave: node-ID and bit timing over the bus (CiA 305)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Final
+
+from tickrig.device.canopen.bus.lss_identification import IDENTIFY, SELECTIVE, FastScanner, Question
+from tickrig.device.canopen.core.service import Handler, Service
+from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
+from tickrig.device.core import NEVER
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.lss import (
+    BIT_RATES,
+    LSS_MASTER_COB_ID,
+    LSS_SLAVE_COB_ID,
+    MESSAGE_BYTES,
+    STANDARD_TABLE,
+    FastScan,
+    LssAddress,
+    LssCommand,
+    LssError,
+    LssMode,
+    message,
+    number_of,
+)
+from tickrig.wire.canopen.nmt import NmtState
+
+IDENTITY: Final = 0x1018
+NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)
+
+Command = Callable[[bytes], None]
+
+
+class LssSlave(Service):
+    """Obeys the LSS master, in every NMT state.
+
+    A node-ID counts from the next reset; an unconfigured slave boots with it when
+    LSS returns to waiting. It is lost with the power unless it was stored. Any
+    reset returns to waiting. Selective switching and fastscan are heard in waiting
+    only, fastscan and identify non-configured by a slave that neither has nor was
+    given a node-ID. A bit rate counts when it is activated: the slave is silent for
+    two switch delays and changes in between (`node.on_bit_rate`). Without all of
+    1018h:01 to 04 there is no LSS.
+
+    Not emulated: manufacturer-specific bit timing tables, automatic bit rate
+    detection (index 9); both are refused with error 1.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._identity = node.dictionary.elements(IDENTITY, len(LssAddress._fields))
+        self._mode = LssMode.WAITING
+        self._bit_rate_index: int | None = None
+        self._switch_us = NEVER
+        self._selective, self._identify = Question(SELECTIVE), Question(IDENTIFY)
+        self._fastscan = FastScanner()
+        self._commands = self._make_commands()
+
+    def power_on(self) -> None:
+        """Begin with the stored bit rate."""
+        self._switch_us = NEVER
+        self._bit_rate_index = self.node.nonvolatile.bit_rate_index
+        self._tell_bit_rate()
+
+    def start(self) -> None:
+        """Wait for the LSS master; a bit rate that is on its way still comes."""
+        self._mode = LssMode.WAITING
+        self.schedule(self._switch_us)
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Hear the LSS master, while initialising too."""
+        if len(self._identity) == len(LssAddress._fields):
+            yield LSS_MASTER_COB_ID, self._receive
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the LSS master: a slave that gets its node-ID boots."""
+        return (can_id for can_id, _ in self.handlers(state))
+
+    def tick(self, now_us: int) -> None:
+        """Switch the bit rate."""
+        self._switch_us = NEVER
+        self._tell_bit_rate()
+
+    @property
+    def _address(self) -> LssAddress:
+        return LssAddress(*(entry.number for entry in self._identity))
+
+    @property
+    def _is_unconfigured(self) -> bool:
+        return self.node.node_id == self.node.pending_id == UNCONFIGURED
+
+    def _make_commands(self) -> dict[LssMode, dict[int, Command]]:
+        always: dict[int, Command] = {
+            LssCommand.SWITCH_GLOBAL: self._switch_global,
+            LssCommand.IDENTIFY_NON_CONFIGURED: self._identify_non_configured,
+        }
+        for step in range(len(IDENTIFY)):
+            always[LssCommand.IDENTIFY_VENDOR + step] = partial(self._identify_remote, step)
+        waiting: dict[int, Command] = {LssCommand.FASTSCAN: self._scan}
+        for step in range(len(SELECTIVE)):
+            waiting[LssCommand.SWITCH_VENDOR + step] = partial(self._switch_selective, step)
+        configuration: dict[int, Command] = {
+            LssCommand.CONFIGURE_NODE_ID: self._configure_node_id,
+            LssCommand.CONFIGURE_BIT_TIMING: self._configure_bit_timing,
+            LssCommand.ACTIVATE_BIT_TIMING: self._activate_bit_timing,
+            LssCommand.STORE: self._store,
+            LssCommand.INQUIRE_NODE_ID: self._inquire_node_id,
+        }
+        for step in range(len(LssAddress._fields)):
+            configuration[LssCommand.INQUIRE_VENDOR + step] = partial(self._inquire, step)
+        return {
+            LssMode.WAITING: {**always, **waiting},
+            LssMode.CONFIGURATION: {**always, **configuration},
+        }
+
+    def _receive(self, frame: CanFrame) -> None:
+        data = frame.data
+        if len(data) == MESSAGE_BYTES:
+            command = self._commands[self._mode].get(data[0])
+            if command is not None:
+                command(data)
+
+    def _answer(self, command: LssCommand, number: int = 0) -> None:
+        self.node.send(LSS_SLAVE_COB_ID, message(command, number))
+
+    def _acknowledge(self, command: LssCommand, allowed: bool) -> None:
+        self._answer(command, LssError.NONE if allowed else LssError.OUT_OF_RANGE)
+
+    def _switch_global(self, data: bytes) -> None:
+        if data[1] == LssMode.CONFIGURATION:
+            self._mode = LssMode.CONFIGURATION
+        elif data[1] == LssMode.WAITING:
+            self._mode = LssMode.WAITING
+            node = self.node
+            if node.node_id == UNCONFIGURED and node.pending_id != UNCONFIGURED:
+                node.reset_communication()
+
+    def _switch_selective(self, step: int, data: bytes) -> None:
+        if self._selective.ask(step, self._address, number_of(data)):
+            self._mode = LssMode.CONFIGURATION
+            self._answer(LssCommand.SWITCHED)
+
+    def _identify_remote(self, step: int, data: bytes) -> None:
+        if self._identify.ask(step, self._address, number_of(data)):
+            self._answer(LssCommand.IDENTIFIED)
+
+    def _identify_non_configured(self, data: bytes) -> None:
+        if self._is_unconfigured:
+            self._answer(LssCommand.NON_CONFIGURED)
+
+    def _scan(self, data: bytes) -> None:
+        if not self._is_unconfigured:
+            return
+        mode = self._fastscan.ask(FastScan.parse(data), self._address)
+        if mode is not None:
+            self._mode = mode
+            self._answer(LssCommand.IDENTIFIED)
+
+    def _configure_node_id(self, data: bytes) -> None:
+        allowed = data[1] in NODE_IDS
+        if allowed:
+            self.node.pending_id = data[1]
+        self._acknowledge(LssCommand.CONFIGURE_NODE_ID, allowed)
+
+    def _configure_bit_timing(self, data: bytes) -> None:
+        allowed = data[1] == STANDARD_TABLE and data[2] in BIT_RATES
+        if allowed:
+            self._bit_rate_index = data[2]
+        self._acknowledge(LssCommand.CONFIGURE_BIT_TIMING, allowed)
+
+    def _activate_bit_timing(self, data: bytes) -> None:
+        delay_us = int.from_bytes(data[1:3], "little") * 1_000
+        self._switch_us = self.node.now_us + delay_us
+        self.node.silent_until_us = self._switch_us + delay_us
+        self.schedule(self._switch_us)
+
+    def _store(self, data: bytes) -> None:
+        nonvolatile = self.node.nonvolatile
+        nonvolatile.node_id = self.node.pending_id
+        nonvolatile.bit_rate_index = self._bit_rate_index
+        nonvolatile.changed()
+        self._acknowledge(LssCommand.STORE, allowed=True)
+
+    def _inquire(self, step: int, data: bytes) -> None:
+        self._answer(LssCommand(data[0]), self._address[step])
+
+    def _inquire_node_id(self, data: bytes) -> None:
+        self._answer(LssCommand.INQUIRE_NODE_ID, self.node.node_id)
+
+    def _tell_bit_rate(self) -> None:
+        """Tell the bit rate, if one was ever configured."""
+        bit_rate = BIT_RATES.get(-1 if self._bit_rate_index is None else self._bit_rate_index)
+        if bit_rate is not None:
+            for told in self.node.on_bit_rate:
+                told(bit_rate)

@@ -1,0 +1,145 @@
+"""SYNC consumer and producer (CiA 301, synchronization object; 1005h, 1006h, 1019h)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.service import ALIVE, Handler, Service
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.pdo.pdo_mapping import whole_number
+from tickrig.device.core import NEVER
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, is_restricted
+from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import NmtState
+
+COB_ID_SYNC: Final = 0x1005
+COMMUNICATION_CYCLE_PERIOD: Final = 0x1006
+SYNC_COUNTER_OVERFLOW: Final = 0x1019
+
+COUNTER_OVERFLOWS: Final = (0, *range(2, 241))
+_NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
+
+
+class Sync(Service):
+    """Hears SYNC and sends it if bit 30 of 1005h and 1006h say so.
+
+    `node.on_sync` is called for each SYNC, for the own one too, at its place
+    between the frames of a tick. A SYNC of another length than 1019h says is
+    none: EMCY 8240h, which is cleared by the next good one. The first own SYNC
+    comes one period after 1005h, 1006h or 1019h was written or the node left
+    Initialising or Stopped, and counts from 1.
+
+    Not emulated: 29-bit CAN-IDs; periods below the tick, of which one SYNC a
+    tick is left; the EMCY of a SYNC that stays away, which CiA 301 leaves open.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        find = node.dictionary.find
+        self._cob_id = find(COB_ID_SYNC)
+        self._period = find(COMMUNICATION_CYCLE_PERIOD)
+        self._overflow = find(SYNC_COUNTER_OVERFLOW)
+        self._due_us, self._counter, self._length, self._length_error = NEVER, 0, 0, False
+        if self._cob_id is not None:
+            self._cob_id.guard = self._check_cob_id
+            self._cob_id.watchers.append(self._changed)
+        if self._period is not None:
+            self._period.watchers.append(self._changed)
+        if self._overflow is not None:
+            self._overflow.guard = self._check_overflow
+            self._overflow.watchers.append(self._changed)
+
+    @property
+    def can_id(self) -> int:
+        """The CAN-ID, 0 if SYNC is neither consumed nor produced."""
+        return self._cob_id.number & CAN_ID_MASK if self._cob_id is not None else 0
+
+    @property
+    def period_us(self) -> int:
+        """The communication cycle period, 0 for none."""
+        return self._period.number if self._period is not None else 0
+
+    @property
+    def overflow(self) -> int:
+        """The greatest counter, 0 if SYNC carries none."""
+        return self._overflow.number if self._overflow is not None else 0
+
+    @property
+    def _produces(self) -> bool:
+        return self._cob_id is not None and bool(self._cob_id.number & FLAG_30)
+
+    def start(self) -> None:
+        """Know of no error."""
+        self._length_error = False
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Begin to produce, or stop."""
+        if (old in ALIVE) is not (new in ALIVE):
+            self._begin()
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Hear SYNC in Pre-operational and Operational."""
+        self._length = 1 if self.overflow else 0
+        if state in ALIVE and not is_restricted(self.can_id):
+            yield self.can_id, self._receive
+
+    def tick(self, now_us: int) -> None:
+        """Send SYNC and act on it, or begin to count the period."""
+        if self._due_us == NEVER:
+            self._due_us = now_us + self.period_us
+            self.schedule(self._due_us)
+            return
+        self._due_us = max(self._due_us + self.period_us, now_us + 1)
+        self.schedule(self._due_us)
+        self._counter = self._counter % self.overflow + 1 if self.overflow else 0
+        self.node.send(self.can_id, bytes([self._counter] if self._counter else []))
+        self._announce(self._counter)
+
+    def _receive(self, frame: CanFrame) -> None:
+        data = frame.data
+        if len(data) != self._length:
+            self._length_error = True
+            length = bytes([len(data)])
+            self.node.emergency(EmcyCode.SYNC_LENGTH, ErrorRegister.COMMUNICATION, length)
+            return
+        if self._length_error:
+            self._length_error = False
+            self.node.emergency_clear(EmcyCode.SYNC_LENGTH)
+        self._announce(data[0] if data else 0)
+
+    def _announce(self, counter: int) -> None:
+        for told in self.node.on_sync:
+            told(counter)
+
+    def _changed(self) -> None:
+        """Follow another COB-ID, period or overflow value."""
+        if self.node.state in ALIVE:
+            self.node.rewire()
+            self._begin()
+
+    def _begin(self) -> None:
+        """Produce from now on, with the counter at 1, or do not."""
+        self._counter, self._due_us = 0, NEVER
+        running = self._produces and self.period_us and self.node.state in ALIVE
+        self.schedule(self.node.now_us if running else NEVER)
+
+    def _check_cob_id(self, value: Value) -> None:
+        """Refuse what is no CAN-ID for it, and another one while it produces."""
+        cob_id = whole_number(value)
+        can_id, producer = cob_id & CAN_ID_MASK, bool(cob_id & FLAG_30)
+        if cob_id & _NOT_IN_A_CAN_ID or is_restricted(can_id):
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        if producer and (self._period is None or (self._produces and can_id != self.can_id)):
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+
+    def _check_overflow(self, value: Value) -> None:
+        """Refuse an impossible counter, and any while a period is set."""
+        if value not in COUNTER_OVERFLOWS:
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        if self.period_us:
+            raise SdoAbort(AbortCode.DEVICE_STATE)

@@ -1,0 +1,86 @@
+"""What all services of a slave have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Self
+
+from tickrig.device.core import NonCopyable
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.canopen.nmt import NmtState
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.core.slave import CanopenSlave
+
+Handler = Callable[[CanFrame], None]
+
+ALIVE = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
+ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
+
+
+class Service(NonCopyable):
+    """One communication service: SDO server, PDOs, SYNC, ...
+
+    A service finds its objects in the dictionary when it is made and hangs its
+    rules onto them (`Entry.guard`, `written`, `source`). An object that is not
+    there switches the service off.
+
+    Attributes:
+        node: the slave that it belongs to.
+        slot: its place in the order of a tick.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        self.node, self.slot = node, slot
+
+    @classmethod
+    def of(cls, node: CanopenSlave) -> Self:
+        """Return this service of a slave; StopIteration if the slave has none."""
+        return next(service for service in node.services if isinstance(service, cls))
+
+    def power_on(self) -> None:
+        """Forget what only a power cut makes it forget."""
+
+    def start(self) -> None:
+        """Begin anew after Reset communication: the dictionary holds power-on values."""
+
+    def booted(self) -> None:
+        """Act at the end of Initialising, in a slave that has a node-ID."""
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Give the CAN-IDs of data frames that it wants in an NMT state, each with its handler."""
+        return iter(())
+
+    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """The same for remote frames."""
+        return iter(())
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Give those of the CAN-IDs whose frames may, when handled, change what the node hears.
+
+        An acceptance filter lets everything pass behind such a frame.
+        """
+        return iter(())
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Hear of each change of the NMT state, after it was made."""
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """Hear of an error (see `CanopenSlave.emergency`)."""
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """Hear that an error is gone."""
+
+    def communication_error(self) -> None:
+        """Hear of a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Hear of the CAN controller's fault confinement."""
+
+    def tick(self, now_us: int) -> None:
+        """Do what is due; called in the tick for which it was scheduled."""
+
+    def schedule(self, due_us: int) -> None:
+        """Ask for `tick` at this time, instead of the one asked for before; `NEVER` for none."""
+        self.node.schedule(self.slot, due_us)

@@ -1,0 +1,284 @@
+"""A CANopen slave: dictionary, NMT state and services, one step a tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import itemgetter
+from typing import Final
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.service import Handler, Service
+from tickrig.device.core import NEVER, NonCopyable
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.time_of_day import TimeOfDay
+
+TICK_US: Final = 1_000
+UNCONFIGURED: Final = 0xFF
+"""Node-ID of a slave that waits for LSS (CiA 305)."""
+
+COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
+
+_can_id = itemgetter(0)
+
+ServiceMaker = Callable[["CanopenSlave", int], Service]
+
+
+class CanopenSlave(NonCopyable):
+    """A `Device[Frames]` that is a CANopen slave (CiA 301).
+
+    Frames of a tick are handled in the order in which they came over the wire.
+    Then services act in the order in which they are listed: SYNC, RPDO, SDO,
+    application, TPDO, EMCY, heartbeat. Frames of one tick leave sorted by CAN-ID.
+
+    Not emulated: the time that a real slave's processor needs.
+
+    Args:
+        dictionary: the objects; services follow what is in it.
+        node_id: 1..127, or `UNCONFIGURED`; LSS may have stored another.
+        services: what makes the services, in the order of a tick.
+        nonvolatile: what survives a power cycle.
+
+    Raises:
+        ValueError: an impossible node-ID.
+
+    Attributes:
+        node_id: the active node-ID.
+        pending_id: the node-ID that counts from the next reset on (CiA 305).
+        state: NMT state.
+        now_us: time of the latest tick.
+        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire; None,
+            for all, from power-on or a reset to the first tick.
+        reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
+        on_accepts: called when these two have changed.
+        time_of_day: the latest TIME stamp that was received, None before the first.
+        silent_until_us: nothing is sent before; LSS switches the bit rate.
+        on_state: told of each change of the NMT state, old and new.
+        on_sync: told the counter of each SYNC, 0 if it has none: RPDOs, TPDOs, then others.
+        on_bit_rate: told the bit rate in bit/s that LSS has switched to.
+        boots: asked at the end of Initialising whether the node boots or stays there.
+        admits: asked before each NMT command whether it is carried out.
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        node_id: int,
+        services: tuple[ServiceMaker, ...],
+        nonvolatile: Nonvolatile | None = None,
+    ) -> None:
+        if node_id != UNCONFIGURED and not 1 <= node_id <= 127:
+            raise ValueError(f"node-ID {node_id} is not in 1..127 and not {UNCONFIGURED}")
+        self.dictionary, self.nonvolatile = dictionary, nonvolatile or Nonvolatile()
+        self.configured_id = self.pending_id = node_id
+        self.node_id, self.state, self.now_us = node_id, NmtState.INITIALISING, 0
+        self.on_state: list[Callable[[NmtState, NmtState], None]] = []
+        self.on_sync: list[Callable[[int], None]] = []
+        self.on_bit_rate: list[Callable[[int], None]] = []
+        self.boots: Callable[[], bool] = _boots
+        self.admits: Callable[[NmtCommand], bool] = _admits
+        self.time_of_day: TimeOfDay | None = None
+        self.silent_until_us = 0
+        self._powered = False
+        self._out: list[CanFrame] = []
+        self._handlers: dict[int, Handler] = {}
+        self._remote_handlers: dict[int, Handler] = {}
+        self.accepts: frozenset[int] | None = None
+        self.reconfigured_by: frozenset[int] = frozenset()
+        self.on_accepts: list[Callable[[], None]] = []
+        self._dues = [NEVER] * len(services)
+        self._due_us = 0
+        self.services = [make(self, slot) for slot, make in enumerate(services)]
+
+    @property
+    def tick_us(self) -> int:
+        """The control period."""
+        return TICK_US
+
+    @property
+    def due_us(self) -> int:
+        """When the next service is due."""
+        return self._due_us
+
+    def reset(self) -> None:
+        """Lose power; the next tick is the first one after power-on."""
+        self._powered = False
+        self._due_us = 0
+        self._listen_to(None)
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Run one tick."""
+        self.now_us = now_us
+        if not self._powered:
+            self._power_on()
+        for frame in rx:
+            handler = self._handlers.get(frame[0])
+            if frame[2] or frame[3]:
+                self._receive_special(frame)
+            elif handler is not None:
+                handler(frame)
+        if self._due_us <= now_us:
+            self._run_due(now_us)
+        out = self._out
+        if not out:
+            return ()
+        self._out = []
+        if now_us < self.silent_until_us:
+            return ()
+        if len(out) > 1:
+            out.sort(key=_can_id)
+        return tuple(out)
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Put a data frame into this tick's traffic."""
+        self._out.append(CanFrame(can_id, data))
+
+    def emergency(self, code: int, register: int, text: bytes = b"") -> None:
+        """Raise an error: it is active until it is cleared, and raising it again is none.
+
+        Args:
+            code: emergency error code; see `EmcyCode`.
+            register: bits of the error register 1001h; the generic bit comes by itself.
+            text: manufacturer-specific bytes, up to 5; errors of one code may differ in them.
+        """
+        if self._powered:
+            for service in self.services:
+                service.emergency(code, register, text)
+
+    def emergency_clear(self, code: int, text: bytes | None = None) -> None:
+        """Clear an error, without `text` all that have this code."""
+        for service in self.services:
+            service.emergency_clear(code, text)
+
+    def communication_error(self) -> None:
+        """Let the error behaviour for communication errors act (1029h:01)."""
+        for service in self.services:
+            service.communication_error()
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Tell what the CAN controller reports; for the one that owns the controller."""
+        if self._powered:
+            for service in self.services:
+                service.bus_state(state)
+
+    def overrun(self) -> None:
+        """Tell that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
+        self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
+        self.emergency_clear(EmcyCode.CAN_OVERRUN)
+
+    def schedule(self, slot: int, due_us: int) -> None:
+        """Enter when a service wants its `tick`."""
+        before, self._dues[slot] = self._dues[slot], due_us
+        if due_us < self._due_us:
+            self._due_us = due_us
+        elif before == self._due_us and self._powered:
+            self._due_us = min(self._dues)
+
+    def rewire(self) -> None:
+        """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
+        self._handlers, self._remote_handlers = {}, {}
+        reconfigured_by: list[int] = []
+        for service in self.services:
+            reconfigured_by += service.reconfigured_by(self.state)
+            for can_id, handler in service.handlers(self.state):
+                self._handlers[can_id] = _both(self._handlers.get(can_id), handler)
+            for can_id, handler in service.remote_handlers(self.state):
+                self._remote_handlers[can_id] = handler
+        self.reconfigured_by = frozenset(reconfigured_by)
+        self._listen_to(frozenset((*self._handlers, *self._remote_handlers)))
+
+    def _listen_to(self, accepts: frozenset[int] | None) -> None:
+        self.accepts = accepts
+        for told in self.on_accepts:
+            told()
+
+    def enter(self, state: NmtState) -> None:
+        """Change the NMT state; services and application hear of it."""
+        old, self.state = self.state, state
+        if old is state:
+            return
+        self.rewire()
+        for service in self.services:
+            service.state_changed(old, state)
+        for told in self.on_state:
+            told(old, state)
+
+    def reset_node(self) -> None:
+        """Reset application and communication: every object has its power-on value again."""
+        self.node_id = self.pending_id
+        self._restore(range(0x1_0000))
+        self._boot()
+
+    def reset_communication(self) -> None:
+        """Reset the communication objects, 1000h to 1FFFh, and boot again."""
+        self.node_id = self.pending_id
+        self._restore(COMMUNICATION_AREA)
+        self._boot()
+
+    def _power_on(self) -> None:
+        self._powered = True
+        self._out, self._dues = [], [NEVER] * len(self.services)
+        self.pending_id = self.nonvolatile.node_id or self.configured_id
+        self.time_of_day, self.silent_until_us = None, 0
+        for service in self.services:
+            service.power_on()
+        self.reset_node()
+
+    def _boot(self) -> None:
+        """Go through Initialising; a slave without node-ID stays there, for LSS alone."""
+        self.enter(NmtState.INITIALISING)
+        for slot, service in enumerate(self.services):
+            self.schedule(slot, NEVER)
+            service.start()
+        self.rewire()
+        if self.node_id != UNCONFIGURED:
+            for service in self.services:
+                service.booted()
+
+    def _restore(self, area: range) -> None:
+        stored = self.nonvolatile.parameters
+        for entry in self.dictionary:
+            if entry.index in area:
+                data = stored.get(entry.key)
+                entry.assign(entry.power_on_data(self.node_id) if data is None else data)
+
+    def _receive_special(self, frame: CanFrame) -> None:
+        """Handle a remote frame; 29-bit frames are for nobody here."""
+        handler = self._remote_handlers.get(frame.can_id)
+        if frame.remote and not frame.extended and handler is not None:
+            handler(frame)
+
+    def _run_due(self, now_us: int) -> None:
+        """Let the services act that are due, in their order."""
+        dues = self._dues
+        for slot, service in enumerate(self.services):
+            if dues[slot] <= now_us:
+                dues[slot] = NEVER
+                service.tick(now_us)
+        if self._powered:
+            self._due_us = min(dues)
+
+
+def _boots() -> bool:
+    """Boot, as CiA 301 has it."""
+    return True
+
+
+def _admits(command: NmtCommand) -> bool:
+    """Carry out each command, as CiA 301 has it."""
+    return True
+
+
+def _both(first: Handler | None, second: Handler) -> Handler:
+    """Return a handler that calls both: two services may listen to one CAN-ID."""
+    if first is None:
+        return second
+
+    def handle(frame: CanFrame) -> None:
+        first(frame)
+        second(frame)
+
+    return handle

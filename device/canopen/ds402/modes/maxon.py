@@ -1,0 +1,88 @@
+"""Maxon's own modes: a setting value is the reference at once (EPOS Firmware Specification)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.modes.taken_target import TakenTarget
+from tickrig.device.canopen.ds402.motion.reference import Control
+
+CURRENT_SETTING: Final = 0x2030
+POSITION_SETTING: Final = 0x2062
+VELOCITY_SETTING: Final = 0x206B
+
+SETTINGS: Final = (CURRENT_SETTING, POSITION_SETTING, VELOCITY_SETTING)
+
+
+class PositionSetting(TakenTarget):
+    """Position mode, -1: 2062h in position units.
+
+    That bit 8 of the controlword does nothing in these modes is our decision.
+    """
+
+    index = POSITION_SETTING
+
+    def follow(self, now_us: int) -> bool:
+        """Be at the setting value."""
+        self.reference.place(self.target())
+        return True
+
+
+class VelocitySetting(Mode):
+    """Velocity mode, -2: 206Bh in velocity units.
+
+    When the mode is chosen while the drive is enabled, 206Bh takes the present
+    velocity (ours).
+    """
+
+    control = Control.VELOCITY
+    halts = False
+
+    def enter(self) -> None:
+        """Take the present velocity, unless the drive is just being enabled."""
+        drive = self.drive
+        if drive.enabled:
+            present = round(self.reference.velocity / drive.settings.units.per_velocity)
+            drive.parameters.write(VELOCITY_SETTING, present)
+
+    def run(self, now_us: int) -> bool:
+        """Turn as fast as the setting value."""
+        drive, reference = self.drive, self.reference
+        value = drive.parameters.number(VELOCITY_SETTING)
+        wanted = drive.limits.velocity(value * drive.settings.units.per_velocity)
+        reference.place(reference.position, wanted)
+        return True
+
+
+class CurrentSetting(Mode):
+    """Current mode, -3: 2030h in milliamperes.
+
+    When the mode is chosen while the drive is enabled, 2030h takes the present
+    current (ours).
+    """
+
+    control = Control.CURRENT
+    halts = False
+
+    def enter(self) -> None:
+        """Take the present current, unless the drive is just being enabled."""
+        drive = self.drive
+        if drive.enabled:
+            present = round(1_000 * self.reference.current_a) * drive.axis.forward
+            drive.parameters.write(CURRENT_SETTING, present)
+
+    def run(self, now_us: int) -> bool:
+        """Have the current of the setting value."""
+        drive = self.drive
+        wanted_a = drive.parameters.number(CURRENT_SETTING) / 1_000 * drive.axis.forward
+        self.reference.current_a = drive.limits.current(wanted_a)
+        return True
+
+
+MODES: Final[dict[int, type[Mode]]] = {
+    -1: PositionSetting,
+    -2: VelocitySetting,
+    -3: CurrentSetting,
+}
+"""By number in 6060h."""

@@ -1,0 +1,162 @@
+"""Profile position mode (CiA 402-2): set-points, one after the other or at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.motion.course import Course, began_us
+from tickrig.device.canopen.ds402.motion.trapezoid import (
+    Limits,
+    Path,
+    RampShape,
+    to_position,
+    to_velocity,
+)
+from tickrig.device.canopen.ds402.motion.window import Window
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.state.state import Controlword, Statusword
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.ds402.drive import Ds402
+    from tickrig.device.canopen.ds402.objects.settings import Settings
+
+SLOWEST: Final = 1.0
+"""Counts per second: a profile has to end some time."""
+
+STEEPEST: Final = 1e12
+"""Counts per second per second, for ramps without a limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetPoint:
+    """A target and how to get there, as it was when the set-point was given.
+
+    Attributes:
+        target: counts.
+        limits: of the way.
+        end_velocity: speed at the target, counts per second.
+        cut: a software limit moved the target.
+    """
+
+    target: float
+    limits: Limits
+    end_velocity: float
+    cut: bool
+
+
+class ProfilePosition(Mode):
+    """Goes to set-points; one more may wait for its turn.
+
+    A set-point takes target, velocities and ramps with it when bit 4 rises; later
+    changes are for the next one. Bit 12 falls when bit 4 has fallen and no
+    set-point waits; while one waits, only one that changes at once is taken. A
+    relative target is added to the target before it. With bit 9 the present
+    set-point is passed at its profile velocity, unless the way turns there.
+    Bit 10: nothing waits, the profile has ended, and the motor is within 6067h
+    of the target for 6068h. After an end velocity the motor goes on with it.
+
+    Not emulated: 60F2h positioning option code; more than one waiting set-point.
+    """
+
+    tells_following_error = True
+
+    def __init__(self, drive: Ds402) -> None:
+        super().__init__(drive)
+        self._course, self._near = Course(self.reference), Window()
+        self._present: SetPoint | None = None
+        self._waiting: SetPoint | None = None
+        self._last = self.reference.position
+        self._acknowledges = self._arrived = False
+
+    def start(self) -> None:
+        """Take a new set-point and acknowledge it."""
+        self._acknowledges = True
+        controlword, present = self.drive.controlword, self._present
+        if present is None or self._arrived or controlword & Controlword.CHANGE_AT_ONCE:
+            self._go(self._set_point())
+        elif self._waiting is None:
+            self._waiting = self._set_point()
+            if controlword & Controlword.CHANGE_ON_SET_POINT:
+                self._pass_by(present, self._waiting)
+
+    def stop(self) -> None:
+        """Take the acknowledge back."""
+        self._acknowledges = False
+
+    def run(self, now_us: int) -> bool:
+        """Follow the path; at its end take the next set-point."""
+        if not self._course.kept:
+            self._course.begin(self._plan(began_us(now_us)))
+        if self._course.follow(now_us):
+            if self._waiting is None:
+                self._arrived = True
+            else:
+                self._go(self._waiting)
+        self._tell(now_us)
+        return self._arrived and self.reference.velocity == 0 and not self._near.waiting
+
+    def halt(self, now_us: int) -> bool:
+        """Brake as 605Dh says; the way goes on afterwards."""
+        stands = super().halt(now_us)
+        self._acknowledge()
+        return stands
+
+    def _go(self, point: SetPoint) -> None:
+        """Go to a set-point from here."""
+        self._present, self._waiting, self._arrived = point, None, False
+        self._course.leave()
+
+    def _pass_by(self, present: SetPoint, following: SetPoint) -> None:
+        """Do not stop at the present set-point, if the way goes on in its direction."""
+        onward = (following.target - present.target) * (present.target - self.reference.position)
+        if onward > 0:
+            self._present = replace(present, end_velocity=present.limits.velocity)
+            self._course.leave()
+
+    def _set_point(self) -> SetPoint:
+        drive, settings = self.drive, self.drive.settings
+        position = drive.parameters.number(indices.TARGET_POSITION)
+        if drive.controlword & Controlword.RELATIVE:
+            target = self._last + position * settings.units.per_position
+        else:
+            target = drive.axis.counts_of(position)
+        self._last = drive.axis.clamp(target)
+        number = drive.parameters.number(indices.MOTION_PROFILE)
+        shape = RampShape.SIN2 if number == RampShape.SIN2 else RampShape.LINEAR
+        limits = profile_limits(settings, shape)
+        return SetPoint(self._last, limits, settings.end_velocity, self._last != target)
+
+    def _plan(self, now_us: int) -> Path:
+        start, point = self._course.motion, self._present
+        if point is None:
+            return to_velocity(now_us, start, 0.0, profile_limits(self.drive.settings))
+        return to_position(now_us, start, point.target, point.limits, point.end_velocity)
+
+    def _tell(self, now_us: int) -> None:
+        drive, point = self.drive, self._present
+        goal = self.reference.position if point is None else point.target
+        away = abs(drive.motor.counts - round(goal))
+        passed = point is not None and point.end_velocity > 0
+        near = self._arrived and (passed or away <= drive.settings.position_window)
+        reached = self._near.holds(now_us, near, drive.settings.position_window_us)
+        self.flags = Statusword.TARGET_REACHED if reached else Statusword(0)
+        drive.limited |= point is not None and point.cut
+        self._acknowledge()
+
+    def _acknowledge(self) -> None:
+        """Set or clear bit 12."""
+        self.flags &= ~Statusword.MODE_12
+        if self._acknowledges or self._waiting:
+            self.flags |= Statusword.MODE_12
+
+
+def profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> Limits:
+    """Return what 6081h, 6083h and 6084h allow; a profile velocity of 0 is the slowest one."""
+    return Limits(
+        max(SLOWEST, settings.profile_velocity),
+        min(STEEPEST, settings.acceleration),
+        min(STEEPEST, settings.deceleration),
+        shape,
+    )

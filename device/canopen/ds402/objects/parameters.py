@@ -1,0 +1,47 @@
+"""The objects of a drive as numbers, whether the device has them or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.ds402.objects.indices import DEFAULTS
+
+
+class Parameters:
+    """Reads objects, and writes those that are there.
+
+    Args:
+        dictionary: of the slave.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._dictionary = dictionary
+
+    def number(self, index: int, sub: int = 0) -> int:
+        """Return a value; the default of `DEFAULTS` if the device has no such object."""
+        entry = self._dictionary.find(index, sub)
+        return DEFAULTS.get((index, sub), 0) if entry is None else entry.number
+
+    def write(self, index: int, value: int, sub: int = 0) -> None:
+        """Set a value, if the device has such an object; too large a one is cut to its range."""
+        entry = self._dictionary.find(index, sub)
+        if entry is not None:
+            entry.value = clamped(value, 8 * entry.size, signed=entry.data_type.signed)
+
+    def watch(self, indices: Iterable[int], changed: Callable[[], None]) -> None:
+        """Call `changed` whenever one of these objects changes."""
+        wanted = frozenset(indices)
+        for entry in self._dictionary:
+            if entry.index in wanted:
+                entry.watchers.append(changed)
+
+
+def clamped(value: int, bits: int, *, signed: bool) -> int:
+    """Return the nearest number that an integer of so many bits holds.
+
+    >>> clamped(40_000, 16, signed=True), clamped(-1, 16, signed=False)
+    (32767, 0)
+    """
+    low = -(1 << bits - 1) if signed else 0
+    return max(low, min(low + (1 << bits) - 1, value))

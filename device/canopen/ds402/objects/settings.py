@@ -1,0 +1,160 @@
+"""How a drive is set up: the configuration objects in the units of its motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+from tickrig.device.canopen.ds402.motion.units import Units
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.objects.indices import NO_LIMIT
+from tickrig.device.canopen.ds402.objects.parameters import Parameters
+
+NO_TORQUE_LIMIT: Final = 0xFFFF
+
+CONFIGURATION: Final = (
+    *range(indices.QUICK_STOP_OPTION, indices.FAULT_REACTION_OPTION + 1),
+    *range(indices.FOLLOWING_ERROR_WINDOW, indices.POSITION_WINDOW_TIME + 1),
+    *range(indices.VELOCITY_WINDOW, indices.VELOCITY_THRESHOLD_TIME + 1),
+    *(indices.ABORT_CONNECTION, indices.MAX_TORQUE, indices.MAX_CURRENT),
+    *(indices.RATED_CURRENT, indices.RATED_TORQUE, indices.POSITION_RANGE),
+    *range(indices.HOME_OFFSET, indices.TORQUE_SLOPE + 1),
+    *(indices.VELOCITY_NOTATION, indices.VELOCITY_DIMENSION, indices.ENCODER_RESOLUTION),
+    *(indices.GEAR_RATIO, indices.FEED_CONSTANT, indices.HOMING_SPEEDS),
+    *(indices.HOMING_ACCELERATION, indices.SI_UNIT_VELOCITY, indices.INTERPOLATION_PERIOD),
+    *(indices.MAX_ACCELERATION, indices.MAX_DECELERATION),
+    *(indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
+)
+"""Objects whose change makes the settings anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """A snapshot of the configuration.
+
+    Positions are in counts from where the encoder was switched on less the home
+    position, velocities in counts per second, accelerations in counts per second
+    per second, all of them without sign; `inf` stands for no limit.
+
+    Attributes:
+        units: of the user.
+        max_velocity: the smaller one of 607Fh and 6080h (revolutions per minute of the motor).
+        software_limits: 607Dh with the home offset, as distances from the zero of the user.
+        following_error_us: how long the error may be too large (6066h).
+        interpolation_us: 60C2h.
+        rated_current_a: 6075h.
+        max_current_a: by 6072h, 6073h.
+        torque_slope_a_s: 6087h as amperes per second.
+        limits_a: by 60E0h and 60E1h, both positive.
+    """
+
+    units: Units
+    max_velocity: float
+    profile_velocity: float
+    end_velocity: float
+    acceleration: float
+    deceleration: float
+    quick_stop_deceleration: float
+    max_acceleration: float
+    max_deceleration: float
+    homing_speeds: tuple[float, float]
+    homing_acceleration: float
+    software_limits: tuple[float, float]
+    position_range: tuple[int, int]
+    following_error_window: float
+    following_error_us: int
+    position_window: float
+    position_window_us: int
+    velocity_window: float
+    velocity_window_us: int
+    velocity_threshold: float
+    velocity_threshold_us: int
+    interpolation_us: int
+    rated_current_a: float
+    max_current_a: float
+    limits_a: tuple[float, float]
+    torque_slope_a_s: float
+
+
+def read_settings(parameters: Parameters, counts_per_turn: int) -> Settings:
+    """Return the present configuration."""
+    read, units = parameters.number, Units(parameters, counts_per_turn)
+    velocity, acceleration, position = (
+        *(abs(units.per_velocity), units.per_acceleration, abs(units.per_position)),
+    )
+    rated_current_a = max(1, read(indices.RATED_CURRENT)) / 1_000
+
+    def rate(index: int, most: float = inf) -> float:
+        value = read(index)
+        return most if value == NO_LIMIT else min(most, max(1, value) * acceleration)
+
+    max_acceleration = rate(indices.MAX_ACCELERATION)
+    max_deceleration = rate(indices.MAX_DECELERATION)
+    max_velocity = min(
+        _limit(read(indices.MAX_PROFILE_VELOCITY), velocity),
+        _limit(read(indices.MAX_MOTOR_SPEED), counts_per_turn / 60),
+    )
+    return Settings(
+        units=units,
+        max_velocity=max_velocity,
+        profile_velocity=min(max_velocity, read(indices.PROFILE_VELOCITY) * velocity),
+        end_velocity=min(max_velocity, read(indices.END_VELOCITY) * velocity),
+        acceleration=rate(indices.PROFILE_ACCELERATION, max_acceleration),
+        deceleration=rate(indices.PROFILE_DECELERATION, max_deceleration),
+        quick_stop_deceleration=rate(indices.QUICK_STOP_DECELERATION, max_deceleration),
+        max_acceleration=max_acceleration,
+        max_deceleration=max_deceleration,
+        homing_speeds=(
+            max(1, read(indices.HOMING_SPEEDS, 1)) * velocity,
+            max(1, read(indices.HOMING_SPEEDS, 2)) * velocity,
+        ),
+        homing_acceleration=rate(indices.HOMING_ACCELERATION, max_acceleration),
+        software_limits=_software_limits(parameters, units),
+        position_range=(read(indices.POSITION_RANGE, 1), read(indices.POSITION_RANGE, 2)),
+        following_error_window=_limit(read(indices.FOLLOWING_ERROR_WINDOW), position),
+        following_error_us=read(indices.FOLLOWING_ERROR_TIME_OUT) * 1_000,
+        position_window=_limit(read(indices.POSITION_WINDOW), position),
+        position_window_us=read(indices.POSITION_WINDOW_TIME) * 1_000,
+        velocity_window=read(indices.VELOCITY_WINDOW) * velocity,
+        velocity_window_us=read(indices.VELOCITY_WINDOW_TIME) * 1_000,
+        velocity_threshold=read(indices.VELOCITY_THRESHOLD) * velocity,
+        velocity_threshold_us=read(indices.VELOCITY_THRESHOLD_TIME) * 1_000,
+        interpolation_us=_period_us(parameters),
+        rated_current_a=rated_current_a,
+        max_current_a=rated_current_a
+        * min(_per_mille(read(indices.MAX_TORQUE)), _per_mille(read(indices.MAX_CURRENT))),
+        limits_a=(
+            rated_current_a * _per_mille(read(indices.NEGATIVE_TORQUE_LIMIT)),
+            rated_current_a * _per_mille(read(indices.POSITIVE_TORQUE_LIMIT)),
+        ),
+        torque_slope_a_s=_limit(read(indices.TORQUE_SLOPE), rated_current_a / 1_000),
+    )
+
+
+def _limit(value: int, unit: float) -> float:
+    return inf if value == NO_LIMIT else value * unit
+
+
+def _per_mille(value: int) -> float:
+    return inf if value == NO_TORQUE_LIMIT else value / 1_000
+
+
+def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float]:
+    """Return the limits in counts, lower one first; none if the lower is not below the upper."""
+    lower = parameters.number(indices.SOFTWARE_LIMIT, 1)
+    upper = parameters.number(indices.SOFTWARE_LIMIT, 2)
+    if lower >= upper:
+        return -inf, inf
+    first, second = sorted((lower * units.per_position, upper * units.per_position))
+    widest = abs(units.per_position) * indices.I32_MAX
+    return (-inf if first <= -widest else first), (inf if second >= widest else second)
+
+
+def _period_us(parameters: Parameters) -> int:
+    """Return 60C2h, at least one tick."""
+    value = parameters.number(indices.INTERPOLATION_PERIOD, 1)
+    exponent = parameters.number(indices.INTERPOLATION_PERIOD, 2)
+    if not -6 <= exponent <= 0:
+        return 1_000
+    return int(max(1_000, value * 10 ** (6 + exponent)))

@@ -1,0 +1,65 @@
+"""The physical side of a drive: what the world does to it, and what it sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.canopen.ds402.motion import switches
+from tickrig.device.physical import Input, Kind, Output, QuantityBank
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.ds402.drive import Ds402
+    from tickrig.device.servo.servo import Servo
+
+SHORT_CIRCUIT: Final = "short_circuit"
+ENCODER_UNPLUGGED: Final = "encoder_unplugged"
+
+DRIVE_INPUTS: Final = (
+    *switches.INPUTS,
+    Input(SHORT_CIRCUIT, "the motor cable has a short circuit", Kind.FAULT),
+    Input(ENCODER_UNPLUGGED, "the encoder cable is pulled", Kind.FAULT),
+)
+"""Of any drive."""
+
+PLANT_INPUTS: Final = (
+    Input("supply_v", "supply of the power stage", high=100, unit="V", initial=24, real=True),
+    Input("load_nm", "torque on the shaft, forward", low=-1_000, high=1_000, unit="Nm", real=True),
+    Input("load_kg_m2", "inertia on the shaft", high=1_000, unit="kg m2", real=True),
+    Input("ambient_c", "air temperature", low=-40, high=85, unit="degC", initial=25, real=True),
+    Input("shaft_blocked", "the shaft is held", Kind.FAULT),
+    Input("motor_phase_open", "a wire of the motor is broken", Kind.FAULT),
+)
+"""Of a drive whose motor has physics."""
+
+OUTPUTS: Final = {
+    item.name: item
+    for item in (
+        Output("shaft_deg", "angle of the output shaft", "deg"),
+        Output("shaft_deg_s", "speed of the output shaft", "deg/s"),
+        Output("position", "position actual value", "user units"),
+        Output("current_a", "current of the motor", "A"),
+        Output("winding_c", "temperature of the winding", "degC"),
+        Output("drive_state", "state of the drive"),
+        Output("mode", "mode of operation, as in 6061h"),
+    )
+}
+
+READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
+    "shaft_deg": lambda drive: drive.motor.shaft_deg,
+    "shaft_deg_s": lambda drive: drive.motor.shaft_deg_s,
+    "position": lambda drive: drive.axis.position,
+    "current_a": lambda drive: drive.motor.current_ma / 1_000,
+    "winding_c": lambda drive: drive.motor.winding_dc / 10,
+    "drive_state": lambda drive: drive.state.name.capitalize().replace("_", " "),
+    "mode": lambda drive: drive.mode_number,
+}
+
+
+def load(servo: Servo, inputs: QuantityBank) -> None:
+    """Let the world act on a motor."""
+    servo.supply_v, servo.ambient_c = inputs["supply_v"], inputs["ambient_c"]
+    servo.load_nm, servo.load_kg_m2 = inputs["load_nm"], inputs["load_kg_m2"]
+    servo.blocked = bool(inputs["shaft_blocked"])
+    servo.phase_open = bool(inputs["motor_phase_open"])
+    servo.encoder_unplugged = bool(inputs[ENCODER_UNPLUGGED])

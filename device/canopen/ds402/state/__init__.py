@@ -1,0 +1,1 @@
+"""The finite state automaton of a drive, its faults and what makes them (CiA 402-2)."""

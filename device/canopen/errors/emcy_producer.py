@@ -1,0 +1,121 @@
+"""EMCY producer with error register and error history (CiA 301, emergency object)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.canopen.core.cob_id_rules import cob_id_guard, is_valid
+from tickrig.device.canopen.core.service import ALIVE, Service
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.errors.error_history import ErrorHistory
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, INVALID
+from tickrig.wire.canopen.emcy import TEXT_BYTES, Emcy, EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import NmtState
+
+ERROR_REGISTER: Final = 0x1001
+COB_ID_EMCY: Final = 0x1014
+INHIBIT_TIME_EMCY: Final = 0x1015
+
+QUEUE_LENGTH: Final = 16
+"""EMCY messages that wait; more are lost, as in a real device."""
+
+
+class EmcyProducer(Service):
+    """Tells errors, once when they occur and once when they are gone (0000h).
+
+    An error is known by its code and its text. 1001h is the sum of the errors
+    that are there, with the generic bit as long as there is one. Each error that
+    goes is told, with the register that is left. In Stopped and in bus-off the
+    messages wait; they are sent afterwards. A reset forgets errors and messages:
+    who still sees the cause has to raise it again.
+
+    Not emulated: 29-bit CAN-IDs.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        find = node.dictionary.find
+        self._register, self._cob_id = find(ERROR_REGISTER), find(COB_ID_EMCY)
+        self._inhibit = find(INHIBIT_TIME_EMCY)
+        self._history = ErrorHistory(node.dictionary)
+        self._active: dict[tuple[int, bytes], int] = {}
+        self._queue: list[bytes] = []
+        self._free_us, self._bus_off = 0, False
+        if self._cob_id is not None:
+            self._cob_id.guard = cob_id_guard(self._cob_id, INVALID, is_valid)
+
+    @property
+    def register(self) -> int:
+        """The error register."""
+        bits = int(ErrorRegister.GENERIC) if self._active else 0
+        for register in self._active.values():
+            bits |= register & 0xFF
+        return bits
+
+    def power_on(self) -> None:
+        """Take the bus for sound."""
+        self._bus_off = False
+
+    def start(self) -> None:
+        """Know of no error."""
+        self._active.clear()
+        self._queue.clear()
+        self._free_us = 0
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """Note and tell an error that was not there."""
+        key = code & 0xFFFF, _padded(text)
+        if key not in self._active:
+            self._active[key] = register
+            self._history.note(*key)
+            self._tell(*key)
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """Tell that an error is gone, if it was there."""
+        gone = [
+            key
+            for key in self._active
+            if key[0] == code and (text is None or key[1] == _padded(text))
+        ]
+        for key in gone:
+            del self._active[key]
+            self._tell(EmcyCode.NO_ERROR, key[1])
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Send what had to wait in Stopped."""
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Wait in bus-off; send afterwards."""
+        self._bus_off = state is ErrorState.BUS_OFF
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def tick(self, now_us: int) -> None:
+        """Send what the inhibit time lets pass."""
+        cob_id = self._cob_id
+        if cob_id is None or not is_valid(cob_id.number):
+            self._queue.clear()
+            return
+        if self.node.state not in ALIVE or self._bus_off:
+            return
+        inhibit_us = self._inhibit.number * 100 if self._inhibit is not None else 0
+        while self._queue and self._free_us <= now_us:
+            self.node.send(cob_id.number & CAN_ID_MASK, self._queue.pop(0))
+            self._free_us = now_us + inhibit_us
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def _tell(self, code: int, text: bytes) -> None:
+        register = self.register
+        if self._register is not None:
+            self._register.assign(bytes([register]))
+        if len(self._queue) < QUEUE_LENGTH:
+            self._queue.append(Emcy(code, register, text).encode())
+        self.schedule(self._free_us)
+
+
+def _padded(text: bytes) -> bytes:
+    return text[:TEXT_BYTES].ljust(TEXT_BYTES, b"\0")

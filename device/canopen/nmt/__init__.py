@@ -1,0 +1,1 @@
+"""Network management and error control of a slave: NMT, heartbeat, guarding (CiA 301)."""

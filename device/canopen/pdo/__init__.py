@@ -1,0 +1,1 @@
+"""PDOs of a slave: mapping, RPDOs, TPDOs, MPDOs (CiA 301)."""

@@ -1,0 +1,88 @@
+"""Segmented transfer of one object (CiA 301, SDO download and SDO upload segment)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.sdo.download_size import DownloadSize
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo_command import (
+    FRAME_BYTES,
+    LAST,
+    SEGMENT_BYTES,
+    SIZE_INDICATED,
+    SPECIFIER,
+    TOGGLE,
+    ClientCommand,
+    ServerCommand,
+)
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.core.entry import Entry
+    from tickrig.device.canopen.sdo.sdo_server import SdoServer
+
+
+class SegmentedUpload:
+    """Gives a value as it was when the client asked for it."""
+
+    def __init__(self, server: SdoServer, data: bytes) -> None:
+        self._server, self._data = server, data
+        self._at = self._toggle = 0
+        server.confirm(ServerCommand.UPLOAD | SIZE_INDICATED, len(data).to_bytes(4, "little"))
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Give the next segment."""
+        if request[0] & SPECIFIER != ClientCommand.UPLOAD_SEGMENT:
+            self._server.initiate(request)
+            return
+        if request[0] & TOGGLE != self._toggle:
+            raise SdoAbort(AbortCode.TOGGLE_BIT)
+        part = self._data[self._at : self._at + SEGMENT_BYTES]
+        self._at += SEGMENT_BYTES
+        last = LAST if self._at >= len(self._data) else 0
+        head = self._toggle | SEGMENT_BYTES - len(part) << 1 | last
+        self._server.respond(bytes([head]) + part.ljust(SEGMENT_BYTES, b"\0"))
+        self._toggle ^= TOGGLE
+        if last:
+            self._server.end()
+        else:
+            self._server.wait(self._segment)
+
+
+class SegmentedDownload:
+    """Collects a value; the object changes when the last segment has come."""
+
+    def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
+        self._server, self._entry = server, entry
+        self._data, self._toggle = bytearray(), 0
+        announced = int.from_bytes(request[4:], "little") if request[0] & SIZE_INDICATED else None
+        self._size = DownloadSize(server, entry, announced)
+        server.confirm(ServerCommand.DOWNLOAD)
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Take the next segment."""
+        command = request[0]
+        if command & SPECIFIER != ClientCommand.DOWNLOAD_SEGMENT:
+            self._server.initiate(request)
+            return
+        if command & TOGGLE != self._toggle:
+            raise SdoAbort(AbortCode.TOGGLE_BIT)
+        self._data += request[1 : FRAME_BYTES - (command >> 1 & 7)]
+        self._size.check(len(self._data))
+        if command & LAST:
+            self._commit()
+        self._server.respond(bytes([ServerCommand.DOWNLOAD_SEGMENT | self._toggle]) + bytes(7))
+        self._toggle ^= TOGGLE
+        if command & LAST:
+            self._server.end()
+        else:
+            self._server.wait(self._segment)
+
+    def _commit(self) -> None:
+        """Write all that came; SdoAbort if it is too little, or the object refuses."""
+        if len(self._data) < (self._size.announced or 0):
+            raise SdoAbort(AbortCode.TOO_SHORT)
+        self._entry.download(bytes(self._data))

@@ -1,0 +1,185 @@
+"""One SDO server: takes requests on one CAN-ID and answers on another (CiA 301, SDO)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.sdo.sdo_block_download import BlockDownload
+from tickrig.device.canopen.sdo.sdo_block_upload import BlockUpload
+from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
+from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload, SegmentedUpload
+from tickrig.device.core import NEVER
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo_command import (
+    BLOCK_END,
+    BLOCK_SUBCOMMAND,
+    EXPEDITED,
+    EXPEDITED_BYTES,
+    FRAME_BYTES,
+    MAX_BLOCK_SIZE,
+    SIZE_INDICATED,
+    SPECIFIER,
+    ClientCommand,
+    ServerCommand,
+)
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.core.entry import Entry
+    from tickrig.device.canopen.core.slave import CanopenSlave
+
+State = Callable[[bytes], None]
+"""What the next request means; a transfer is in one of these at a time."""
+
+NO_MULTIPLEXER: Final = bytes(3)
+_GOES_ON: Final[dict[int, int]] = {
+    ClientCommand.BLOCK_UPLOAD: BLOCK_SUBCOMMAND,
+    ClientCommand.BLOCK_DOWNLOAD: BLOCK_END & BLOCK_SUBCOMMAND,
+}
+"""Bits of a block command that are 0 in an initiate request."""
+_UPLOAD: Final = int(ClientCommand.UPLOAD)
+_EXPEDITED: Final = tuple(
+    bytes([ServerCommand.UPLOAD | EXPEDITED | SIZE_INDICATED | EXPEDITED_BYTES - size << 2])
+    for size in range(EXPEDITED_BYTES + 1)
+)
+"""First byte of an expedited answer, by the number of bytes."""
+_FILL: Final = tuple(bytes(EXPEDITED_BYTES - size) for size in range(EXPEDITED_BYTES + 1))
+
+
+class SdoServer:
+    """Serves one client: one transfer at a time, every kind of CiA 301.
+
+    Where CiA 301 leaves it open: requests that do not have 8 bytes are ignored.
+    A new initiate request ends a running transfer silently. What is no request
+    in the present state is aborted with 0504 0001h, with multiplexer 0 if no
+    transfer runs. Reserved bits are not looked at.
+
+    Not emulated: network indication, the time that a real server needs.
+
+    Args:
+        node: the slave.
+        wake: asks for a look at `due_us` at that time.
+        limits: what CiA 301 leaves to the device.
+
+    Attributes:
+        request_id: CAN-ID from client to server.
+        response_id: CAN-ID from server to client.
+        block_size: segments in a block that it offers for block download, 1..127.
+        due_us: when the transfer times out.
+    """
+
+    def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
+        self.node, self._wake, self._limits = node, wake, limits
+        self.request_id = self.response_id = 0
+        self.block_size = MAX_BLOCK_SIZE
+        self._entries = node.dictionary.by_multiplexer
+        self._multiplexer = NO_MULTIPLEXER
+        self._beginnings: Final[dict[int, Callable[[Entry, bytes], None]]] = {
+            ClientCommand.DOWNLOAD: self._begin_download,
+            ClientCommand.UPLOAD: self._begin_upload,
+            ClientCommand.BLOCK_UPLOAD: self._begin_block_upload,
+            ClientCommand.BLOCK_DOWNLOAD: self._begin_block_download,
+        }
+        self._idle: Final[State] = self._without_transfer
+        self._state: State = self._idle
+        self.due_us = NEVER
+
+    def receive(self, frame: CanFrame) -> None:
+        """Take a request, or the next segment."""
+        request = frame[1]
+        if len(request) == FRAME_BYTES:
+            try:
+                self._state(request)
+            except SdoAbort as refused:
+                self.abort(refused.code)
+
+    def respond(self, response: bytes) -> None:
+        """Send to the client."""
+        self.node.send(self.response_id, response)
+
+    def confirm(self, command: int, rest: bytes = bytes(4)) -> None:
+        """Send a response that names the object of the transfer."""
+        self.respond(bytes([command]) + self._multiplexer + rest)
+
+    def wait(self, state: State) -> None:
+        """Let the transfer wait for a request, but not for ever."""
+        self._state = state
+        self.due_us = self.node.now_us + self._limits.timeout_us
+        self._wake(self.due_us)
+
+    def free_bytes(self, entry: Entry) -> int:
+        """Return what a string or domain may hold beside all others."""
+        others = (one for one in self.node.dictionary if not one.size and one is not entry)
+        return self._limits.memory_bytes - sum(len(one.data) for one in others)
+
+    def end(self) -> None:
+        """End the transfer."""
+        self._state, self._multiplexer, self.due_us = self._idle, NO_MULTIPLEXER, NEVER
+
+    def abort(self, code: AbortCode) -> None:
+        """End the transfer and tell the client why."""
+        self.confirm(ServerCommand.ABORT, code.to_bytes(4, "little"))
+        self.end()
+
+    def initiate(self, request: bytes) -> None:
+        """Take a request that does not go on with a transfer: it begins one, or ends it."""
+        command = request[0]
+        if command == ClientCommand.ABORT:
+            self.end()
+            return
+        begin = self._beginnings.get(command & SPECIFIER)
+        if begin is None or command & _GOES_ON.get(command & SPECIFIER, 0):
+            raise SdoAbort(AbortCode.COMMAND_SPECIFIER)
+        self.end()
+        self._multiplexer = request[1:4]
+        begin(self.node.dictionary.look_up(self._multiplexer), request)
+
+    def upload(self, data: bytes) -> None:
+        """Give a value in one answer, or begin to give it in segments."""
+        size = len(data)
+        if 0 < size <= EXPEDITED_BYTES:
+            self.respond(_EXPEDITED[size] + self._multiplexer + data + _FILL[size])
+            self.end()
+        else:
+            SegmentedUpload(self, data)
+
+    def _without_transfer(self, request: bytes) -> None:
+        """Take a request while no transfer runs; reading a small value is the short way."""
+        if request[0] == _UPLOAD:
+            entry = self._entries.get(request[1:4])
+            if entry is not None and entry.readable and entry.source is None:
+                data = entry.data
+                size = len(data)
+                if 0 < size <= EXPEDITED_BYTES:
+                    self.node.send(
+                        self.response_id, _EXPEDITED[size] + request[1:4] + data + _FILL[size]
+                    )
+                    return
+        self.initiate(request)
+
+    def _begin_upload(self, entry: Entry, _request: bytes) -> None:
+        self.upload(entry.upload())
+
+    def _begin_download(self, entry: Entry, request: bytes) -> None:
+        """Write at once, or begin to take segments.
+
+        Expedited data without a size fills the object: the bytes beyond are not looked at.
+        """
+        command = request[0]
+        if not command & EXPEDITED:
+            SegmentedDownload(self, entry, request)
+            return
+        size = EXPEDITED_BYTES - (command >> 2 & 3)
+        if not command & SIZE_INDICATED:
+            size = min(entry.size or EXPEDITED_BYTES, EXPEDITED_BYTES)
+        entry.download(request[4 : 4 + size])
+        self.respond(bytes([ServerCommand.DOWNLOAD]) + request[1:4] + bytes(4))
+        self.end()
+
+    def _begin_block_upload(self, entry: Entry, request: bytes) -> None:
+        BlockUpload(self, entry.upload(), request)
+
+    def _begin_block_download(self, entry: Entry, request: bytes) -> None:
+        BlockDownload(self, entry, request)

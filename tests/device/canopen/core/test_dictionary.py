@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import pytest
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.wire.canopen.datatypes import DataType
+
+
+def make(index: int, sub: int = 0) -> Entry:
+    return Entry(index, sub, "x", DataType.UNSIGNED8, Access.READ)
+
+
+def test_two_entries_at_one_place_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"<2000h:01 x> is in the dictionary twice"):
+        Dictionary([make(0x2000, 1), make(0x2000), make(0x2000, 1)])
+
+
+def test_a_missing_entry_is_told_by_its_place() -> None:
+    dictionary = Dictionary([make(0x2000)])
+    assert (0x2000, 0) in dictionary
+    with pytest.raises(KeyError, match=r"2000h:01 is not in the dictionary"):
+        dictionary[0x2000, 1]
+
+
+def test_elements_end_at_a_gap() -> None:
+    dictionary = Dictionary([make(0x2000, sub) for sub in (0, 1, 2, 4)])
+    assert [entry.sub for entry in dictionary.elements(0x2000)] == [1, 2]
+    assert [entry.sub for entry in dictionary.elements(0x2000, most=1)] == [1]
