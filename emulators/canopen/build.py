@@ -21,7 +21,7 @@ from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 
 @dataclass(frozen=True, slots=True)

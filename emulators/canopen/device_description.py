@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.wire.canopen.device_info import DeviceInfo
-from tickrig.wire.canopen.eds_finding import Finding
+from tickrig.wire.canopen.eds.device_info import DeviceInfo
+from tickrig.wire.canopen.eds.eds_finding import Finding
 
 
 @dataclass(frozen=True, slots=True)

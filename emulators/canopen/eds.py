@@ -10,10 +10,10 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.predefined import predefined
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds_device import COUNTS, read_device
-from tickrig.wire.canopen.eds_entry import EdsEntry
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_device import COUNTS, read_device
+from tickrig.wire.canopen.eds.eds_entry import EdsEntry
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 
 def read_eds(path: Path) -> DeviceDescription:

@@ -19,7 +19,7 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.size import parse_size
-from tickrig.wire.canopen.eds_writer import write_eds as format_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
 
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
 DEVICES: Final = ("eds", "dcf", "model", "rtc")

@@ -13,7 +13,7 @@ from tickrig.device.canopen.device_rtc.make import application_of, make_dictiona
 from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.emulators.canopen.device_description import DeviceDescription
-from tickrig.wire.canopen.device_info import BIT_RATES, DeviceInfo
+from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
 
 VENDOR: Final = "tickrig"
 PRODUCT: Final = 0x1008

@@ -111,7 +111,7 @@ def _split(word: str) -> tuple[int, Path]:
 
 def _read(node: int, path: Path) -> EdsObjects:
     from tickrig.host.monitor.decode.eds_objects import read_eds  # noqa: PLC0415 - slow
-    from tickrig.wire.canopen.eds_finding import EdsError  # noqa: PLC0415
+    from tickrig.wire.canopen.eds.eds_finding import EdsError  # noqa: PLC0415
 
     try:
         return read_eds(path, node)

@@ -19,16 +19,16 @@ from tickrig.host.canopen.script import (
     Tell,
 )
 from tickrig.host.link import NEVER
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateResponse,
     Response,
     UploadInitiateResponse,
     parse_response,
 )
-from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 from tickrig.wire.errors import WireError
 
 Failure = SdoFailed | StateTimeout | WrongIdentity

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.wire.canopen.eds_device import EdsDevice, read_device
-from tickrig.wire.canopen.eds_file import EdsFile, decode_text
-from tickrig.wire.canopen.eds_finding import EdsError, Finding
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text
+from tickrig.wire.canopen.eds.eds_finding import EdsError, Finding
 
 
 def open_eds(path: Path) -> EdsFile:

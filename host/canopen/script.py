@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
-from tickrig.wire.canopen.sdo import Response
+from tickrig.wire.canopen.sdo.sdo import Response
 
 SDO_TIMEOUT_US: Final = 500_000
 

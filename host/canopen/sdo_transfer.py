@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.canopen.script import Answer, Ask, Script, Tell
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -20,7 +20,7 @@ from tickrig.wire.canopen.sdo import (
     UploadInitiateResponse,
     UploadSegmentRequest,
 )
-from tickrig.wire.canopen.sdo_command import EXPEDITED_BYTES, SEGMENT_BYTES
+from tickrig.wire.canopen.sdo.sdo_command import EXPEDITED_BYTES, SEGMENT_BYTES
 
 
 def upload(index: int, sub: int) -> Script[bytes]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import click
 
-from tickrig.wire.canopen.eds_finding import Finding
+from tickrig.wire.canopen.eds.eds_finding import Finding
 
 
 def tell_findings(findings: Iterable[Finding]) -> None:

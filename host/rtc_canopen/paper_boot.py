@@ -10,8 +10,8 @@ from tickrig.host.rtc_canopen.boot import boot
 from tickrig.host.rtc_canopen.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.device_file import DeviceFile
 from tickrig.host.rtc_canopen.pdo_layout import PdoLayout
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,

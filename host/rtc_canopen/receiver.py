@@ -12,7 +12,7 @@ from tickrig.host.rtc_canopen.served_node import House, ServedNode
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
 from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
-from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
 from tickrig.wire.errors import WireError
 
 EMERGENCY: Final = range(0x081, 0x100)

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.host.link import NEVER
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
-from tickrig.wire.canopen.sdo import UploadInitiateResponse, parse_response
+from tickrig.wire.canopen.sdo.sdo import UploadInitiateResponse, parse_response
 from tickrig.wire.errors import WireError
 
 NEARER: Final = 4

@@ -19,7 +19,7 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.sim_network import SimNetwork
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 NODE_ID = 5
 

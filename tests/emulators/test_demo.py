@@ -5,7 +5,7 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from tests.wire.rrc_samples import SAMPLES
+from tests.wire.rrc.samples import SAMPLES
 from tickrig.emulators.child import running
 from tickrig.emulators.cli import main
 

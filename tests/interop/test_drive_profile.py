@@ -18,7 +18,7 @@ from canopen.profiles.p402 import BaseNode402
 from tests.interop.buses import Bus
 from tests.interop.slave import Slave, running
 from tickrig.device.canopen.models import epos
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 pytestmark = pytest.mark.realtime
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.eds.communication_profile import (
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.device_info import BIT_RATES, DeviceInfo
-from tickrig.wire.canopen.object_table import ROT, RWW, ObjectTable
+from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
+from tickrig.wire.canopen.eds.object_table import ROT, RWW, ObjectTable
 from tickrig.wire.rtc_canopen.profile import Direction, PlacedPort, RtcProfile
 
 NO_PROFILE: Final = 0

@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import COMMUNICATION_AREA, CanopenSlave
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 STORE_PARAMETERS: Final = 0x1010
 RESTORE_DEFAULTS: Final = 0x1011

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
 class SdoAbort(Exception):  # noqa: N818 - the standard's word

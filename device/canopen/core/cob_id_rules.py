@@ -7,9 +7,9 @@ from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 InUse = Callable[[int], bool]
 

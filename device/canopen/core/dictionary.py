@@ -7,8 +7,8 @@ from itertools import pairwise
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.object_table import ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.object_table import ObjectCode, ObjectInfo
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 __all__ = ["Dictionary", "ObjectCode", "ObjectInfo"]
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access
+from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 TRUTH: Final = (0, 1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.object_table import (
+from tickrig.wire.canopen.eds.object_table import (
     CONST,
     RO,
     ROT,

@@ -9,9 +9,9 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 ERROR_BEHAVIOUR: Final = 0x1029
 COMMUNICATION_ERROR: Final = 1

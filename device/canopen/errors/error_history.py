@@ -8,8 +8,8 @@ from typing import Final
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 PRE_DEFINED_ERROR_FIELD: Final = 0x1003
 

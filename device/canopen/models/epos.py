@@ -21,7 +21,8 @@ from tickrig.device.canopen.ds402.state.statusword import statusword_of
 from tickrig.device.canopen.ds402.state.supervision import Bounds
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.communication_profile import (
     OFF,
     U8,
     U16,
@@ -30,8 +31,7 @@ from tickrig.wire.canopen.communication_profile import (
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.object_table import ObjectCode
+from tickrig.wire.canopen.eds.object_table import ObjectCode
 
 NODE_ID: Final = 1
 """beego: 1 is the left wheel, 2 the right one."""

@@ -11,12 +11,12 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.objects import CONST, RO, ROT, RW, RWW, Objects
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Converter, Ds401
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.communication_profile import (
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.datatypes import DataType
 
 NODE_ID: Final = 16
 ANALOGUE_INPUTS: Final = 8

@@ -7,7 +7,8 @@ from typing import Final
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.objects import ROT, RW, RWW, Element, Objects
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.communication_profile import (
     OFF,
     U8,
     U16,
@@ -16,7 +17,6 @@ from tickrig.wire.canopen.communication_profile import (
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.datatypes import DataType
 
 NODE_ID: Final = 32
 """Unless told otherwise."""

@@ -10,7 +10,6 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.pdo.mpdo import DISPATCHING_LISTS, SCANNER_LISTS
 from tickrig.device.canopen.pdo.pdo_packing import Slot, total_bits
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.pdo import (
     DAM_MPDO,
@@ -19,6 +18,7 @@ from tickrig.wire.canopen.pdo import (
     SAM_MPDO,
     MappedObject,
 )
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 DUMMIES: Final = {
     kind.value: kind.bits

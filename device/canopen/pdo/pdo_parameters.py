@@ -8,9 +8,9 @@ from typing import Final
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.pdo.pdo_mapping import whole_number
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 SYNCHRONOUS: Final = range(241)
 """Transmission types 0 to 240."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.entry import Entry

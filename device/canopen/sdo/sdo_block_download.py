@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.sdo.download_size import DownloadSize
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.crc import crc16
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_ACKNOWLEDGE,
     BLOCK_CRC,
     BLOCK_END,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.crc import crc16
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_ACKNOWLEDGE,
     BLOCK_CRC,
     BLOCK_END,

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.sdo.download_size import DownloadSize
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo_command import (
     FRAME_BYTES,
     LAST,
     SEGMENT_BYTES,

@@ -12,8 +12,8 @@ from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
 from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload, SegmentedUpload
 from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_END,
     BLOCK_SUBCOMMAND,
     EXPEDITED,

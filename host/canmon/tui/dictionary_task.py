@@ -15,7 +15,7 @@ from tickrig.host.monitor.decode.memory import Entry
 from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.canopen.sdo_command import RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
 
 Node = tuple[str, int]
 """Bus and node-ID."""

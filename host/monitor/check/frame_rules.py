@@ -11,10 +11,10 @@ from tickrig.host.monitor.ident import ERROR, ident_of, ident_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.can_error_class import describe as describe_error
-from tickrig.wire.canopen.abort import describe_abort
 from tickrig.wire.canopen.emcy import Emcy, describe
-from tickrig.wire.canopen.sdo_command import FRAME_BYTES, ClientCommand
-from tickrig.wire.canopen.sdo_layout import index_sub
+from tickrig.wire.canopen.sdo.abort import describe_abort
+from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand
+from tickrig.wire.canopen.sdo.sdo_layout import index_sub
 from tickrig.wire.errors import WireError
 
 EMCY_IDS: Final = range(0x081, 0x100)

@@ -24,7 +24,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
 from tickrig.wire.canopen.nmt import NMT_COB_ID
-from tickrig.wire.canopen.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step

@@ -9,10 +9,10 @@ from pathlib import Path
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.monitor.decode.decoded import EDS
 from tickrig.host.monitor.decode.object_text import ObjectText, slug
-from tickrig.wire.canopen.eds_device import EdsDevice
-from tickrig.wire.canopen.eds_entry import EdsEntry
-from tickrig.wire.canopen.eds_finding import Finding
-from tickrig.wire.canopen.eds_writer import VARIABLES
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_entry import EdsEntry
+from tickrig.wire.canopen.eds.eds_finding import Finding
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 
 Entry = tuple[int, int]
 

@@ -6,8 +6,8 @@ from typing import Final
 
 from tickrig.host.monitor.decode.sdo_open import OpenTransfer, Phase
 from tickrig.host.monitor.decode.transfer import Direction
-from tickrig.wire.canopen.sdo import Request, Response
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.sdo import Request, Response
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockAcknowledge,
     BlockDownloadInitiateResponse,
     BlockEnd,
@@ -16,7 +16,7 @@ from tickrig.wire.canopen.sdo_block import (
     BlockStart,
     BlockUploadInitiateResponse,
 )
-from tickrig.wire.canopen.sdo_command import BLOCK_END, BLOCK_SEQNO, FRAME_BYTES
+from tickrig.wire.canopen.sdo.sdo_command import BLOCK_END, BLOCK_SEQNO, FRAME_BYTES
 
 ORPHAN: Final = "of a block transfer whose beginning was not heard"
 

@@ -26,7 +26,7 @@ from tickrig.host.monitor.decode.sdo_segments import (
     take_segment,
 )
 from tickrig.host.monitor.decode.transfer import Direction, Mode, Outcome, Transfer, write_entry
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -40,7 +40,10 @@ from tickrig.wire.canopen.sdo import (
     parse_request,
     parse_response,
 )
-from tickrig.wire.canopen.sdo_block import BlockDownloadInitiateRequest, BlockUploadInitiateRequest
+from tickrig.wire.canopen.sdo.sdo_block import (
+    BlockDownloadInitiateRequest,
+    BlockUploadInitiateRequest,
+)
 from tickrig.wire.errors import WireError
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from tickrig.host.monitor.decode.sdo_open import OpenTransfer, Phase
 from tickrig.host.monitor.decode.transfer import Direction, Mode
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.sdo import (
     DownloadInitiateRequest,
     DownloadInitiateResponse,
     UploadInitiateRequest,
     UploadInitiateResponse,
 )
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockDownloadInitiateRequest,
     BlockUploadInitiateRequest,
 )

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from tickrig.host.monitor.decode.transfer import Direction, Mode, Outcome, Transfer
-from tickrig.wire.canopen.crc import crc16
-from tickrig.wire.canopen.sdo import Segment
-from tickrig.wire.canopen.sdo_block import BlockEnd, BlockSegment
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo import Segment
+from tickrig.wire.canopen.sdo.sdo_block import BlockEnd, BlockSegment
 
 
 class Phase(Enum):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tickrig.host.monitor.decode.sdo_open import OpenTransfer
-from tickrig.wire.canopen.sdo import DownloadSegmentResponse, Segment, UploadSegmentRequest
+from tickrig.wire.canopen.sdo.sdo import DownloadSegmentResponse, Segment, UploadSegmentRequest
 
 
 def ask_segment(running: OpenTransfer, request: UploadSegmentRequest) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from tickrig.wire.canopen.abort import describe_abort
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.sdo.abort import describe_abort
 
 
 class Direction(StrEnum):

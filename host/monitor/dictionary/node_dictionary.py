@@ -8,8 +8,8 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.memory import Entry, NodeMemory
 from tickrig.host.monitor.decode.transfer import Outcome, Transfer, write_entry
 from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
-from tickrig.wire.canopen.abort import describe_abort
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
+from tickrig.wire.canopen.sdo.abort import describe_abort
 
 FIRST_OBJECT: Final = 0x1000
 """Below it are data types (CiA 301, structure of the object dictionary)."""

@@ -7,7 +7,7 @@ from tickrig.host.rtc_canopen.builder.fragment import write_fragment
 from tickrig.host.rtc_canopen.builder.names import check_identifiers, snake_name
 from tickrig.host.rtc_canopen.builder.profile_file import Project
 from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import device_info, object_table
 
 

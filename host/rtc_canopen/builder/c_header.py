@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.rtc_canopen.builder.names import c_name, snake_name
 from tickrig.host.rtc_canopen.builder.skeleton import CALLBACKS
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.object_table import ObjectRow
+from tickrig.wire.canopen.eds.object_table import ObjectRow
 from tickrig.wire.rtc_canopen.objects import object_table
 from tickrig.wire.rtc_canopen.profile import PlacedPort, RtcProfile
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from tickrig.host.rtc_canopen.builder.fragment import pdo_name
-from tickrig.wire.canopen.eds_value import format_value
-from tickrig.wire.canopen.object_table import Access, ObjectRow
+from tickrig.wire.canopen.eds.eds_value import format_value
+from tickrig.wire.canopen.eds.object_table import Access, ObjectRow
 from tickrig.wire.rtc_canopen.objects import object_table
 from tickrig.wire.rtc_canopen.profile import FIRST_PORT, PlacedPort, RtcProfile
 

@@ -11,7 +11,7 @@ from tickrig.host.monitor.decode.transfer import write_entry
 from tickrig.host.rtc_canopen.editor.row import Row
 from tickrig.host.rtc_canopen.view import ServerView, Transfer
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds_value import parse_value
+from tickrig.wire.canopen.eds.eds_value import parse_value
 from tickrig.wire.errors import FieldError
 
 AT_ONCE: Final = 8

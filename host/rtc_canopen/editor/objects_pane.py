@@ -10,7 +10,7 @@ from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.node_objects import NodeObjects
 from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.view import ServerView
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 
 class ObjectsPane(CursorView[Entry]):

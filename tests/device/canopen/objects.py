@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RW = Access.READ | Access.WRITE
 RO = Access.READ

@@ -15,7 +15,7 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RW = Access.READ | Access.WRITE
 OFF = 0x8000_0000

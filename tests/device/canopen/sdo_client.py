@@ -6,8 +6,8 @@ from tests.device.canopen.reference import NODE_ID, make_dictionary
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.crc import crc16
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     Request,
@@ -18,7 +18,7 @@ from tickrig.wire.canopen.sdo import (
     UploadSegmentRequest,
     parse_response,
 )
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,

@@ -7,7 +7,7 @@ from tests.device.canopen.sdo_client import OPEN_SECOND, Client, booted, pattern
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -15,7 +15,7 @@ from tickrig.wire.canopen.sdo import (
     UploadInitiateResponse,
     parse_response,
 )
-from tickrig.wire.canopen.sdo_block import BlockEnded
+from tickrig.wire.canopen.sdo.sdo_block import BlockEnded
 
 READ_TYPE, TYPE = "605#4000100000000000", ["585#4300100091010F00"]
 ABORT = "605#8000000000000008"

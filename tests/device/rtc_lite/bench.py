@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tests.wire.rtc_lite_vectors import raw
+from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.rtc_lite.component import ERROR, Component, Result
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.device.rtc_lite.bench import NodeBench
-from tests.wire.rtc_lite_vectors import VECTORS, raw
+from tests.wire.rtc_lite.vectors import VECTORS, raw
 
 BEGIN = {
     "L01": "Created",

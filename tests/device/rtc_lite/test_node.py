@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.device.rtc_lite.bench import NodeBench, Recorder
-from tests.wire.rtc_lite_vectors import raw
+from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.core import NEVER
 from tickrig.device.physical import Input
 from tickrig.device.rtc_lite.component import Component

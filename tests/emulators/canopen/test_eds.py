@@ -11,9 +11,9 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.device_info import DeviceInfo
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.device_info import DeviceInfo
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 SAMPLE = Path(__file__).parent / "sample.dcf"
 NODE_ID = 5

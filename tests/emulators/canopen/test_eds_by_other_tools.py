@@ -15,9 +15,9 @@ from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.device_info import DeviceInfo
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_writer import write_dcf, write_eds
+from tickrig.wire.canopen.eds.device_info import DeviceInfo
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
 
 ROOT = Path(__file__).parents[3]
 SHIPPED = (*(ROOT / "examples").rglob("*.eds"), *(ROOT / "tests" / "golden").rglob("*.eds"))

@@ -12,8 +12,8 @@ import pytest
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.eds import describe
 from tickrig.emulators.canopen.profiles import application_of
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 ROOT: Final = Path(__file__).parents[3]
 FILES: Final = (Path(__file__).parent / "sample.dcf", ROOT / "examples" / "eds" / "epos.eds")

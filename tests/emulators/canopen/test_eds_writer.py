@@ -12,9 +12,9 @@ from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, Objec
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.device_info import DeviceInfo
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_writer import write_dcf, write_eds
+from tickrig.wire.canopen.eds.device_info import DeviceInfo
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
 
 R1_EDS = Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds"
 SAMPLE = Path(__file__).parent / "sample.dcf"

@@ -17,7 +17,7 @@ from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node import NODE_OUTPUTS
 from tickrig.emulators.canopen.node_spec import NodeSpec
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 SHIPPED = Path(__file__).parents[3] / "examples" / "eds"
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, Objec
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.physical import Kind
 from tickrig.emulators.canopen.touch import ObjectTouch, find_object, object_name
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RO, RW, CONST = Access.READ, Access.READ | Access.WRITE, Access.READ | Access.CONST
 D = DataType

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.wire.rtc_lite_vectors import raw
+from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.wire.rtc_lite_vectors import REPLIES, REQUESTS, raw
+from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.trace import Mark

@@ -7,7 +7,7 @@ import time
 import pytest
 import serial
 
-from tests.wire.rtc_lite_vectors import VECTORS, raw
+from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.emulators.child import running
 from tickrig.emulators.control_client import ControlClient
 

@@ -12,7 +12,7 @@ from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE

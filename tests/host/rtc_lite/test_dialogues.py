@@ -12,7 +12,7 @@ import pytest
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
-from tests.wire.rtc_lite_vectors import VECTORS, raw
+from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.host.rtc import OutPort, connect
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_types.basic import Time, TimedLong

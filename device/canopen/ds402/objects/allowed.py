@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.ds402.modes.homing_methods import METHODS
 from tickrig.device.canopen.ds402.motion.trapezoid import RampShape
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 ALLOWED: Final[dict[int, Container[Value]]] = {
     indices.ABORT_CONNECTION: (0, 1, 2, 3),

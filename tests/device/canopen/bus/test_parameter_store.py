@@ -7,8 +7,8 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.bus.parameter_store import LOAD, SAVE, ParameterStore
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 STORE, RESTORE = 0x1010, 0x1011
 COMMUNICATION, MINE, PROFILE = 0x1017, 0x2001, 0x6005

@@ -5,7 +5,7 @@ import pytest
 from tests.device.canopen.objects import booted, u32, write
 from tickrig.device.canopen.bus.time_stamp import TimeStamp
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.time_of_day import TimeOfDay
 from tickrig.wire.errors import FieldError
 

@@ -8,13 +8,13 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.core.objects import ROT, RWW, Objects
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.communication_profile import (
     OFF,
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.datatypes import DataType
 
 PROFILE = CommunicationProfile(
     device_type=0x0003_0191,

@@ -14,7 +14,7 @@ from tickrig.device.canopen.device_rtc.make import make_device_rtc
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.sim_network import SimNetwork
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import object_table
 
 

@@ -8,12 +8,12 @@ from tickrig.device.canopen.core.objects import RWRW, Objects
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.communication_profile import (
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.communication_profile import (
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.datatypes import DataType, Value
 
 Row = tuple[int, int, DataType, Value]
 """Index, number of elements, data type, default."""

@@ -5,8 +5,8 @@ import pytest
 from tests.device.canopen.objects import array, booted, errors, make_bus, read, u8, u32, write
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.can_error import ErrorState
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
 def test_an_error_is_told_once_and_again_when_it_is_gone() -> None:

@@ -14,7 +14,7 @@ from tickrig.device.canopen.models import motor_core_unit
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.sim_network import SimNetwork
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 NODE_ID = motor_core_unit.NODE_ID
 

@@ -6,7 +6,7 @@ from tests.device.canopen.pdo_bench import OFF, RW, PdoBench, u8, u32
 from tests.device.canopen.reference import R32
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RANGE = AbortCode.VALUE_RANGE
 

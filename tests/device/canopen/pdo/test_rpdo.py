@@ -7,8 +7,8 @@ from tests.device.canopen.reference import RO, RPDO, RW, STR, U16
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.wire.canopen.abort import AbortCode
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.device.core import NEVER
-from tickrig.wire.canopen.abort import AbortCode
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.crc import crc16
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.sdo import Abort, DownloadInitiateRequest, Response
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo import Abort, DownloadInitiateRequest, Response
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockDownloadInitiateRequest,
     BlockEnd,
     BlockEnded,

@@ -7,7 +7,7 @@ import pytest
 from tests.host.monitor.decode.traces import last
 from tickrig.host.monitor.decode.eds_objects import read_eds
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
 

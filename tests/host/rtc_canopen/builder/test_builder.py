@@ -19,7 +19,7 @@ from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, pars
 from tickrig.host.rtc_canopen.commands.builder import main
 from tickrig.host.rtc_canopen.definition_reader import parse_definition
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.eds_writer import write_eds
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import object_table
 
 EVERYTHING = """

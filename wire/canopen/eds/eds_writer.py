@@ -9,10 +9,10 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final
 
-from tickrig.wire.canopen.described import Described, Table
-from tickrig.wire.canopen.device_info import BIT_RATES_KBIT, DeviceInfo
-from tickrig.wire.canopen.eds_value import format_limit, format_value, parse_value
-from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.described import Described, Table
+from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
+from tickrig.wire.canopen.eds.eds_value import format_limit, format_value, parse_value
+from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode, ObjectInfo
 
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER: Final = range(0x2000, 0x6000)
@@ -44,7 +44,7 @@ def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     Raises:
         ValueError: a name or an access that an EDS cannot hold.
 
-    >>> from tickrig.wire.canopen.object_table import ObjectTable
+    >>> from tickrig.wire.canopen.eds.object_table import ObjectTable
     >>> text = write_eds(ObjectTable())
     >>> text.splitlines()[:2]
     ['[FileInfo]', 'FileName=device.eds']

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Final, Self
 
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,
@@ -29,7 +29,7 @@ from tickrig.wire.canopen.sdo_block import (
     BlockUploadInitiateRequest,
     BlockUploadInitiateResponse,
 )
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_SUBCOMMAND,
     EXPEDITED,
     EXPEDITED_BYTES,
@@ -42,7 +42,7 @@ from tickrig.wire.canopen.sdo_command import (
     ClientCommand,
     ServerCommand,
 )
-from tickrig.wire.canopen.sdo_layout import check_frame, frame_at, index_sub, number_field
+from tickrig.wire.canopen.sdo.sdo_layout import check_frame, frame_at, index_sub, number_field
 from tickrig.wire.errors import FieldError, FramingError
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.wire.rrc_samples import SAMPLES
+from tests.wire.rrc.samples import SAMPLES
 from tickrig.wire.errors import ChecksumError
 from tickrig.wire.rrc.check import check_digit, strip_check
 

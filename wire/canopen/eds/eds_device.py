@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.device_info import BIT_RATES_KBIT, DeviceInfo
-from tickrig.wire.canopen.eds_entry import EdsEntry, read_entry, required
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_writer import VARIABLES
-from tickrig.wire.canopen.object_table import RO, RW, Access, ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
+from tickrig.wire.canopen.eds.eds_entry import EdsEntry, read_entry, required
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
+from tickrig.wire.canopen.eds.object_table import RO, RW, Access, ObjectCode, ObjectInfo
 
 COMMISSIONING: Final = "DeviceComissioning"
 UNSET_NODE_IDS: Final = (0, 0xFF)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 VECTORS: Final[dict[str, list[dict[str, Any]]]] = json.loads(
-    (Path(__file__).parents[1] / "golden" / "rtc_lite.json").read_text("utf-8")
+    (Path(__file__).parents[2] / "golden" / "rtc_lite.json").read_text("utf-8")
 )
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.eds_finding import shorten
-from tickrig.wire.canopen.eds_value import parse_limit, parse_value
-from tickrig.wire.canopen.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_finding import shorten
+from tickrig.wire.canopen.eds.eds_value import parse_limit, parse_value
+from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode
 
 SIMPLE_TYPES: Final = range(0x1C)
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)

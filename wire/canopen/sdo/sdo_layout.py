@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.wire.canopen.sdo_command import FRAME_BYTES
+from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES
 from tickrig.wire.errors import FieldError, FramingError
 
 

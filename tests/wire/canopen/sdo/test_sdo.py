@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.canopen.abort import AbortCode
-from tickrig.wire.canopen.crc import crc16
-from tickrig.wire.canopen.sdo import (
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.crc import crc16
+from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -22,7 +22,7 @@ from tickrig.wire.canopen.sdo import (
     parse_request,
     parse_response,
 )
-from tickrig.wire.canopen.sdo_block import (
+from tickrig.wire.canopen.sdo.sdo_block import (
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,

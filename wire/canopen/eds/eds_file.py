@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.wire.canopen.eds_finding import Finding, shorten
-from tickrig.wire.canopen.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_finding import Finding, shorten
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 
 Section = dict[str, str]
 

@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds_device import EdsDevice, read_device
-from tickrig.wire.canopen.eds_entry import EdsEntry
-from tickrig.wire.canopen.eds_file import EdsFile
-from tickrig.wire.canopen.object_table import RO, RW, WO
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.canopen.eds.eds_entry import EdsEntry
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.object_table import RO, RW, WO
 
 U8 = "ParameterName=x\nDataType=5\nAccessType=rw\n"
 SOUND = f"[1000]\n{U8}"

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tests.wire.rtc_lite_vectors import REPLIES, REQUESTS, raw
+from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite import layout
 from tickrig.wire.rtc_lite.codes import Command, LinkFault, Status

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.object_table import (
+from tickrig.wire.canopen.eds.object_table import (
     CONST,
     RO,
     ROT,

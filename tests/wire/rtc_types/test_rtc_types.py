@@ -19,7 +19,7 @@ from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode
 from tickrig.wire.rtc_types.idl import LongLong, Octet, Primitive, Struct, ULongLong
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "cdr.txt"
+GOLDEN = Path(__file__).parents[2] / "golden" / "cdr.txt"
 TM = Time(1, 2)
 VALUES: list[Struct] = [
     basic.TimedLong(TM, -3),

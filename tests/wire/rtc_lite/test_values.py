@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.wire.rtc_lite_vectors import VECTORS, raw
+from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.wire.errors import FieldError, FramingError
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import Frame

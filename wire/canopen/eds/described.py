@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Protocol
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.object_table import Access, ObjectInfo
+from tickrig.wire.canopen.eds.object_table import Access, ObjectInfo
 
 
 class Described(Protocol):

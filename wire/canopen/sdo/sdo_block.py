@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Self
 
-from tickrig.wire.canopen.sdo_command import (
+from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_ACKNOWLEDGE,
     BLOCK_CRC,
     BLOCK_END,
@@ -25,7 +25,7 @@ from tickrig.wire.canopen.sdo_command import (
     ClientCommand,
     ServerCommand,
 )
-from tickrig.wire.canopen.sdo_layout import frame_at, index_sub, number_field
+from tickrig.wire.canopen.sdo.sdo_layout import frame_at, index_sub, number_field
 from tickrig.wire.errors import FieldError
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.wire.rtc_lite_vectors import raw
+from tests.wire.rtc_lite.vectors import raw
 from tickrig.wire.rtc_lite.codes import Command, LinkFault
 from tickrig.wire.rtc_lite.frame import Frame, fault_frame
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet

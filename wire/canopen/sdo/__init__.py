@@ -1,0 +1,1 @@
+"""SDO frames, their CRC and abort codes (CiA 301); transfers are put together elsewhere."""
