@@ -8,8 +8,8 @@ from typing import Final
 from tickrig.device.core import NEVER
 from tickrig.emulators.can_end import CanEnd
 from tickrig.emulators.rig import Rig
-from tickrig.host.errors import LinkClosed, LinkTimeout
-from tickrig.host.stamped_link import Stamped
+from tickrig.host.links.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 
 CHUNK_US: Final = 1_000_000

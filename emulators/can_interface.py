@@ -10,8 +10,8 @@ from can.typechecking import CanFilters, Channel
 
 from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_host import CanHost
-from tickrig.host.can_message import to_frame, to_message
-from tickrig.host.errors import LinkError
+from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.errors import LinkError
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError
 

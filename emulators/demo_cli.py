@@ -13,7 +13,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.cli.telling import warnings_told
-from tickrig.host.errors import DeviceRefused, LinkError
+from tickrig.host.links.errors import DeviceRefused, LinkError
 
 if TYPE_CHECKING:
     from tickrig.emulators.fig120.samples import Sample

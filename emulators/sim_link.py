@@ -5,7 +5,7 @@ from __future__ import annotations
 from tickrig.device.core import NEVER
 from tickrig.emulators.port import ByteEnd
 from tickrig.emulators.rig import Rig
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 
 
 class SimLink:

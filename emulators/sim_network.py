@@ -16,7 +16,7 @@ from tickrig.emulators.can_host import CanHost, Repeat
 from tickrig.emulators.retimed import retime, retimed
 from tickrig.emulators.rig import Rig
 from tickrig.emulators.sim_waits import SimCondition, SimQueue, SimQueues, SimTime
-from tickrig.host.can_message import to_message
+from tickrig.host.links.can_message import to_message
 from tickrig.wire.can import STANDARD_MAX, CanFrame
 
 EPOCH_S: Final = 946_684_800

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tickrig.host.errors import LinkError
+from tickrig.host.links.errors import LinkError
 from tickrig.host.rrc import RrcClient
 
 

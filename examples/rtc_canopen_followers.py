@@ -9,7 +9,7 @@ from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.host.rtc_canopen.definition import PdoName
+from tickrig.host.rtc_canopen.definition.definition import PdoName
 from tickrig.host.rtc_canopen.serve import open_server, serve
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.wire.rtc_types.basic import Time, TimedShort

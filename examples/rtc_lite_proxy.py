@@ -10,7 +10,7 @@ from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc_lite import attach
 
 

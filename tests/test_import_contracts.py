@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[1]
 VIOLATIONS = {
     "device reads a clock": ("device/core.py", "import time"),
     "wire does I/O": ("wire/errors.py", "import os"),
-    "device knows the host": ("device/core.py", "import tickrig.host.link"),
-    "host knows the device": ("host/link.py", "import tickrig.device.core"),
+    "device knows the host": ("device/core.py", "import tickrig.host.links.link"),
+    "host knows the device": ("host/links/link.py", "import tickrig.device.core"),
     "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.clock"),
 }
 

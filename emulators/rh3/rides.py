@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 from tickrig.emulators.clock import RealClock
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.drive import Ride
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager
-from tickrig.host.rtc.real_time import RealTime
-from tickrig.host.serial_link import SerialLink
+from tickrig.host.rtc.execution.real_time import RealTime
 
 
 class SerialRide:

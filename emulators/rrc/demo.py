@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 from tickrig.emulators.child import running
 from tickrig.emulators.control_client import ControlClient
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.host.serial_link import SerialLink
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.replies import EventKind

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Final
 
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rtc_types.basic import TimedLong
 

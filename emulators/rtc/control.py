@@ -8,15 +8,15 @@ from tickrig.device.core import NEVER
 from tickrig.emulators.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
 from tickrig.host.cli.user_file import told
-from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.literal import literal
-from tickrig.host.rtc.manager import DEFAULT_RATE_HZ, Manager
-from tickrig.host.rtc.port import AnyPort
-from tickrig.host.rtc.probes import Probes
-from tickrig.host.rtc.real_time import RealTime
-from tickrig.host.rtc.rts_profile import write_rts_profile
-from tickrig.host.rtc.system import describe
-from tickrig.host.rtc.system_toml import write_toml
+from tickrig.host.rtc.configuration.configuration import Configuration
+from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.ports.literal import literal
+from tickrig.host.rtc.ports.port import AnyPort
+from tickrig.host.rtc.ports.probes import Probes
+from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
+from tickrig.host.rtc.system.rts_profile import write_rts_profile
+from tickrig.host.rtc.system.system import describe
+from tickrig.host.rtc.system.system_toml import write_toml
 
 
 class SystemControl(Requests):

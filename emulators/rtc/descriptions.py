@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from tickrig.emulators.requests import Object
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc.parameter import as_text
-from tickrig.host.rtc.port import AnyPort, ConnectorProfile
-from tickrig.host.rtc.states import LifeCycleState
+from tickrig.host.rtc.configuration.configuration import Configuration
+from tickrig.host.rtc.configuration.parameter import as_text
+from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
+from tickrig.host.rtc.system.manager import Manager
 
 
 def describe_component(manager: Manager, component: RtComponent) -> Object:

@@ -8,12 +8,12 @@ from typing import Final
 
 from tickrig.emulators.run import say
 from tickrig.host.cli.refused import Refused
-from tickrig.host.errors import LinkClosed
-from tickrig.host.reopening_link import ReopeningLink
-from tickrig.host.rtc.manager import Manager
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.reopening_link import ReopeningLink
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
 from tickrig.host.rtc_lite.attachment import RATE_HZ
-from tickrig.host.serial_link import SerialLink
 
 BAUD: Final = 57_600
 

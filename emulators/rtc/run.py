@@ -22,9 +22,9 @@ from tickrig.host.cli.telling import warnings_told
 from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
-from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc.real_time import RealTime
-from tickrig.host.rtc.system import System, restore
+from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.system import System, restore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,9 @@ from typing import Final
 
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system import System
-from tickrig.host.rtc.system_toml import parse_toml
+from tickrig.host.rtc.system.rts_profile import parse_rts_profile
+from tickrig.host.rtc.system.system import System
+from tickrig.host.rtc.system.system_toml import parse_toml
 
 TOML: Final = ".toml"
 XML: Final = ".xml"

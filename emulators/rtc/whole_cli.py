@@ -23,9 +23,9 @@ def check(at: Path, file: Path) -> None:
     """
     with loading():
         from tickrig.emulators.rtc.system_file import file_format, read_system  # noqa: PLC0415
-        from tickrig.host.rtc.compare import differences  # noqa: PLC0415
-        from tickrig.host.rtc.rts_profile import parse_rts_profile  # noqa: PLC0415
-        from tickrig.host.rtc.system_toml import parse_toml  # noqa: PLC0415
+        from tickrig.host.rtc.system.compare import differences  # noqa: PLC0415
+        from tickrig.host.rtc.system.rts_profile import parse_rts_profile  # noqa: PLC0415
+        from tickrig.host.rtc.system.system_toml import parse_toml  # noqa: PLC0415
 
     parse = parse_rts_profile if file_format(file) == "xml" else parse_toml
     wanted = read_system(file)
@@ -45,7 +45,7 @@ def dot(at: Path) -> None:
     \b
     tickrig rtc dot | dot -Tsvg -o system.svg
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.rtc.dot import Edge, write_dot  # noqa: PLC0415
+    from tickrig.host.rtc.system.dot import Edge, write_dot  # noqa: PLC0415
 
     described = components(at)
     ends = dict.fromkeys(
@@ -58,7 +58,7 @@ def dot(at: Path) -> None:
 
 
 def _box(component: Any) -> Any:
-    from tickrig.host.rtc.dot import Box  # noqa: PLC0415
+    from tickrig.host.rtc.system.dot import Box  # noqa: PLC0415
 
     ins, outs = list[str](), list[str]()
     for port in component["ports"]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, Self, TypeGuard
 
-from tickrig.host.canmon.source_word import FileWord, parse_source
+from tickrig.host.canmon.sources.source_word import FileWord, parse_source
 from tickrig.host.canmon.workspace import SettingError, Workspace
 from tickrig.host.cli.can_options import BusOptions
 

@@ -6,11 +6,11 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.unread import until_unread
+from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.version import version_option
 
-HERE: Final = "tickrig.host.canmon"
+HERE: Final = "tickrig.host.canmon.verbs"
 VERBS: Final = {
     "dump": (f"{HERE}.dump:command", "Show frames as they come, and what they mean."),
     "conv": (f"{HERE}.conv:command", "Write what SOURCE holds into the file LOG."),

@@ -18,7 +18,7 @@ from tickrig.host.canopen.script import (
     Step,
     Tell,
 )
-from tickrig.host.link import NEVER
+from tickrig.host.links.link import NEVER
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (

@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.wire.errors import WireError
 from tickrig.wire.modbus.requests import (
     ERROR_BIT,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.components.navigation import Navigation
 from tickrig.host.motion.components.odometry import Odometry
 from tickrig.host.motion.components.omni_to_2wd import OmniTo2WD
@@ -11,7 +12,6 @@ from tickrig.host.motion.components.path_follower import PathFollower
 from tickrig.host.motion.components.position_input import PositionInput
 from tickrig.host.motion.components.ref_hard import Opener, RefHardRh3
 from tickrig.host.rtc import ExecutionContext, LifeCycleState, Manager
-from tickrig.host.serial_link import SerialLink
 
 RATE_HZ: Final = 50.0
 """1 / control_cycle."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final, TypeVar
 
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.host.rtc.data_port import InPort
+from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.idl import Struct
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.errors import LinkTimeout
-from tickrig.host.link import NEVER, Link
+from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import NEVER, Link
 from tickrig.host.log import log_of
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.exchange import Exchange

@@ -1,6 +1,6 @@
 """What the RRC client raises beside LinkTimeout and LinkClosed.
 
-DeviceRefused            (tickrig.host.errors)
+DeviceRefused            (tickrig.host.links.errors)
  +-- RrcRefused          ER: came for one command
  +-- RrcStopped          ER: came too many times in a row; the client sends no more
 """
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.errors import DeviceRefused
+from tickrig.host.links.errors import DeviceRefused
 from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, COMMAND_UNKNOWN, RECEIVE_BUFFER_OVERFLOW
 
 _ONLY_WHILE_ON: Final = (

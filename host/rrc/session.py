@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Final, Self, TypeVar
 
-from tickrig.host.errors import LinkTimeout
-from tickrig.host.link import Link
+from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc.channel import Channel
 from tickrig.host.rrc.errors import RrcRefused
 from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.refusals import OnRefusals, Refusals
-from tickrig.host.serial_link import SerialLink
 from tickrig.wire.rrc.commands import Command, DeviceName, Output, StableMode
 from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, EventKind, StatusA
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import ClassVar, TypeVar
 
 from tickrig.host.rtc.component_action import ComponentAction, guarded
-from tickrig.host.rtc.configuration import Configuration
+from tickrig.host.rtc.configuration.configuration import Configuration
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.port import AnyPort, PortProfile
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.port import AnyPort, PortProfile
 
 P = TypeVar("P", bound=AnyPort)
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, ParamSpec
 
 from tickrig.host.log import log_of
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.states import ReturnCode
 
 if TYPE_CHECKING:
-    from tickrig.host.rtc.execution_context import ExecutionContext
+    from tickrig.host.rtc.execution.execution_context import ExecutionContext
 
 OK: Final = ReturnCode.RTC_OK
 

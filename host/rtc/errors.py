@@ -5,7 +5,7 @@ RtcRefused (ValueError)    an operation that cannot be: no such port, other data
 
 from __future__ import annotations
 
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.states import ReturnCode
 
 
 class RtcRefused(ValueError):  # noqa: N818 - what the model did

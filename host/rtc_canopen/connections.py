@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc.port import ConnectorProfile
-from tickrig.host.rtc_canopen.definition import RtConnection
+from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc_canopen.definition.definition import RtConnection
 from tickrig.host.rtc_canopen.events import EventKind, Note
 
 

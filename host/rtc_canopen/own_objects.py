@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.rtc_canopen.definition import SystemDefinition
+from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.wire.canopen.cob_id import FLAG_30
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (

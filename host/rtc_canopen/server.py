@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.link import NEVER
+from tickrig.host.links.link import NEVER
+from tickrig.host.links.stamped_link import Stamped
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc.states import LifeCycleState, ReturnCode
-from tickrig.host.rtc_canopen.beat import Beat
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_canopen.connections import Connections
-from tickrig.host.rtc_canopen.data_flow import DataFlow
-from tickrig.host.rtc_canopen.definition import NodeEntry, SystemDefinition
-from tickrig.host.rtc_canopen.device_file import DeviceFile
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
+from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
+from tickrig.host.rtc_canopen.definition.links import Links
 from tickrig.host.rtc_canopen.events import EventKind, EventLog
-from tickrig.host.rtc_canopen.links import Links
+from tickrig.host.rtc_canopen.node.beat import Beat
+from tickrig.host.rtc_canopen.node.receiver import QUIET_US, Receiver
+from tickrig.host.rtc_canopen.node.served_node import ServedNode
+from tickrig.host.rtc_canopen.node.start_order import StartOrder
 from tickrig.host.rtc_canopen.own_objects import SYNC_COB_ID
-from tickrig.host.rtc_canopen.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.receiver import QUIET_US, Receiver
-from tickrig.host.rtc_canopen.served_node import ServedNode
-from tickrig.host.rtc_canopen.start_order import StartOrder
-from tickrig.host.stamped_link import Stamped
+from tickrig.host.rtc_canopen.proxy.data_flow import DataFlow
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import (

@@ -10,8 +10,8 @@ from tickrig.host.canopen.dialogue import Failure, Job
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.data_port import DataPort, OutPort
-from tickrig.host.rtc_canopen.definition import (
+from tickrig.host.rtc.ports.data_port import DataPort, OutPort
+from tickrig.host.rtc_canopen.definition.definition import (
     PdoLink,
     PdoName,
     Role,
@@ -20,9 +20,9 @@ from tickrig.host.rtc_canopen.definition import (
 )
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import Event
-from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, proxy_index
-from tickrig.host.rtc_canopen.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, proxy_index
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.server import Server
 
 NOT_HEARD: Final = -1

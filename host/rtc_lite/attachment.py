@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.log import log_of
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.manager import Manager
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.lookout import Lookout
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.log import log_of
 from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
 from tickrig.host.rtc_lite.rtno_link import RtnoLink

@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from tickrig.host.errors import LinkError
-from tickrig.host.link import Link
+from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import Link
 from tickrig.host.log import log_of
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.frame import Frame

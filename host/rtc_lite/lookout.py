@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite.conversation import POLL_US, Conversation
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.wire.rtc_lite.codes import Command

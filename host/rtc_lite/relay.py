@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from tickrig.host.errors import DeviceRefused
-from tickrig.host.rtc.data_port import InPort, OutPort
+from tickrig.host.links.errors import DeviceRefused
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.wire.rtc_lite.messages import PortData, PortProfile
 from tickrig.wire.rtc_lite.values import PORT_TYPES, PortType
 from tickrig.wire.rtc_types import basic

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite.frame_link import FrameLink
 from tickrig.wire.rtc_lite.codes import Command, Status
 from tickrig.wire.rtc_lite.frame import Frame

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.host.errors import DeviceRefused, LinkTimeout
+from tickrig.host.links.errors import DeviceRefused, LinkTimeout
 from tickrig.host.rtc_lite.conversation import Conversation
 from tickrig.wire.rtc_lite.codes import Command, ContextType, State
 from tickrig.wire.rtc_lite.messages import PortProfile, Reply, parse_component_profile

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.errors import DeviceRefused
-from tickrig.host.link import Link
+from tickrig.host.links.errors import DeviceRefused
+from tickrig.host.links.link import Link
 from tickrig.host.urg.scan import Scan
 from tickrig.wire.errors import WireError
 from tickrig.wire.scip import status

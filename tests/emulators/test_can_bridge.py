@@ -14,7 +14,7 @@ from tickrig.emulators.can_bridge import CanBridge
 from tickrig.emulators.can_bus_port import FRAMES_A_POLL, CanBusPort
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.can_message import to_frame, to_message
+from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.wire.can import Frames
 
 

@@ -7,7 +7,7 @@ from tests.emulators.test_can_rig import Node
 from tickrig.emulators.can_host import CanHost
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.errors import LinkClosed, LinkTimeout
 from tickrig.wire.can_bits import frame_bits
 
 

@@ -17,7 +17,7 @@ from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_interface import TickrigBus
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.can_message import to_frame, to_message
+from tickrig.host.links.can_message import to_frame, to_message
 
 
 @pytest.fixture

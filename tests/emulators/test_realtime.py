@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.emulators.cli import main as tickrig
-from tickrig.host.serial_link import SerialLink
+from tickrig.host.links.serial_link import SerialLink
 
 pytestmark = pytest.mark.realtime
 

@@ -6,7 +6,7 @@ from tests.emulators.echo import Echo
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 
 
 def linked() -> SimLink:

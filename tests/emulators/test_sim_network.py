@@ -17,7 +17,7 @@ from tests.emulators.sim_bench import NODE_ID, SimBench
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig
 from tickrig.emulators.sim_network import SimNetwork
-from tickrig.host.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.errors import LinkClosed, LinkTimeout
 
 BLOB = bytes(index * 7 % 251 for index in range(5_000))
 

@@ -22,8 +22,8 @@ from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.emulator import Emulator
 from tickrig.emulators.requests import VERSION
 from tickrig.emulators.sim_link import SimLink
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.host.serial_link import SerialLink
 from tickrig.wire.rrc.replies import EventKind, StatusA
 
 QUICK = RrcConfig(power_on_ticks=5, button_off_ticks=5)

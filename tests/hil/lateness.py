@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
 from tickrig.emulators.control_client import TIMEOUT_S
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 
 LATE_US: Final = 5_000
 """Later than this the bench cannot be believed: half a period of the RRC."""

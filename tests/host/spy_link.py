@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 
 
 class SpyLink:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
-from tickrig.host.errors import LinkTimeout
+from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.commands import BadParameters

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
-from tickrig.host.errors import LinkTimeout
+from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import Arrival, RrcClient
 from tickrig.wire.rrc.replies import EventKind
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rigs import ScriptedLink, standby_bench
-from tickrig.host.errors import LinkTimeout
+from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.rrc.replies import EventKind
 

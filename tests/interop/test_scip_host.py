@@ -17,7 +17,7 @@ import pytest
 from hokuyolx import HokuyoLX
 
 from tickrig.emulators.child import running
-from tickrig.host.serial_link import SerialLink
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.urg.client import UrgClient
 from tickrig.host.urg.scan import Scan
 

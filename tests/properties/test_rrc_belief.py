@@ -19,7 +19,7 @@ from tickrig.device.rrc.states import POWERED_ON, RrcState
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.errors import LinkTimeout
+from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
 from tickrig.wire.rrc import commands as cmd
 

@@ -12,13 +12,13 @@ from tickrig.device.canopen.device_rtc.make import make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import OutPort as DeviceOutPort
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
+from tickrig.host.links.stamped_link import Stamped
 from tickrig.host.rtc import InPort, ModuleSpec, RtComponent
-from tickrig.host.rtc_canopen.definition import NodeEntry, Role, SystemDefinition
-from tickrig.host.rtc_canopen.device_file import read_device_file
-from tickrig.host.rtc_canopen.pdo_layout import PdoLayout, lay_out
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role, SystemDefinition
+from tickrig.host.rtc_canopen.definition.device_file import read_device_file
+from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, lay_out
 from tickrig.host.rtc_canopen.server import Server
-from tickrig.host.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState

@@ -13,10 +13,10 @@ from tickrig.emulators.child import running
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
 from tickrig.host.rtc_lite import RtcLiteProxy
-from tickrig.host.serial_link import SerialLink
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 BAUD = 57_600

@@ -9,7 +9,7 @@ from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.byte_text import escape
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.trace import Mark
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.wire.rtc_lite.codes import Command
 
 _NAMES: Final = {command.value: command.name for command in Command}

@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.emulators.rtc_lite.demo.overheard import OverheardLink
 from tickrig.emulators.rtc_lite.demo.stage import CAST, Stage
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc_lite import EventKind, ProxyEvent, Settings, attach
 from tickrig.wire.rtc_types.basic import TimedLong
 

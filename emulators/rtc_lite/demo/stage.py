@@ -15,10 +15,10 @@ from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rtc_lite.components import COMPONENTS
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.link import Link
-from tickrig.host.rtc.manager import Manager
-from tickrig.host.rtc.real_time import RealTime
-from tickrig.host.serial_link import SerialLink
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.system.manager import Manager
 
 CAST: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
 """Which node plays which part."""

@@ -15,11 +15,11 @@ from textual.screen import Screen
 from textual.widgets import TabbedContent, TabPane
 
 from tickrig.host.canmon.bench_setup import BenchSetup
-from tickrig.host.canmon.tui.bench import Bench
-from tickrig.host.canmon.tui.export_screen import ExportScreen
-from tickrig.host.canmon.tui.panel import Panel
-from tickrig.host.canmon.tui.session import Session
-from tickrig.host.canmon.tui.status_line import StatusLine
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.bench import Bench
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.widgets.export_screen import ExportScreen
+from tickrig.host.canmon.tui.widgets.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter

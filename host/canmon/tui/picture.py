@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.model import Model
-from tickrig.host.canmon.tui.opening import open_session
-from tickrig.host.canmon.tui.panels import PANELS
+from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.cli.can_options import BusOptions
 
 SIZE: Final = (110, 26)

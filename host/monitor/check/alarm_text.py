@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.host.monitor.check.alarms import Alarm, Alarms, State
-from tickrig.host.monitor.quantity import s_text
+from tickrig.host.monitor.frames.quantity import s_text
 
 HEAD: Final = f"{'RULE':<20} {'STATE':<10} {'COUNT':>6} {'AGO':>8}  LATEST"
 

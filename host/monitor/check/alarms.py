@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.finding import Finding
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 
 RECENT_US: Final = 2_000_000
 """A rule that a frame broke counts as broken for so long."""

@@ -11,11 +11,11 @@ from tickrig.host.monitor.check.checker import ended
 from tickrig.host.monitor.check.finding import Finding
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.sorted_log import SortedLog
-from tickrig.host.monitor.column_bits import column_bits
-from tickrig.host.monitor.column_traffic import windows_of
-from tickrig.host.monitor.ident import ERROR
-from tickrig.host.monitor.logs.columns import Columns
-from tickrig.host.monitor.runs import Ints
+from tickrig.host.monitor.columns.column_bits import column_bits
+from tickrig.host.monitor.columns.column_traffic import windows_of
+from tickrig.host.monitor.columns.columns import Columns
+from tickrig.host.monitor.columns.runs import Ints
+from tickrig.host.monitor.frames.ident import ERROR
 
 Placed = tuple[int, int, Finding]
 """A finding with its row, and its place among those of the row: the order of `Checker`."""

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from tickrig.host.monitor.check.rule import Suspects
-from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.ident import ERROR, ident_of, ident_text
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.ident import ERROR, ident_of, ident_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.can_error_class import describe as describe_error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.monitor.load import WINDOW_US, Window
+from tickrig.host.monitor.traffic.load import WINDOW_US, Window
 
 
 class MaxLoad:

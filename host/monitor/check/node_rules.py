@@ -11,8 +11,8 @@ from typing import Final
 from tickrig.host.monitor.check.frame_rules import FrameRule
 from tickrig.host.monitor.check.rule import Suspects
 from tickrig.host.monitor.check.time_rules import BOOT_UP
-from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.node_of import sender_of
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.node_of import sender_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
 

@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from tickrig.host.monitor.check.finding import Finding
 from tickrig.host.monitor.check.rule import NO_GAP_US, Rule, Suspects
-from tickrig.host.monitor.column_rows import heards
-from tickrig.host.monitor.ident import ERROR
-from tickrig.host.monitor.logs.columns import Columns
-from tickrig.host.monitor.runs import Ints, Runs
+from tickrig.host.monitor.columns.column_rows import heards
+from tickrig.host.monitor.columns.columns import Columns
+from tickrig.host.monitor.columns.runs import Ints, Runs
+from tickrig.host.monitor.frames.ident import ERROR
 
 
 class SortedLog:

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.check.rule import Suspects
-from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.ident import ident_text
-from tickrig.host.monitor.quantity import ms_text
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.ident import ident_text
+from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 
 BOOT_UP: Final = bytes([NmtState.INITIALISING])

@@ -8,8 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
-from tickrig.host.monitor.decode.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.memory import DEVICE_TYPE, HEARTBEAT_TIME, NodeMemory
 from tickrig.host.monitor.decode.network_services import (
     decode_emcy,
     decode_error_control,
@@ -17,9 +15,11 @@ from tickrig.host.monitor.decode.network_services import (
     decode_sync,
     decode_time,
 )
-from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.decode.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
-from tickrig.host.monitor.decode.transfer import Direction, Outcome, Transfer, write_entry
+from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.objects.memory import DEVICE_TYPE, HEARTBEAT_TIME, NodeMemory
+from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.monitor.decode.pdo.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
+from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer, write_entry
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
@@ -27,7 +27,7 @@ from tickrig.wire.canopen.nmt import NMT_COB_ID
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.sdo_channel import SdoChannel, Step
+    from tickrig.host.monitor.decode.sdo.sdo_channel import SdoChannel, Step
 
 Route = Callable[[int, CanFrame], Decoded]
 
@@ -112,7 +112,7 @@ class BusDecoder:
                 return partial(_unmapped, node) if can_id in PDO_IDS else _raw
 
     def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
-        from tickrig.host.monitor.decode.sdo_channel import (  # noqa: PLC0415 - not on every bus
+        from tickrig.host.monitor.decode.sdo.sdo_channel import (  # noqa: PLC0415 - not on every bus
             SdoChannel,
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.decode.transfer import Transfer
+from tickrig.host.monitor.decode.sdo.transfer import Transfer
 from tickrig.wire.canopen.datatypes import Value
 
 EDS: Final = "eds"

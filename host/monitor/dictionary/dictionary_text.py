@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tickrig.host.monitor.decode.transfer import write_entry
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.monitor.dictionary.object_row import ObjectRow
-from tickrig.host.monitor.quantity import s_text
+from tickrig.host.monitor.frames.quantity import s_text
 
 LEAST_NAME: Final = 12
 MOST_NAME: Final = 36

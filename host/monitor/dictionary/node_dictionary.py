@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.memory import Entry, NodeMemory
-from tickrig.host.monitor.decode.transfer import Outcome, Transfer, write_entry
+from tickrig.host.monitor.decode.objects.memory import Entry, NodeMemory
+from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer, write_entry
 from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 from tickrig.wire.canopen.sdo.abort import describe_abort

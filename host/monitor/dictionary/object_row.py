@@ -5,8 +5,8 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import NamedTuple
 
-from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.decode.transfer import write_entry
+from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
 
 
 class Origin(StrEnum):

@@ -14,7 +14,7 @@ from math import isfinite
 from typing import Final
 
 from tickrig.host.cli.setting import parse_setting
-from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.decode.objects.object_text import ObjectText
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.errors import FieldError
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.monitor.buckets import bucket_of, middle_us
+from tickrig.host.monitor.traffic.buckets import bucket_of, middle_us
 
 EXACT_US: Final = 100_000
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.filter import parse_filter
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.decode.filter.filter import parse_filter
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.steps import Condition
 
 

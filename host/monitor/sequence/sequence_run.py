@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterable
 from enum import StrEnum
 from typing import Final, NamedTuple, assert_never
 
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.steps import (
     FOREVER,
     Condition,

@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from math import tau
 from typing import ClassVar, Final, Protocol
 
-from tickrig.host.errors import LinkError
-from tickrig.host.link import Link
+from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.log import log_of
 from tickrig.host.modbus.master import Answer, ModbusMaster
-from tickrig.host.motion.base_texts import fault_text, refusal_text
+from tickrig.host.motion.components.base_texts import fault_text, refusal_text
 from tickrig.host.motion.dead_reckoning import wheel_speeds
 from tickrig.host.motion.geometry import Twist
 from tickrig.host.motion.ports import newest, sound
@@ -25,8 +26,7 @@ from tickrig.host.rtc import (
     RtComponent,
     ServicePort,
 )
-from tickrig.host.rtc.parameter import Parameter
-from tickrig.host.serial_link import SerialLink
+from tickrig.host.rtc.configuration.parameter import Parameter
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
 from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
 from tickrig.wire.rtc_types import iis

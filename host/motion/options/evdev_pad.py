@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.motion.options.pad import Hand
 
 EV_ABS: Final = 0x03

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.errors import LinkError
+from tickrig.host.links.errors import LinkError
 from tickrig.host.log import log_of
 from tickrig.host.motion.options.evdev_pad import EvdevPad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad

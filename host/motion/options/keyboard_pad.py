@@ -8,7 +8,7 @@ import termios
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.motion.options.pad import Hand
 
 KEYS: Final[Mapping[str, Hand]] = {

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
-from tickrig.host.rtc.data_port import InPort
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.wire.rtc_types.basic import TimedLong
 
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.components.seq_ports import SEQ_PORTS
-from tickrig.host.rtc.data_port import InPort
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.wire.rtc_types.idl import Struct
 
 

@@ -6,9 +6,9 @@ from typing import ClassVar, Final
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.components.seq_ports import SEQ_PORTS
-from tickrig.host.rtc.data_port import OutPort
-from tickrig.host.rtc.execution_context import ExecutionContext
-from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.data_port import OutPort
 from tickrig.wire.rtc_types.basic import (
     Time,
     TimedDouble,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tickrig.host.rtc_canopen.builder.names import snake_name
 from tickrig.host.rtc_canopen.builder.profile_file import Project
-from tickrig.host.rtc_canopen.definition import NodeEntry, SystemDefinition
-from tickrig.host.rtc_canopen.definition_writer import write_definition
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
+from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.wire.rtc_canopen.profile import Direction, PlacedPort
 
 

@@ -15,7 +15,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 from tickrig.host.cli.version import version_option
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.rtc_canopen.commands.opening import (
     STANDARD_OUTPUT,
     BusFailed,

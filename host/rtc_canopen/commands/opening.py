@@ -16,12 +16,12 @@ from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.cli.user_file import find_class, told
+from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.stamped_link import StampedLink
 
 if TYPE_CHECKING:
-    from tickrig.host.can_link import CanLink
-    from tickrig.host.rtc_canopen.definition import BusEntry
+    from tickrig.host.links.can_link import CanLink
+    from tickrig.host.rtc_canopen.definition.definition import BusEntry
     from tickrig.host.rtc_canopen.events import Event, Listener
     from tickrig.host.rtc_canopen.server import Server
     from tickrig.wire.can_error import ErrorState
@@ -101,8 +101,8 @@ def open_link(
         bus_state: told what its CAN controller reports.
         stack: closes it.
     """
-    from tickrig.host.can_link import CanLink  # noqa: PLC0415
-    from tickrig.host.echo_free_link import EchoFreeLink  # noqa: PLC0415
+    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415
+    from tickrig.host.links.echo_free_link import EchoFreeLink  # noqa: PLC0415
 
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)

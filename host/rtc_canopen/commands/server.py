@@ -17,8 +17,9 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.telling import warnings_told
 from tickrig.host.cli.version import version_option
-from tickrig.host.errors import LinkClosed
-from tickrig.host.link import NEVER
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import NEVER
+from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
     BusFailed,
     bus_of,
@@ -27,7 +28,6 @@ from tickrig.host.rtc_canopen.commands.opening import (
     open_link,
     read_server,
 )
-from tickrig.host.stamped_link import StampedLink
 
 if TYPE_CHECKING:
     from tickrig.host.rtc_canopen.server import Server
@@ -68,7 +68,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _check(file, server)
         return
     if options.pop("dot"):
-        from tickrig.host.rtc_canopen.paper_dot import draw_on_paper  # noqa: PLC0415
+        from tickrig.host.rtc_canopen.paper.paper_dot import draw_on_paper  # noqa: PLC0415
 
         click.echo(draw_on_paper(server))
         return
@@ -86,7 +86,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
 
 
 def _check(file: Path, server: Server) -> None:
-    from tickrig.host.rtc_canopen.paper_check import check_on_paper  # noqa: PLC0415
+    from tickrig.host.rtc_canopen.paper.paper_check import check_on_paper  # noqa: PLC0415
 
     if mistakes := check_on_paper(server):
         raise Refused("\n".join(f"{file}: {mistake}" for mistake in mistakes))

@@ -11,7 +11,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
 
-from tickrig.host.monitor.decode.transfer import write_entry
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc_canopen.editor import joining
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView

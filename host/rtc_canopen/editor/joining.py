@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.rtc_canopen.definition import PdoLink, RtConnection
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, RtConnection
 from tickrig.host.rtc_canopen.editor.system_rows import Item
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.view import PdoView, PortView, ServerView

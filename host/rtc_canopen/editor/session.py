@@ -8,12 +8,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.rtc_canopen.definition_file import save_definition
+from tickrig.host.links.stamped_link import StampedLink
+from tickrig.host.rtc_canopen.definition.definition_file import save_definition
 from tickrig.host.rtc_canopen.events import Listener
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.host.rtc_canopen.view import ServerView
-from tickrig.host.stamped_link import StampedLink
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 

@@ -7,7 +7,7 @@ from textwrap import wrap
 from typing import Final
 
 from tickrig.host.rtc_canopen.events import Event, EventKind
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import Phase
 from tickrig.host.rtc_canopen.view import NodeView
 from tickrig.host.tui.line_view import Line
 

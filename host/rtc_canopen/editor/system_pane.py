@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from tickrig.host.rtc_canopen.definition import PdoLink, RtConnection
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, RtConnection
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.system_rows import Item, SystemRow, system_rows
 from tickrig.host.rtc_canopen.view import ComponentView, NodeView, PdoView, PortView, SystemView

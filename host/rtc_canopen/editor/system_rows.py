@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterator
 from functools import lru_cache
 from typing import Final
 
-from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.editor.row import Row
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import Phase
 from tickrig.host.rtc_canopen.view import (
     NOT_HEARD,
     ComponentView,

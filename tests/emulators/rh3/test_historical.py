@@ -16,7 +16,7 @@ import pytest
 from tickrig.device.body.pose import Pose
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import OutPort
-from tickrig.host.rtc.connect import connect
+from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.rtc_types.rh2 import Path, RunMode
 
 OFFSET_M, SPEED_M_S, PERIODS = 0.05, 0.3, 1_000

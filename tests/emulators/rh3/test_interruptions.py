@@ -12,7 +12,7 @@ from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.motion.components.ref_hard import RefHardRh3
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import OutPort
-from tickrig.host.rtc.connect import connect
+from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.rh3 import Status
 from tickrig.wire.rtc_types import iis
 

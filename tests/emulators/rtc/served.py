@@ -12,7 +12,7 @@ from tests.host.rtc.chain import Chain
 from tickrig.emulators.cli import main
 from tickrig.emulators.control_server import ControlServer
 from tickrig.emulators.rtc.control import SystemControl
-from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.rtc.execution.real_time import RealTime
 
 ROUND_US = 500
 

@@ -19,7 +19,7 @@ from tickrig.emulators.child import running
 from tickrig.emulators.cli import main
 from tickrig.emulators.control_client import ControlClient
 from tickrig.emulators.rtc.at import default_path
-from tickrig.host.rtc.system_toml import parse_toml
+from tickrig.host.rtc.system.system_toml import parse_toml
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "rtc_chain.toml"
 

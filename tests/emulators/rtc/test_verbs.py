@@ -14,10 +14,10 @@ from tests.emulators.rtc.served import Served
 from tests.host.rtc.spy import ERROR
 from tickrig.emulators.cli import main
 from tickrig.host.rtc import Provider, ServicePort
-from tickrig.host.rtc.compare import differences
-from tickrig.host.rtc.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system import System, describe
-from tickrig.host.rtc.system_toml import parse_toml
+from tickrig.host.rtc.system.compare import differences
+from tickrig.host.rtc.system.rts_profile import parse_rts_profile
+from tickrig.host.rtc.system.system import System, describe
+from tickrig.host.rtc.system.system_toml import parse_toml
 
 
 @pytest.fixture

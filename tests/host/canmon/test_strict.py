@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tickrig.host.canmon import whole_log
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.sources import whole_log
 
 WELL = "(0000000001.000000) can0 705#7F\n"
 NOISE = "what?\n"

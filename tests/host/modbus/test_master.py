@@ -12,7 +12,7 @@ from tickrig.emulators.faults import FaultyPort
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rs485_line import Rs485Line
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.modbus.master import Answer, ModbusMaster
 from tickrig.wire.modbus.requests import (
     READ,

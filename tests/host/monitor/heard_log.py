@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.traffic import Snapshot, Traffic
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.wire.candump import parse_line
 
 

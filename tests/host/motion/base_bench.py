@@ -12,7 +12,7 @@ from tickrig.emulators.faults import FaultyPort
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.rs485_line import Rs485Line
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.motion.components.ref_hard import RefHardRh3
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D

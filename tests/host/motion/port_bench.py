@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.ports import arrived, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, Manager, OutPort, RtComponent
-from tickrig.host.rtc.connect import connect
+from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.idl import Struct
 

@@ -6,8 +6,8 @@ import pytest
 
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.rtc import Manager, RtComponent
-from tickrig.host.rtc.data_port import DataPort
-from tickrig.host.rtc.service_port import ServicePort
+from tickrig.host.rtc.ports.data_port import DataPort
+from tickrig.host.rtc.ports.service_port import ServicePort
 
 PORTS = """
 PositionInput > position IIS/TimedPose2D

@@ -13,11 +13,11 @@ from tickrig.device.modbus.registers import Registers
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.errors import LinkClosed
-from tickrig.host.link import Link
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import Link
 from tickrig.host.motion.components.ref_hard import RefHard, RefHardRh3
-from tickrig.host.rtc.connect import connect
-from tickrig.host.rtc.service_port import Consumer, ServicePort
+from tickrig.host.rtc.ports.connect import connect
+from tickrig.host.rtc.ports.service_port import Consumer, ServicePort
 from tickrig.wire.rh3 import Status
 
 

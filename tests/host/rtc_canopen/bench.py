@@ -12,10 +12,10 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig import Rig, Station
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.definition import SystemDefinition
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.events import Event, EventKind
-from tickrig.host.rtc_canopen.proxy import ProxyRtc
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.server import Server
 

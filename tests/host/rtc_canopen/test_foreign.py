@@ -8,7 +8,7 @@ from tests.emulators.can_bench import frames
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import Phase
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 

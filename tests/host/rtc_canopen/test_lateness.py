@@ -6,9 +6,9 @@ import pytest
 
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.emulators.can_host import CanHost
+from tickrig.host.links.stamped_link import Stamped
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.stamped_link import Stamped
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 BLAMED = (EventKind.HEARTBEAT_LOST, EventKind.DUPLICATE_NODE, EventKind.DUPLICATE_SUSPECTED)

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.node.served_node import Phase
 from tickrig.host.rtc_canopen.serve import read_files, serve
-from tickrig.host.rtc_canopen.served_node import Phase
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.wire.can import CanFrame

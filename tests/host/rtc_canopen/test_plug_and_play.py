@@ -6,7 +6,7 @@ from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_logger
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import Phase
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE

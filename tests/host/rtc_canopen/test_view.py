@@ -7,12 +7,12 @@ import pytest
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_knob
 from tickrig.host.rtc import LifeCycleState, RtcRefused
-from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, Role, RtConnection
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.definition_writer import write_definition
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, Role, RtConnection
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import Phase
 from tickrig.host.rtc_canopen.view import NOT_HEARD, PdoView, PortView, ServerView
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_types.basic import TimedShortSeq

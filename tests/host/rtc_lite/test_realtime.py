@@ -12,12 +12,12 @@ from tests.host.rtc_lite.experiment import ALL, JOINTS
 from tickrig.emulators.child import Child, running
 from tickrig.emulators.clock import RealClock
 from tickrig.emulators.control_client import ControlClient
-from tickrig.host.reopening_link import ReopeningLink
+from tickrig.host.links.reopening_link import ReopeningLink
+from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.real_time import RealTime
+from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
-from tickrig.host.serial_link import SerialLink
 
 EMULATOR = "tickrig.emulators.rtc_lite.cli"
 DEADLINE_S = 10.0

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.wire.rtc_lite.vectors import VECTORS
-from tickrig.host.errors import DeviceRefused
+from tickrig.host.links.errors import DeviceRefused
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc_lite.relays import Relays
 from tickrig.wire.rtc_lite.messages import PortData, PortProfile

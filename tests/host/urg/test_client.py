@@ -12,7 +12,7 @@ from tickrig.device.urg.parameters import URG_04LX
 from tickrig.emulators.rig import Rig
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.errors import DeviceRefused, LinkClosed
+from tickrig.host.links.errors import DeviceRefused, LinkClosed
 from tickrig.host.urg.client import UrgClient
 from tickrig.wire.scip.reply import Reply
 from tickrig.wire.scip.scan import encode_scan

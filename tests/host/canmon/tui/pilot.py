@@ -10,17 +10,17 @@ from typing import Any
 from textual.app import App
 
 from tests.host.canmon.wire import Wire
-from tickrig.host.canmon.file_source import FileSource
-from tickrig.host.canmon.source_word import FileWord
+from tickrig.host.canmon.sources.file_source import FileSource
+from tickrig.host.canmon.sources.source_word import FileWord
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.bench import Bench
-from tickrig.host.canmon.tui.model import Model
-from tickrig.host.canmon.tui.nodes_panel import NodesPanel
-from tickrig.host.canmon.tui.opening import open_session
-from tickrig.host.canmon.tui.panel import Panel
-from tickrig.host.canmon.tui.session import Session
-from tickrig.host.canmon.tui.statistics_panel import StatisticsPanel
-from tickrig.host.canmon.tui.trace_panel import TracePanel
+from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
+from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
+from tickrig.host.canmon.tui.settings.bench import Bench
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.opening import open_session
+from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui.line import line_text
 from tickrig.host.tui.line_view import LineView

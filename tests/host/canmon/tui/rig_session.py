@@ -10,10 +10,10 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_host import CanHost
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.canmon.tui.model import Model
-from tickrig.host.canmon.tui.session import Session
-from tickrig.host.monitor.decode.eds_objects import read_eds
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.monitor.decode.objects.eds_objects import read_eds
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"

@@ -22,13 +22,13 @@ from tests.host.canmon.tui.pilot import (
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.bench_setup import BenchSetup
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.bench import Bench
-from tickrig.host.canmon.tui.model import Meant, Model
-from tickrig.host.canmon.tui.opening import open_session
-from tickrig.host.canmon.tui.panels import PANELS
-from tickrig.host.canmon.tui.session import NEVER
-from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.trace_panel import TracePanel
+from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
+from tickrig.host.canmon.tui.settings.bench import Bench
+from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.opening import open_session
+from tickrig.host.canmon.tui.tasks.session import NEVER
+from tickrig.host.canmon.tui.widgets.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui.framed_app import FramedApp

@@ -8,13 +8,13 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_channels import CHANNELS
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.canmon.tui.dictionary_task import DictionaryTask
-from tickrig.host.canmon.tui.model import Model
-from tickrig.host.canmon.tui.opening import open_session
-from tickrig.host.canmon.tui.session import Session
-from tickrig.host.canmon.tui.transmit_task import TransmitTask
+from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.opening import open_session
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.decode.objects.eds_objects import read_eds
 from tickrig.host.monitor.transmit.transmit_words import parse_words
 
 STEPS = 1_000

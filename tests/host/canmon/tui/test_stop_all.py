@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 from tests.host.canmon.tui.rig_session import BUS, RigSession
-from tickrig.host.canmon.failure import SourceFailed
-from tickrig.host.canmon.tui.transmit_task import TransmitTask
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
 from tickrig.host.monitor.transmit.transmit_words import parse_words
 from tickrig.wire.can import CanFrame
 

@@ -15,7 +15,7 @@ from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
 from tickrig.host.monitor.check.finding import Finding
 from tickrig.host.monitor.check.words import parse_rules
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.wire.can import CanFrame
 
 RULES = parse_rules(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tests.host.monitor.heard_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.decode.objects.eds_objects import read_eds
 from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin

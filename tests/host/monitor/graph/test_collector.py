@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
+from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.signal_word import parse_signal
-from tickrig.host.monitor.heard import Heard
-from tickrig.host.monitor.logs.column_reader import read_columns
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
 

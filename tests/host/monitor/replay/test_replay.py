@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.replay.lateness import Lateness
 from tickrig.host.monitor.replay.replay_plan import ReplayPlan
 from tickrig.wire.can import CanFrame

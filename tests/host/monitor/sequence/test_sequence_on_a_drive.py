@@ -7,9 +7,9 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can_host import CanHost
 from tickrig.emulators.can_wire import CanWire
 from tickrig.emulators.rig import Rig, Station
-from tickrig.host.canmon.watch import Watch
-from tickrig.host.monitor.decode.eds_objects import read_eds
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.canmon.output.watch import Watch
+from tickrig.host.monitor.decode.objects.eds_objects import read_eds
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
 from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.host.monitor.transmit.pdo_words import PdoWords

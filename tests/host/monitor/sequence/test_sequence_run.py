@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.line_sequence import parse_lines
 from tickrig.host.monitor.sequence.sequence_run import NEVER, Mark, SequenceRun
 from tickrig.host.monitor.sequence.toml_sequence import TomlSequence

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.eds_objects import EdsObjects, read_eds
-from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.heard import Heard
+from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, read_eds
+from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.transmit.pdo_words import PdoWords
 from tickrig.wire.canopen.datatypes import DataType
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.decode.eds_objects import read_eds
+from tickrig.host.monitor.decode.objects.eds_objects import read_eds
 from tickrig.host.monitor.transmit.pdo_words import PdoWords
 from tickrig.host.monitor.transmit.transmit_list import TransmitRow
 from tickrig.host.monitor.transmit.transmit_text import render_transmit

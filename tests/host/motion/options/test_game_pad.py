@@ -7,7 +7,7 @@ import termios
 import pytest
 
 from tests.host.motion.port_bench import PERIOD_US, PortBench
-from tickrig.host.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.motion.options.evdev_pad import ABS_RX, ABS_X, ABS_Y, EV_ABS, Axes, EvdevPad
 from tickrig.host.motion.options.game_pad import GamePad, open_pad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad

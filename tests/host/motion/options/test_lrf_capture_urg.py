@@ -10,7 +10,7 @@ from tickrig.device.urg.world import room
 from tickrig.emulators.rig import Rig, Station
 from tickrig.emulators.serial_line import SerialLine
 from tickrig.emulators.sim_link import SimLink
-from tickrig.host.link import Link
+from tickrig.host.links.link import Link
 from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
 
 

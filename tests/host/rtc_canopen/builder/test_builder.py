@@ -17,7 +17,7 @@ from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.names import COMPONENT_NAMES
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project
 from tickrig.host.rtc_canopen.commands.builder import main
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import object_table

@@ -11,7 +11,7 @@ from tickrig.emulators.canopen.node_spec import parse_node
 from tickrig.emulators.rig import Rig, Station
 from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, parse_project
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.server import Server
 

@@ -12,8 +12,8 @@ from tests.host.canmon.tui.pilot import screen_text
 from tests.host.rtc_canopen.bench import EDS
 from tests.host.rtc_canopen.components import Knob
 from tests.host.rtc_canopen.editor.desk import Desk, at_desk
-from tickrig.host.rtc_canopen.definition import PdoLink, PdoName, RtConnection
-from tickrig.host.rtc_canopen.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, RtConnection
+from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.question import Question
 from tickrig.host.rtc_canopen.server import Server

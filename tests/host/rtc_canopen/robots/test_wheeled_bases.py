@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tickrig.host.rtc import InPort, Manager, ModuleSpec, OutPort, RtComponent
-from tickrig.host.rtc.data_port import DataPort
+from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.host.rtc_canopen.robots.beego import Beego
 from tickrig.host.rtc_canopen.robots.fourx import WHEELS, FourX
 from tickrig.host.rtc_canopen.robots.joystick import Joystick

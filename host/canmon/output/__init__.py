@@ -1,0 +1,1 @@
+"""How verbs print, paint, send and end; not what a frame means."""

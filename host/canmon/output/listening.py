@@ -1,0 +1,61 @@
+"""Taking what comes from a source, without a screen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
+
+import click
+
+from tickrig.host.canmon.sources.source import AnySource
+from tickrig.host.canmon.sources.source_word import BusWord, parse_source
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.cli.options import Decorator
+from tickrig.host.cli.refused import Refused
+
+Item = TypeVar("Item")
+
+POLL_US: Final = 20_000
+PATIENCE_US: Final = 5_000_000
+"""How long a bus is heard where nothing else ends it."""
+
+
+def _span(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
+    try:
+        return None if text is None else parse_time_us(text)
+    except ValueError as error:
+        raise Refused(f"--for {error}") from None
+
+
+span_option: Final[Decorator] = click.option(
+    "--for", "span_us", metavar="TIME", callback=_span, help="End after 10s, 500ms."
+)
+"""Add the option `--for`, in microseconds."""
+
+
+def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
+    """Return the bit rate that -b or a SOURCE word names, as can0@500k; None if none does."""
+    buses = (word for word in map(parse_source, words) if isinstance(word, BusWord))
+    named = (word.bitrate for word in buses if word.bitrate is not None)
+    return next(named, None) if options.bitrate is None else options.bitrate
+
+
+def listen(
+    source: AnySource[Item], take: Callable[[Sequence[Item]], None], span_us: int | None
+) -> None:
+    """Take what comes until the source ends or the time is over."""
+    begin_s = time.monotonic()
+    while not (source.ended or is_over(begin_s, span_us)):
+        take(source.poll(POLL_US))
+
+
+def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
+    """Return how long to listen where nobody says it; a file and a pipe have an end."""
+    return None if not source.live or list(words) == ["-"] else PATIENCE_US
+
+
+def is_over(begin_s: float, span_us: int | None) -> bool:
+    """Say whether a time has passed by the clock of this machine."""
+    return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6

@@ -1,0 +1,65 @@
+"""A log file that a verb writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.output.meaning import Meant
+from tickrig.host.canmon.sources.source_word import FileWord, parse_source
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.log_format import LogFormatError
+from tickrig.host.monitor.logs.reading.log_reader import LogError
+from tickrig.host.monitor.logs.writing.log_writer import write_log
+
+
+class LogFile:
+    """A log under way.
+
+    Args:
+        path: the file; one that exists is replaced.
+        source: SOURCE words of what is read meanwhile.
+
+    Raises:
+        Refused: the name tells no format, the format needs what is not there, or the file is
+            read meanwhile.
+        SourceFailed: it cannot be written, now or later.
+    """
+
+    def __init__(self, path: Path, source: Sequence[str]) -> None:
+        self._path = path
+        read = (
+            parsed.path for word in source if isinstance(parsed := parse_source(word), FileWord)
+        )
+        if path.exists() and any(one.exists() and one.samefile(path) for one in read):
+            raise Refused(f"{path} is read, so it cannot be written")
+        try:
+            self._writer = write_log(path)
+        except (LogFormatError, LogError) as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            raise SourceFailed(f"{path}: {error.strerror}") from error
+
+    def take(self, meant: Sequence[Meant], lost: int) -> None:
+        """Add frames; what came is with the operating system then."""
+        try:
+            for heard, _ in meant:
+                assert isinstance(heard, Heard), "who opens serial ports does not write a log"
+                self._writer.write(heard)
+            if meant:
+                self._writer.flush()
+        except OSError as error:
+            raise SourceFailed(f"{self._path}: {error.strerror}") from error
+
+    def close(self) -> None:
+        """End the log, and say what it could not hold."""
+        try:
+            self._writer.close()
+        except OSError as error:
+            raise SourceFailed(f"{self._path}: {error.strerror}") from error
+        for word in self._writer.words():
+            click.echo(word, err=True)

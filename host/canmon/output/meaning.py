@@ -1,0 +1,54 @@
+"""What frames mean, and which of them are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from tickrig.host.monitor.frames.heard import Heard
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.decoder import Decoder
+    from tickrig.host.monitor.decode.filter.filter import Filter
+    from tickrig.host.monitor.decode.filter.missing_signals import MissingSignals
+    from tickrig.host.monitor.decode.serial.heard_line import Listened
+
+Meant = tuple["Listened", "Decoded | None"]
+"""A frame or a line of a serial port, and what it means where somebody asked."""
+
+
+class Meaning:
+    """Decodes frames and passes on those that are wanted.
+
+    Args:
+        decoder: tells what frames mean; None where nobody asks.
+        wanted: which frames pass; None for all. It needs a decoder.
+    """
+
+    def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
+        self._decoder, self._wanted = decoder, wanted
+        self._missing: MissingSignals | None = None
+        if wanted is not None and wanted.signals:
+            from tickrig.host.monitor.decode.filter.missing_signals import (  # noqa: PLC0415 - slow
+                MissingSignals,
+            )
+
+            self._missing = MissingSignals(wanted.signals)
+
+    def take(self, heards: Sequence[Listened]) -> Iterator[Meant]:
+        """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
+        decoder, wanted, missing = self._decoder, self._wanted, self._missing
+        for heard in heards:
+            if decoder is None:
+                decoded = None
+            else:
+                decoded = decoder.take(heard) if isinstance(heard, Heard) else heard.decoded
+            if missing and decoded is not None:
+                missing.take(decoded)
+            if wanted is None or (decoded is not None and wanted.matches(heard, decoded)):
+                yield heard, decoded
+
+    def words(self) -> list[str]:
+        """Say which signals the filter asks for that never came, one line each."""
+        return [] if self._missing is None else self._missing.words()

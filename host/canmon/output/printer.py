@@ -1,0 +1,154 @@
+"""What `dump` prints of each frame: candump's lines, its log format, JSON or CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from math import isfinite
+from typing import TYPE_CHECKING, assert_never
+
+from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.reading.json_line import json_line
+from tickrig.host.monitor.logs.writing.log_writer import log_line
+from tickrig.wire.can_error import ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.serial.heard_line import Listened
+
+Printer = Callable[["Listened", "Decoded | None"], str]
+"""Writes a frame, or a line of a serial port, and what it means, where that is known."""
+
+
+class Output(StrEnum):
+    """What is printed."""
+
+    TEXT = ""
+    LOG = "log"
+    JSONL = "jsonl"
+    CSV = "csv"
+
+
+def printer_of(
+    output: Output, stamp: Stamp, extra: bool, raw: bool, errors: bool = False
+) -> Printer:
+    """Return what prints a frame.
+
+    Args:
+        output: as what.
+        stamp: time in front of lines of text.
+        extra: direction in lines of text.
+        raw: leave out what frames mean,
+        errors: but not of error frames.
+    """
+    write = _writer(output, stamp, extra)
+    if not raw:
+        return write
+    if errors:
+        return lambda heard, _: write(heard, _error_meaning(heard))
+    return lambda heard, _: write(heard, None)
+
+
+def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
+    match output:
+        case Output.TEXT:
+            return text_printer(DumpLines(stamp, extra))
+        case Output.LOG:
+            return log_printer
+        case Output.JSONL:
+            return json_printer
+        case Output.CSV:
+            return csv_printer
+        case _:
+            assert_never(output)
+
+
+def _error_meaning(heard: Listened) -> Decoded | None:
+    if not isinstance(heard.frame, ErrorFrame):
+        return None
+    from tickrig.host.monitor.decode.error_frame_text import (  # noqa: PLC0415 - seldom wanted
+        decode_error,
+    )
+
+    return decode_error(heard.frame)
+
+
+def text_printer(lines: DumpLines) -> Printer:
+    """Return what writes lines as candump shows them."""
+
+    def printed(heard: Listened, decoded: Decoded | None) -> str:
+        text = decoded_text(decoded)
+        if isinstance(heard, Heard):
+            return lines.line(heard, text)
+        from tickrig.host.monitor.frames.serial_text import line_text  # noqa: PLC0415 - seldom wanted
+
+        return f"{lines.stamp(heard.at_us)}  {line_text(heard, text)}"
+
+    return printed
+
+
+def log_printer(heard: Listened, decoded: Decoded | None) -> str:
+    """Write a line of a log, which holds frames alone."""
+    assert isinstance(heard, Heard), "who opens serial ports does not ask for a log"
+    return log_line(heard)
+
+
+def json_printer(heard: Listened, decoded: Decoded | None) -> str:
+    """Write an object in JSON, with kind, node, text, signals and their source."""
+    more = "" if decoded is None else _meaning_json(decoded)
+    if isinstance(heard, Heard):
+        return json_line(heard, more)
+    from tickrig.host.monitor.frames.serial_text import line_json  # noqa: PLC0415 - seldom wanted
+
+    return line_json(heard, more)
+
+
+def _meaning_json(decoded: Decoded) -> str:
+    import json  # noqa: PLC0415 - seldom wanted
+
+    node = "" if decoded.node is None else f',"node":{decoded.node}'
+    text = f',"text":{json.dumps(decoded.text)}' if decoded.text else ""
+    values = {signal.name: _plain(signal.value) for signal in decoded.signals}
+    signals = f',"sig":{json.dumps(values, separators=(",", ":"))}' if values else ""
+    source = f',"src":"{decoded.source}"' if decoded.source else ""
+    return f',"kind":"{decoded.kind}"{node}{text}{signals}{source}'
+
+
+def csv_printer(heard: Listened, decoded: Decoded | None) -> str:
+    """Write a row below `DUMP_HEADER`; a line of a serial port has no identifier."""
+    at_us, channel, sent = heard.at_us, heard.channel, heard.sent
+    if isinstance(heard, Heard):
+        frame = heard.frame
+        text, _, data = str(frame).partition("#")
+        length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+    else:
+        text, data, length = "", heard.data.hex().upper(), len(heard.data)
+    meaning = ("", "", "")
+    if decoded is not None:
+        node = "" if decoded.node is None else str(decoded.node)
+        meaning = (decoded.kind, node, _cell(decoded.text))
+    at_s = f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}"
+    cells = (at_s, _cell(channel), text, "tx" if sent else "rx", str(length), data, *meaning)
+    return ",".join(cells)
+
+
+def decoded_text(decoded: Decoded | None) -> str:
+    """Write what a frame means: node, kind, and what it says."""
+    if decoded is None or decoded.kind == "raw":
+        return ""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    return f"{node}{decoded.kind} {decoded.text}".rstrip()
+
+
+def _plain(value: object) -> object:
+    """Return a value as JSON has it: bytes are hex, and what is no number is null."""
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value.hex().upper() if isinstance(value, bytes | bytearray) else value
+
+
+def _cell(text: str) -> str:
+    """Quote a cell that needs it (RFC 4180)."""
+    quoted = text.replace('"', '""')
+    return f'"{quoted}"' if set(text) & set(',"\r\n') else text

@@ -1,0 +1,96 @@
+"""A bus that a verb sends on, and hears where it wants to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final
+
+import can
+
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.sources.bus_reader import open_bus
+from tickrig.host.canmon.sources.bus_source import BusSource, merged, reader_of
+from tickrig.host.canmon.sources.source_word import BusWord, parse_source
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused
+from tickrig.host.links.can_message import to_message
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.wire.can import CanFrame
+
+SEND_TIMEOUT_S: Final = 1
+"""How long a full queue of the driver may stay full."""
+
+
+class Transmitter:
+    """An open bus.
+
+    Args:
+        word: SOURCE word of a bus.
+        options: what the command line says of it.
+        hears: read what comes in; else nothing is kept of it.
+
+    Attributes:
+        name: what the bus is called.
+
+    Raises:
+        Refused: the word names no bus.
+        SourceFailed: the bus cannot be opened.
+    """
+
+    def __init__(self, word: str, options: BusOptions, *, hears: bool = False) -> None:
+        bus_word = parse_source(word)
+        if not isinstance(bus_word, BusWord):
+            raise Refused(f"{word!r} is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k")
+        self._bus, interface, self.name = open_bus(merged(bus_word, options))
+        self._source: BusSource | None = None
+        if hears:
+            reader = reader_of(self._bus, interface, self.name)
+            self._source = BusSource([reader], [bus_word.chosen])
+
+    def send(self, frame: CanFrame) -> None:
+        """Send a frame; SourceFailed if the bus is gone or takes none for 1 s."""
+        send_on(self._bus, self.name, frame)
+
+    def poll(self, timeout_us: int) -> list[Heard]:
+        """Wait for a first frame, then return all that are there.
+
+        Raises:
+            SourceFailed: the bus is gone.
+        """
+        assert self._source is not None, "it was opened to hear"
+        heard = self._source.poll(timeout_us)
+        if not heard and self._source.failed:
+            raise SourceFailed(self._source.failed)
+        return heard
+
+    def close(self) -> None:
+        """Close the bus."""
+        if self._source is None:
+            self._bus.shutdown()
+        else:
+            self._source.close()
+
+
+def send_on(bus: can.BusABC, name: str, frame: CanFrame) -> None:
+    """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
+    try:
+        bus.send(to_message(frame), SEND_TIMEOUT_S)
+    except (can.CanError, OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise SourceFailed(f"cannot send on {name}: {reason}") from error
+
+
+@contextmanager
+def transmitters(
+    words: Sequence[str], options: BusOptions, *, hears: bool = False
+) -> Iterator[list[Transmitter]]:
+    """Open buses, and close them behind the block."""
+    opened: list[Transmitter] = []
+    try:
+        for word in words:
+            opened.append(Transmitter(word, options, hears=hears))
+        yield opened
+    finally:
+        for one in opened:
+            one.close()

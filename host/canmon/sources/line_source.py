@@ -1,0 +1,107 @@
+"""Serial ports as a source, beside buses: the lines of the devices on them.
+
+A port has one reader. Who wants to hear a host and its device hangs the receive
+line of an adapter of its own on each of their wires.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import PurePath
+from typing import Final
+
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.sources.live_source import LiveSource, Reader
+from tickrig.host.canmon.sources.source_word import BusWord, LineWord
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.monitor.decode.serial.heard_line import HeardLine, Listened
+from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
+from tickrig.host.monitor.decode.serial.serial_rtc_lite import RtcLiteLine
+from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.host.monitor.logs.tally import Tally
+from tickrig.wire.rtc_lite.frame import Checksum
+
+Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
+"""What decodes a line by its name, and its usual bit/s."""
+
+DECODINGS: Final[dict[str, Decoding]] = {
+    "rrc": (RrcLines, 115_200),
+    "rtc-lite": (RtcLiteLine, 57_600),
+    "rtc-lite-xor8": (partial(RtcLiteLine, checksum=Checksum.XOR8), 57_600),
+}
+
+
+class LineReader:
+    """One serial port; nothing is sent on it.
+
+    Args:
+        word: its port, protocol and direction.
+
+    Attributes:
+        name: of its port.
+        lost: 0, for a serial port does not tell.
+        tally: empty; what is no line is told as one.
+        stepped: False, its time passes by itself.
+
+    Raises:
+        LinkClosed: the port cannot be opened.
+    """
+
+    def __init__(self, word: LineWord) -> None:
+        decoder, usual_baud = DECODINGS[word.protocol]
+        self.name, self._from_host = PurePath(word.port).name or word.port, word.from_host
+        self.lost, self.tally, self.stepped = 0, Tally(), False
+        self._decoder = decoder(self.name)
+        self._link = SerialLink(word.port, word.baud or usual_baud)
+
+    def read(self, timeout_us: int, /) -> list[HeardLine]:
+        """Wait for a first byte, then return the lines that are whole; LinkClosed if it is gone."""
+        data = self._link.receive(timeout_us)
+        at_us = time.time_ns() // 1_000
+        return self._decoder.take(at_us, data, to_device=self._from_host) if data else []
+
+    def close(self) -> None:
+        """Close the port."""
+        self._link.close()
+
+
+def open_lines(
+    words: Sequence[LineWord], buses: Sequence[BusWord], options: BusOptions
+) -> LiveSource[Listened]:
+    """Open serial ports, and buses beside them.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: a port or bus that cannot be opened.
+    """
+    readers: list[Reader[Listened]] = []
+    try:
+        for word in words:
+            readers.append(open_port(word))
+        for bus in buses:
+            readers.append(_open_bus(bus, options))
+    except BaseException:
+        for reader in readers:
+            reader.close()
+        raise
+    chosen: list[CandumpFilter | None] = [None] * len(words)
+    return LiveSource(readers, chosen + [bus.chosen for bus in buses])
+
+
+def open_port(word: LineWord) -> LineReader:
+    """Open a serial port; SourceFailed if that cannot be."""
+    try:
+        return LineReader(word)
+    except LinkClosed as error:
+        raise SourceFailed(str(error)) from None
+
+
+def _open_bus(word: BusWord, options: BusOptions) -> Reader[Listened]:
+    from tickrig.host.canmon.sources.bus_reader import open_bus  # noqa: PLC0415 - python-can is slow
+    from tickrig.host.canmon.sources.bus_source import merged, reader_of  # noqa: PLC0415
+
+    return reader_of(*open_bus(merged(word, options)))

@@ -1,0 +1,162 @@
+"""What comes in by itself as a source: a thread for each port reads into one bounded queue."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Iterable, Sequence
+from itertools import repeat
+from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
+
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.tally import Tally
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.serial.heard_line import HeardLine
+
+QUEUE_FRAMES: Final = 200_000
+"""Ten seconds of the busiest bus of 1 Mbit/s."""
+
+WAIT_US: Final = 100_000
+"""How long a thread may take to see that it shall end."""
+
+Item = TypeVar("Item", bound="Heard | HeardLine")
+Read_co = TypeVar("Read_co", bound="Heard | HeardLine", covariant=True)
+
+
+class Reader(Protocol[Read_co]):
+    """One bus, or one serial port, that is open.
+
+    Attributes:
+        name: what it is called.
+        lost: frames that its driver says it dropped.
+        tally: what was no frame.
+        stepped: its time passes while it is read, and it belongs to the thread that opened it.
+    """
+
+    name: str
+    lost: int
+    tally: Tally
+    stepped: bool
+
+    def read(self, timeout_us: int, /) -> Sequence[Read_co]:
+        """Wait for a first frame; LinkClosed if the bus is gone."""
+        ...
+
+    def close(self) -> None:
+        """Close the bus."""
+        ...
+
+
+class LiveSource(Generic[Item]):
+    """One or more buses or serial ports, read by a thread each.
+
+    What the caller does not fetch is kept up to a limit; frames beyond it are
+    lost, and counted. A bus in virtual time is read by the caller itself: time
+    passes while it polls.
+
+    Args:
+        readers: open buses and ports.
+        chosen: which frames of each are wanted; None for all.
+        queue_frames: frames that are kept.
+    """
+
+    live = True
+
+    def __init__(
+        self,
+        readers: Sequence[Reader[Item]],
+        chosen: Iterable[CandumpFilter | None] = repeat(None),
+        queue_frames: int = QUEUE_FRAMES,
+    ) -> None:
+        self._readers, self._queue_frames = readers, queue_frames
+        self._queue: deque[Item] = deque()
+        self._came, self._stop, self._overruns, self._failed = threading.Event(), False, 0, ""
+        pairs = list(zip(readers, chosen, strict=False))
+        self._stepped = [pair for pair in pairs if pair[0].stepped]
+        self._threads = [
+            threading.Thread(target=self._receive, args=pair, daemon=True)
+            for pair in pairs
+            if not pair[0].stepped
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Say that a bus is gone, and all that came was fetched."""
+        return (bool(self._failed) or self._stop) and not self._queue
+
+    @property
+    def lost(self) -> int:
+        """Frames that the drivers dropped or that found the queue full."""
+        return self._overruns + sum(reader.lost for reader in self._readers)
+
+    @property
+    def unread(self) -> int:
+        """Frames that came and could not be taken, as those of CAN FD."""
+        return sum(reader.tally.unread for reader in self._readers)
+
+    @property
+    def failed(self) -> str:
+        """Why a bus is gone."""
+        return self._failed
+
+    def poll(self, timeout_us: int, /) -> list[Item]:
+        """Wait for a first frame, then return all that are there."""
+        for reader, chosen in self._stepped:
+            self._take(reader, chosen, timeout_us)
+        if not self._queue and not self._stepped and not self.ended:
+            self._came.wait(timeout_us / 1e6)
+        self._came.clear()
+        return [self._queue.popleft() for _ in range(len(self._queue))]
+
+    def words(self) -> list[str]:
+        """Say what was no frame or got lost."""
+        remarks = (word for one in self._readers for word in one.tally.remarks(one.name))
+        return [*self.losses(), *remarks]
+
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        said = [word for reader in self._readers for word in reader.tally.losses(reader.name)]
+        said += [
+            f"{one.name}: its driver lost {one.lost} frames" for one in self._readers if one.lost
+        ]
+        return said + ([f"{self._overruns} frames found the queue full"] if self._overruns else [])
+
+    def close(self) -> None:
+        """Close the buses."""
+        if self._stop:
+            return
+        self._stop = True
+        for thread in self._threads:
+            thread.join()
+        for reader in self._readers:
+            reader.close()
+
+    def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
+        while not self._stop and not self._failed:
+            self._take(reader, chosen, WAIT_US)
+        self._came.set()
+
+    def _take(self, reader: Reader[Item], chosen: CandumpFilter | None, timeout_us: int) -> None:
+        try:
+            heard = reader.read(timeout_us)
+        except LinkClosed as error:
+            self._failed = str(error)
+            return
+        if chosen is not None:
+            heard = [one for one in heard if _passes(chosen, one)]
+        room = self._queue_frames - len(self._queue)
+        if len(heard) > room:
+            self._overruns += len(heard) - room
+            heard = heard[:room]
+        self._queue += heard
+        if heard:
+            self._came.set()
+
+
+def _passes(chosen: CandumpFilter, one: Heard | HeardLine) -> bool:
+    return not isinstance(one, Heard) or chosen.passes(flagged_id(one))

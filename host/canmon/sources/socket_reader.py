@@ -1,0 +1,121 @@
+"""A SocketCAN bus, read from its socket: with the frames that the kernel dropped.
+
+The kernel counts frames for which a socket's queue had no room, and tells the
+count with each frame that is read (socket(7), SO_RXQ_OVFL). Frames of CAN FD and
+CAN XL it shows to sockets alone that want them (linux, networking/can). python-can
+asks for neither; here all is asked for, and what is not classic CAN is counted.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+from contextlib import suppress
+from select import select
+from typing import Any, Final
+
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
+
+SO_RXQ_OVFL: Final = 40
+SO_TIMESTAMPNS: Final = 35
+SO_RCVBUFFORCE: Final = 33
+SOL_CAN_RAW: Final = 101
+CAN_RAW_FD_FRAMES: Final = 5
+CAN_RAW_XL_FRAMES: Final = 7
+RECEIVE_BYTES: Final = 4 << 20
+"""Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
+
+BATCH: Final = 1_024
+
+_EXTENDED: Final = 0x8000_0000
+_REMOTE: Final = 0x4000_0000
+_STANDARD_MASK: Final = 0x7FF
+_FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame, linux/can.h
+_FD_BYTES: Final = 72  # struct canfd_frame; a frame of CAN XL is cut to as many
+_FLAGS_AT: Final = 4  # flags of struct canxl_frame, where others have a length below
+_XL_FLAG: Final = 0x80
+_STAMP: Final = struct.Struct("@ll")
+_COUNT: Final = struct.Struct("@I")
+_ANCILLARY: Final = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_COUNT.size)
+
+
+class SocketReader:
+    """The socket of an open SocketCAN bus of python-can.
+
+    Args:
+        bus: the bus; nobody else reads from it.
+        name: what it is called in what is heard.
+
+    Attributes:
+        lost: frames that the kernel dropped because its queue was full.
+        tally: what was no frame.
+        stepped: never.
+    """
+
+    stepped = False
+
+    def __init__(self, bus: Any, name: str) -> None:
+        self._bus, self.name = bus, name
+        self._socket: socket.socket = bus.socket
+        self.lost, self.tally = 0, Tally()
+        self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        for option in (CAN_RAW_FD_FRAMES, CAN_RAW_XL_FRAMES):
+            with suppress(OSError):  # older kernels have no such frames
+                self._socket.setsockopt(SOL_CAN_RAW, option, 1)
+        _enlarge(self._socket)
+        self._socket.setblocking(False)
+
+    def read(self, timeout_us: int, /) -> list[Heard]:
+        """Wait for a first frame; LinkClosed if the bus is gone."""
+        heard: list[Heard] = []
+        select([self._socket], [], [], timeout_us / 1e6)
+        try:
+            while len(heard) < BATCH:
+                heard += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY))
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            if not heard:
+                raise LinkClosed(f"{self.name}: {error.strerror}") from error
+        return heard
+
+    def close(self) -> None:
+        """Close the bus."""
+        self._bus.shutdown()
+
+    def _heard(
+        self, data: bytes, ancillary: list[tuple[int, int, bytes]], flags: int, address: Any
+    ) -> tuple[Heard, ...]:
+        at_us = 0
+        for _, kind, said in ancillary:
+            if kind == SO_TIMESTAMPNS:
+                seconds, nanos = _STAMP.unpack(said)
+                at_us = seconds * 1_000_000 + nanos // 1_000
+            elif kind == SO_RXQ_OVFL:
+                self.lost = _COUNT.unpack(said)[0]
+        if len(data) != _FRAME.size:
+            self.tally.passed_over[CAN_XL if data[_FLAGS_AT] & _XL_FLAG else CAN_FD] += 1
+            return ()
+        sent = bool(flags & socket.MSG_CONFIRM)  # by this very socket (linux, networking/can)
+        return (Heard(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
+
+
+def _enlarge(sock: socket.socket) -> None:
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)
+    except PermissionError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+
+
+def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:
+    if flagged & ERROR_FLAG:
+        return ErrorFrame(flagged & ERROR_CLASS_MASK, data)
+    extended, remote = bool(flagged & _EXTENDED), bool(flagged & _REMOTE)
+    can_id = flagged & (ERROR_CLASS_MASK if extended else _STANDARD_MASK)
+    if remote:
+        return CanFrame(can_id, b"", True, extended, min(length, 8))
+    return CanFrame(can_id, data[:length], False, extended)

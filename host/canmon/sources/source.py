@@ -1,0 +1,147 @@
+"""Where frames come from: buses, log files or standard input, under one face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from inspect import cleandoc
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import click
+
+from tickrig.host.canmon.sources.file_source import FileSource
+from tickrig.host.canmon.sources.source_word import BusWord, FileWord, LineWord, parse_source
+from tickrig.host.canmon.sources.stdin_source import StdinSource
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.frames.heard import Heard
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.serial.heard_line import Listened
+
+SOURCE_HELP = """\b
+SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
+         can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
+         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
+         serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
+         run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
+         -                         standard input: what candump or canmon dump prints"""
+"""For the help text of a verb that takes SOURCE words."""
+
+
+def explain_sources(command: click.Command) -> None:
+    """Put what a SOURCE may be in the place of `{source}` in a command's help."""
+    command.help = cleandoc(command.help or "").replace("{source}", SOURCE_HELP)
+
+
+Taken_co = TypeVar("Taken_co", covariant=True)
+
+
+class AnySource(Protocol[Taken_co]):
+    """Frames, or lines of a serial port, as they come in.
+
+    Attributes:
+        live: it goes on by itself; False where all of it is there already.
+    """
+
+    live: bool
+
+    @property
+    def ended(self) -> bool:
+        """Say that no more will come."""
+        ...
+
+    @property
+    def lost(self) -> int:
+        """Frames that were there and did not get here, as far as anybody told."""
+        ...
+
+    @property
+    def unread(self) -> int:
+        """Lines and frames that got here and could not be taken, as noise and CAN FD."""
+        ...
+
+    @property
+    def failed(self) -> str:
+        """Why it ended before its time; empty if it did not."""
+        ...
+
+    def poll(self, timeout_us: int, /) -> Sequence[Taken_co]:
+        """Wait for a first frame, then return all that are there; none if none came."""
+        ...
+
+    def words(self) -> list[str]:
+        """Say what was no frame or got lost, one line each."""
+        ...
+
+    def losses(self) -> list[str]:
+        """Say what of it got lost or could not be taken: not what is no frame by its nature."""
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds; closing twice is no error."""
+        ...
+
+
+class Source(AnySource[Heard], Protocol):
+    """Frames as they come in."""
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Wait for a first frame, then return all that are there; none if none came."""
+        ...
+
+
+def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:
+    """Open what SOURCE words name: one or more buses, or files, or standard input.
+
+    Files are merged by time; buses are read as frames come in.
+
+    Args:
+        words: SOURCE words; without any the options name a bus.
+        options: interface, bit rate and such of the buses.
+
+    Raises:
+        Refused: words that name nothing, or things that do not go together.
+        SourceFailed: a bus or file that cannot be opened.
+    """
+    options = options or BusOptions()
+    if not words and not options:
+        raise Refused(
+            "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
+        )
+    parsed = [parse_source(word) for word in words]
+    files = [word for word in parsed if isinstance(word, FileWord)]
+    buses = [word for word in parsed if isinstance(word, BusWord)]
+    if parsed == [None]:
+        return StdinSource()
+    if len(files) == len(parsed) > 0:
+        return FileSource(files)
+    if any(isinstance(word, LineWord) for word in parsed):
+        raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
+    if len(buses) < len(parsed):
+        raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
+    from tickrig.host.canmon.sources.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only
+
+    return open_buses(buses or [BusWord()], options)
+
+
+def open_any(words: Sequence[str], options: BusOptions) -> AnySource[Listened]:
+    """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
+    parsed = [parse_source(word) for word in words]
+    lines = [word for word in parsed if isinstance(word, LineWord)]
+    if not lines:
+        return open_source(words, options)
+    buses = [word for word in parsed if isinstance(word, BusWord)]
+    if len(buses) + len(lines) < len(parsed):
+        raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
+    from tickrig.host.canmon.sources.line_source import open_lines  # noqa: PLC0415 - pyserial
+
+    return open_lines(lines, buses, options)
+
+
+def log_path(word: str) -> Path:
+    """Return the log file that a word names; Refused if it names none."""
+    parsed = parse_source(word)
+    if not isinstance(parsed, FileWord):
+        raise Refused(f"{word!r} is no log file")
+    return parsed.path

@@ -1,0 +1,134 @@
+"""What a SOURCE word names.
+
+>>> parse_source("slcan:/dev/ttyACM0@500k")
+BusWord(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None)
+>>> parse_source("can0,123:7FF").chosen.passes(0x123)
+True
+>>> parse_source("serial:/dev/ttyUSB0@57600,rtc-lite").protocol
+'rtc-lite'
+>>> parse_source("-") is None
+True
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.host.monitor.logs.log_format import COMPRESSED, SUFFIXES, LogFormatError, log_format
+
+INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}
+"""Short names of python-can's interfaces."""
+
+PROTOCOLS: Final = ("rrc", "rtc-lite", "rtc-lite-xor8")
+"""What is spoken on serial lines."""
+
+UDP_GROUP: Final = "239.74.163.2"
+"""The IPv4 group of python-can's udp_multicast."""
+
+_BUS: Final = re.compile(
+    r"(?:(?P<interface>[A-Za-z]\w*):)?(?P<channel>[^@]*)(?:@(?P<bitrate>[0-9]{1,9}[kM]?))?"
+)
+_LINE: Final = re.compile(
+    r"serial:(?P<port>.+?)(?:@(?P<baud>[0-9]{1,9}[kM]?))?"
+    rf",(?P<protocol>{'|'.join(PROTOCOLS)})(?P<host>,host)?"
+)
+_FACTORS: Final = {"k": 1_000, "M": 1_000_000}
+
+
+@dataclass(frozen=True, slots=True)
+class FileWord:
+    """A log file, and which frames of it are wanted."""
+
+    path: Path
+    chosen: CandumpFilter | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BusWord:
+    """A bus, and which frames of it are wanted; what is None the options say."""
+
+    interface: str | None = None
+    channel: str | None = None
+    bitrate: int | None = None
+    chosen: CandumpFilter | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LineWord:
+    """A serial port, and the protocol of its line.
+
+    Attributes:
+        port: a device or pyserial URL.
+        baud: bit/s, None for what is usual with the protocol.
+        protocol: one of `PROTOCOLS`.
+        from_host: what comes in is what the host sends.
+    """
+
+    port: str
+    baud: int | None
+    protocol: str
+    from_host: bool = False
+
+
+def parse_source(word: str) -> FileWord | BusWord | LineWord | None:
+    """Read a SOURCE word; None is standard input.
+
+    Raises:
+        Refused: it is none.
+    """
+    if word == "-":
+        return None
+    if line := _LINE.fullmatch(word):
+        baud = _bit_s(line["baud"]) if line["baud"] else None
+        return LineWord(line["port"], baud, line["protocol"], bool(line["host"]))
+    if Path(word).is_file():
+        return _file(word, "")
+    name, _, filters = word.partition(",")
+    path = Path(name)
+    if path.is_file() or path.suffix.lower() in (*SUFFIXES, COMPRESSED):
+        return _file(name, filters)
+    if name and path.is_dir():
+        raise Refused(f"SOURCE {name!r} is a folder")
+    return _bus(name, filters)
+
+
+def _file(name: str, filters: str) -> FileWord:
+    try:
+        log_format(Path(name))
+    except LogFormatError as error:
+        raise Refused(str(error)) from None
+    return FileWord(Path(name), _chosen(filters))
+
+
+def _bus(name: str, filters: str) -> BusWord:
+    match = _BUS.fullmatch(name)
+    if match is None or not name:
+        raise Refused(f"SOURCE {name!r} is not a bus as can0 or slcan:/dev/ttyACM0@500k, nor a log")
+    interface, channel, bitrate = match.group("interface", "channel", "bitrate")
+    if name in INTERFACES:
+        interface, channel = name, ""
+    if interface == "udp":
+        channel = channel or UDP_GROUP
+    return BusWord(
+        INTERFACES.get(interface, interface),
+        channel or None,
+        _bit_s(bitrate) if bitrate else None,
+        _chosen(filters),
+    )
+
+
+def _bit_s(text: str) -> int:
+    factor = _FACTORS.get(text[-1], 1)
+    return int(text.rstrip("kM")) * factor
+
+
+def _chosen(filters: str) -> CandumpFilter | None:
+    try:
+        return CandumpFilter.parse(filters) if filters else None
+    except ValueError as error:
+        raise Refused(str(error)) from None

@@ -1,0 +1,98 @@
+"""A log file that is read at once, where that is faster than frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.sources.source_word import FileWord, parse_source
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.reading.log_reader import LogError
+from tickrig.host.monitor.traffic.traffic import Snapshot
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.columns.columns import Columns
+
+SMALL_BYTES: Final = 1 << 20
+"""Below it a log is read frame by frame sooner than numpy is imported."""
+
+
+class WholeLog:
+    """All of a log file, as a source whose end is reached.
+
+    Attributes:
+        columns: its frames.
+    """
+
+    live = False
+    ended = True
+    failed = ""
+
+    def __init__(self, path: Path, columns: Columns) -> None:
+        self._name, self.columns = str(path), columns
+
+    @property
+    def lost(self) -> int:
+        """Frames that its recorder says it lost."""
+        return self.columns.tally.lost
+
+    @property
+    def unread(self) -> int:
+        """Lines and frames that could not be taken."""
+        return self.columns.tally.unread
+
+    def poll(self, timeout_us: int, /) -> list[Heard]:
+        """Return nothing: all is in the columns."""
+        return []
+
+    def words(self) -> list[str]:
+        """Say what was no frame or got lost, one line each."""
+        return self.columns.tally.words(self._name)
+
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        return self.columns.tally.losses(self._name)
+
+    def snapshot(self) -> Snapshot:
+        """Return the statistics of all frames."""
+        from tickrig.host.monitor.columns.column_traffic import snapshot_of  # noqa: PLC0415 - numpy
+
+        return snapshot_of(self.columns)
+
+    def close(self) -> None:
+        """Close nothing: it was read."""
+
+
+def whole_log(words: Sequence[str]) -> WholeLog | None:
+    """Read the log that SOURCE words name; None if it is better read frame by frame.
+
+    Raises:
+        Refused: words that name nothing.
+        SourceFailed: a file that cannot be read.
+    """
+    path = _large_log(words)
+    if path is None:
+        return None
+    from tickrig.host.monitor.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
+
+    try:
+        return WholeLog(path, read_columns(path))
+    except OSError as error:
+        raise SourceFailed(f"{path}: {error.strerror}") from error
+    except LogError as error:
+        raise SourceFailed(str(error)) from error
+
+
+def _large_log(words: Sequence[str]) -> Path | None:
+    if len(words) != 1 or find_spec("numpy") is None:
+        return None
+    word = parse_source(words[0])
+    if not isinstance(word, FileWord) or word.chosen is not None:
+        return None
+    try:
+        return word.path if word.path.stat().st_size >= SMALL_BYTES else None
+    except OSError:
+        return None  # who reads it frame by frame says so

@@ -1,0 +1,1 @@
+"""The tabs of `canmon tui`, one module each, and the contract that they keep."""

@@ -1,0 +1,152 @@
+"""The tab of the alarms: rules that are held against the traffic while it goes on."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any, ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Static, TextArea
+
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.nested_settings import below
+from tickrig.host.canmon.tui.tasks.alarm_task import AlarmTask
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.monitor.check.alarm_text import HEAD, render_alarms
+from tickrig.host.monitor.check.alarms import State
+from tickrig.host.monitor.check.words import SWITCHES, VALUES, parse_rules
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
+
+STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
+
+
+class AlarmsPanel(Panel):
+    """Rules and findings."""
+
+    title = "alarms"
+    section = "alarms"
+    HELP = """
+    # Alarms
+
+    The rules of `canmon check`, held against what is heard. A rule is BROKEN while something is
+    missing, and for 2 s after a frame broke it; then it was broken, until somebody acknowledges.
+    What has never come is missed after 2 s. Findings are below, the latest first.
+
+    Rules are written as TOML, as for `canmon check`; F5 takes them, Escape leaves them:
+
+        no_emcy = true
+        no_sdo_abort = true
+        max_load = 60
+        nodes = [3, "16-18"]
+        heartbeat = {3 = "100ms±20%"}
+        max_gap = {181 = "20ms"}
+        known = ["080", "181-18F"]
+    """
+    DEFAULT_CSS = """
+    AlarmsPanel TextArea { display: none; height: 12; }
+    AlarmsPanel #wrong { display: none; height: auto; color: $error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "acknowledge", "acknowledge"),
+        Binding("c", "clear", "clear"),
+        Binding("e", "edit", "rules"),
+        Binding("f5", "apply", "take the rules", key_display="F5"),
+        Binding("escape", "leave", "leave the rules", show=False),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.held = AlarmTask(session.model)
+        session.tasks.append(self.held)
+        self.rules_text = ""
+        self._lines: list[str] = []
+
+    def compose(self) -> ComposeResult:
+        """Lay out rules and findings."""
+        yield LineView()
+        yield Static(id="wrong", markup=False)
+        yield TextArea(tab_behavior="focus")
+
+    def snapshot(self, model: Model) -> None:
+        """Keep how the rules stand."""
+        self._lines = render_alarms(self.held.alarms, model.now_us)
+
+    def paint(self) -> None:
+        """Show it."""
+        lines = [_styled(line) for line in self._lines]
+        if not self.held.alarms.rows():
+            lines = [plain("no rules: e writes some, F1 shows how")]
+        self.query_one(LineView).show(lines)
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take the rules."""
+        words = settings.get("rules", {})
+        if not isinstance(words, Mapping):
+            raise SettingError(("rules",), "is no table of rules")
+        with below("rules"):
+            self.held.hold(parse_rules(words))
+        self.rules_text = rules_toml(words)
+
+    def save(self) -> dict[str, Any]:
+        """Return them; those that do not hold are None, so that a workspace leaves them out."""
+        rules = dict.fromkeys((*SWITCHES, *VALUES))
+        return {"rules": {**rules, **tomllib.loads(self.rules_text)}}
+
+    def action_acknowledge(self) -> None:
+        """Take note of all that was broken."""
+        with self.session.lock:
+            self.held.alarms.acknowledge()
+        self.look()
+
+    def action_clear(self) -> None:
+        """Begin anew."""
+        with self.session.lock:
+            self.held.alarms.clear()
+        self.look()
+
+    def action_edit(self) -> None:
+        """Write rules."""
+        area = self.query_one(TextArea)
+        area.text, area.display = self.rules_text, True
+        area.focus()
+
+    def action_apply(self) -> None:
+        """Hold the rules that are written; say what is wrong with them."""
+        area, wrong = self.query_one(TextArea), self.query_one("#wrong", Static)
+        if not area.display:
+            return
+        try:
+            rules = parse_rules(tomllib.loads(area.text))
+            with self.session.lock:
+                self.held.hold(rules)
+        except ValueError as error:
+            wrong.update(str(error))
+            wrong.display = True
+            return
+        self.rules_text = area.text
+        self.action_leave()
+
+    def action_leave(self) -> None:
+        """Go back to the alarms."""
+        self.query_one(TextArea).display = self.query_one("#wrong").display = False
+        self.query_one(LineView).focus()
+        self.look()
+
+
+def rules_toml(words: Mapping[str, Any]) -> str:
+    """Write rules as a person would."""
+    import tomlkit  # noqa: PLC0415 - an extra
+
+    return tomlkit.dumps(words)
+
+
+def _styled(line: str) -> Line:
+    if line == HEAD or line.startswith("FINDINGS"):
+        return plain(line, "bold")
+    found = next((style for state, style in STYLES.items() if f" {state} " in line), "")
+    return plain(line, found)

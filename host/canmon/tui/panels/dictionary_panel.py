@@ -1,0 +1,200 @@
+"""The tab of the object dictionary: the objects of one node, read and written by SDO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.settings import text_of
+from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.sending_bus import next_bus
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.widgets.ask_line import AskLine
+from tickrig.host.canmon.tui.widgets.choice_view import ChoiceView
+from tickrig.host.canmon.tui.widgets.title_line import TitleLine
+from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
+from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
+from tickrig.host.monitor.dictionary.object_row import ObjectRow
+from tickrig.host.monitor.dictionary.object_words import encode_words
+from tickrig.host.tui.line import Line, plain
+
+
+class DictionaryPanel(Panel):
+    """Objects that the EDS names or that were heard, with their latest values."""
+
+    title = "objects"
+    section = "objects"
+    HELP = """
+    # Objects of a node
+
+    What the EDS names, and what was heard of the node: each object with its latest value, where
+    that is from (eds: its power-on value, sdo, pdo) and its age. Why a transfer failed stands
+    behind it. Values come from the traffic, whoever asked for them.
+
+    Reading and writing need the monitor armed (A); they use the default SDO of the node (1200h).
+    A value is written as it is shown, in the same unit; bytes in hex where the type is not known.
+    """
+    DEFAULT_CSS = """
+    DictionaryPanel #node { background: $boost; }
+    DictionaryPanel #head { text-style: bold; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("n", "next_node(1)", "node", key_display="n N"),
+        Binding("N", "next_node(-1)", "node before", show=False),
+        Binding("g", "go", "go to node"),
+        Binding("enter,r", "read", "read", key_display="r"),
+        Binding("R", "read_all", "read all"),
+        Binding("e", "write", "write"),
+        Binding("space", "watch", "watch"),
+        Binding("slash", "filter", "filter", key_display="/"),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.client = DictionaryTask(session.model.decoder)
+        session.tasks.append(self.client)
+        self.node: Node | None = None
+        self.filter_text = ""
+        self._wanted_node = 0
+        self._known: list[Node] = []
+        self._rows: list[ObjectRow] = []
+        self._lines: list[str] = []
+        self._state = ""
+
+    def compose(self) -> ComposeResult:
+        """Lay out node, titles and objects."""
+        yield TitleLine("node")
+        yield TitleLine("head")
+        yield ChoiceView()
+        yield AskLine()
+
+    def snapshot(self, model: Model) -> None:
+        """Keep the objects of the node."""
+        self._known = [(row.channel, row.node) for row in model.board.rows()]
+        if self.node is None and self._known:
+            told = [node for node in self._known if node[1] == self._wanted_node]
+            self._choose((told or self._known)[0])
+        self._rows = []
+        if self.node is not None:
+            self._rows = self.client.objects(self.node).rows(self.filter_text)
+        self._lines = render_dictionary(self._rows, model.now_us)
+        left = f"{self.client.left} transfers left" if self.client.left else self.client.said
+        self._state = "   ".join([self._title(), *filter(None, [left])])
+
+    def paint(self) -> None:
+        """Show them."""
+        head, *_ = self._lines
+        self.query_one("#node", TitleLine).show(self._state)
+        self.query_one("#head", TitleLine).show("  " + head)
+        lines = [
+            self._line(row, text) for row, text in zip(self._rows, self._lines[1:], strict=True)
+        ]
+        self.query_one(ChoiceView).show(lines or [plain("no object: give --eds, or g and a node")])
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take node and filter."""
+        node = settings.get("node", 0)
+        if type(node) is not int or not 0 <= node <= 127:
+            raise SettingError(("node",), f"{node!r} is no node-ID 1 to 127, nor 0 for any")
+        self._wanted_node = node
+        self.filter_text = text_of(settings, "filter", "")
+
+    def save(self) -> dict[str, Any]:
+        """Return them."""
+        return {"node": self._wanted_node, "filter": self.filter_text}
+
+    def action_next_node(self, steps: int) -> None:
+        """Show the next node that was heard or has an EDS."""
+        if self._known:
+            place = self._known.index(self.node) if self.node in self._known else -steps
+            self._show(self._known[(place + steps) % len(self._known)])
+
+    def action_go(self) -> None:
+        """Ask for a node-ID."""
+        self.query_one(AskLine).ask("node-ID 1 to 127", "", self._go)
+
+    def action_read(self) -> None:
+        """Read the chosen object."""
+        self._transfer(lambda row: self.client.read(self.session.now_us, row.entry))
+
+    def action_read_all(self) -> None:
+        """Read all objects that are shown."""
+        if self._may_send():
+            with self.session.lock:
+                for row in self._rows:
+                    self.client.read(self.session.now_us, row.entry)
+            self.look()
+
+    def action_watch(self) -> None:
+        """Read the chosen object each second, or no more."""
+        self._transfer(lambda row: self.client.watch(self.session.now_us, row.entry))
+
+    def action_write(self) -> None:
+        """Ask for a value of the chosen object, and write it."""
+        row = self._chosen()
+        if row is not None and self._may_send():
+            kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))
+            question = f"{write_entry(row.entry)} {row.text.name} ({kind})"
+            self.query_one(AskLine).ask(question, "", lambda text: self._write(row, text))
+
+    def action_filter(self) -> None:
+        """Ask for a part of a name, or the begin of an index."""
+        self.query_one(AskLine).ask("name or index", self.filter_text, self._filter)
+
+    def _show(self, node: Node) -> None:
+        with self.session.lock:
+            self._choose(node)
+        self._wanted_node = node[1]
+        self.look()
+
+    def _choose(self, node: Node) -> None:
+        self.node = node
+        self.client.choose(node)
+
+    def _go(self, text: str) -> None:
+        if not text.isdecimal() or not 1 <= int(text) <= 127:
+            raise ValueError(f"{text!r} is no node-ID 1 to 127")
+        bus = self.node[0] if self.node else next_bus(self.session, "")
+        self._show((bus, int(text)))
+
+    def _filter(self, text: str) -> None:
+        self.filter_text = text
+        self.look()
+
+    def _write(self, row: ObjectRow, text: str) -> None:
+        data = encode_words(row.text, text)
+        with self.session.lock:
+            self.client.write(self.session.now_us, row.entry, data)
+        self.look()
+
+    def _transfer(self, act: Callable[[ObjectRow], None]) -> None:
+        row = self._chosen()
+        if row is not None and self._may_send():
+            with self.session.lock:
+                act(row)
+            self.look()
+
+    def _chosen(self) -> ObjectRow | None:
+        number = self.query_one(ChoiceView).chosen
+        return self._rows[number] if number < len(self._rows) else None
+
+    def _may_send(self) -> bool:
+        if not self.session.armed:
+            self.notify("not armed: nothing is sent; A arms", markup=False)
+        return self.session.armed
+
+    def _title(self) -> str:
+        if self.node is None:
+            return "no node was heard"
+        wanted = f"   filter {self.filter_text}" if self.filter_text else ""
+        return f"{self.node[0]} node {self.node[1]}{wanted}"
+
+    def _line(self, row: ObjectRow, text: str) -> Line:
+        mark = "* " if row.entry in self.client.watched else "  "
+        return plain(mark + text, "red" if row.trouble else "")

@@ -1,0 +1,232 @@
+"""The tab of the graph: curves of signals, live or of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import click
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.nested_settings import below, texts_of
+from tickrig.host.canmon.tui.settings.settings import text_of
+from tickrig.host.canmon.tui.tasks.graph_task import GraphTask
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.widgets.ansi_colour import colour_line
+from tickrig.host.canmon.tui.widgets.ask_line import AskLine
+from tickrig.host.canmon.tui.widgets.picture_view import PictureView
+from tickrig.host.canmon.tui.widgets.title_line import TitleLine
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.graph.drawing.plot import LABEL_WIDTH
+from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
+from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
+from tickrig.host.monitor.graph.view import LEAST_US
+from tickrig.host.tui.line import Line
+
+PICTURE: Final = (960, 400)
+QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"
+EMPTY: Final = "no signals: a adds one, F1 shows how"
+
+
+class GraphPanel(Panel):
+    """Curves with a cursor, several axes, zoom in both directions."""
+
+    title = "graph"
+    section = "graph"
+    HELP = """
+    # Graph
+
+    A signal is an object, as `5.velocity_actual_value` or `5.statusword.fault`, or a slice, as
+    `181[2:6]s*0.001`; `LABEL=` before it names it, `@2` behind it takes another axis. One that is
+    added later has the values of the frames that are still in the trace. A spike never vanishes.
+
+    Live shows the latest time; moving, the cursor and space stop the picture, not the recording.
+    Up, down, i and o change the vertical axis that y chooses; r lets it fit again.
+    """
+    DEFAULT_CSS = "GraphPanel #state { background: $boost; }"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("a", "add", "add"),
+        Binding("x", "remove", "remove"),
+        Binding("plus,equals_sign", "zoom(2)", "zoom", key_display="+ -"),
+        Binding("minus", "zoom(0.5)", "zoom out", show=False),
+        Binding("left", "cursor(-0.01)", "cursor", key_display="← →"),
+        Binding("right", "cursor(0.01)", "cursor right", show=False),
+        Binding("shift+left", "cursor(-0.1)", "cursor far left", show=False),
+        Binding("shift+right", "cursor(0.1)", "cursor far right", show=False),
+        Binding("comma", "move(-0.25)", "move", key_display=", ."),
+        Binding("full_stop", "move(0.25)", "move on", show=False),
+        Binding("l", "show('live')", "live"),
+        Binding("h", "show('all')", "all"),
+        Binding("space", "show('held')", "hold"),
+        Binding("y", "next_axis", "axis"),
+        Binding("up", "lift(0.1)", "axis up", show=False),
+        Binding("down", "lift(-0.1)", "axis down", show=False),
+        Binding("i", "stretch(2)", "axis closer", show=False),
+        Binding("o", "stretch(0.5)", "axis farther", show=False),
+        Binding("r", "fit", "fit axis", show=False),
+        Binding("c", "clear", "clear"),
+        Binding("s", "write", "write a file"),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.graph = LiveGraph(Sight.LIVE if session.source.live else Sight.ALL)
+        session.tasks.append(GraphTask(self.graph))
+        self._texts: list[str] = []
+        self._lines: list[Line] = []
+
+    def compose(self) -> ComposeResult:
+        """Lay out state and picture."""
+        yield TitleLine("state")
+        yield PictureView()
+        yield AskLine()
+
+    def snapshot(self, model: Model) -> None:
+        """Draw the picture: it reads the samples."""
+        self.graph.now_us = model.now_us
+        width, height = self.query_one(PictureView).size
+        if self.graph.words:
+            self._lines = [colour_line(line) for line in self.graph.render(width, height)]
+        else:
+            self._lines = [((EMPTY, ""),)]
+
+    def paint(self) -> None:
+        """Show it."""
+        self.query_one("#state", TitleLine).show(self._state())
+        self.query_one(PictureView).show(self._lines)
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take signals and window."""
+        for number, text in enumerate(texts_of(settings, "signals")):
+            with below("signals", number):
+                self._add_signal(text)
+        window = text_of(settings, "window", "10s")
+        with below("window"):
+            self.graph.window_us = max(LEAST_US, parse_time_us(window))
+
+    def save(self) -> dict[str, Any]:
+        """Return them."""
+        return {"signals": list(self._texts), "window": time_text(self.graph.window_us)}
+
+    def action_add(self) -> None:
+        """Ask for a signal."""
+        self.query_one(AskLine).ask(QUESTION, "", self._add)
+
+    def action_remove(self) -> None:
+        """Ask which signal is shown no more."""
+        if self._texts:
+            self.query_one(AskLine).ask("take out", self._texts[-1], self._remove)
+
+    def action_zoom(self, factor: float) -> None:
+        """Come closer in time."""
+        self._act(lambda: self.graph.zoom(factor))
+
+    def action_move(self, fraction: float) -> None:
+        """Move in time."""
+        self._act(lambda: self.graph.move(fraction))
+
+    def action_cursor(self, fraction: float) -> None:
+        """Move the cursor."""
+        self._act(lambda: self.graph.move_cursor(fraction))
+
+    def action_show(self, sight: str) -> None:
+        """See what comes, all, or what stands still."""
+        self._act(lambda: self.graph.show(Sight(sight)))
+
+    def action_next_axis(self) -> None:
+        """Choose a vertical axis."""
+        self._act(self.graph.next_axis)
+
+    def action_lift(self, fraction: float) -> None:
+        """Move the vertical axis."""
+        self._act(lambda: self.graph.lift(fraction))
+
+    def action_stretch(self, factor: float) -> None:
+        """Come closer in height."""
+        self._act(lambda: self.graph.stretch(factor))
+
+    def action_fit(self) -> None:
+        """Fit the vertical axis."""
+        self._act(self.graph.fit)
+
+    def action_clear(self) -> None:
+        """Forget all samples."""
+        self._act(self.graph.clear)
+
+    def action_write(self) -> None:
+        """Ask for a file, and write the picture or the samples."""
+        self.query_one(AskLine).ask("file: .svg .html .png .csv", "graph.svg", self._write)
+
+    def on_picture_view_pointed(self, event: PictureView.Pointed) -> None:
+        """Put the cursor where the mouse is."""
+        with self.session.lock:
+            view = self.graph.view()
+            inner = max(1, self.query_one(PictureView).size.width - LABEL_WIDTH - 1)
+            share = min(max(0.0, (event.x - LABEL_WIDTH - 1) / inner), 1.0)
+            self.graph.cursor_us = view.from_us + round(view.span_us * share)
+            self.graph.move_cursor(0)
+        self.look()
+
+    def _act(self, act: Callable[[], None]) -> None:
+        with self.session.lock:
+            act()
+        self.look()
+
+    def _add(self, text: str) -> None:
+        self._add_signal(text)
+        self.look()
+
+    def _add_signal(self, text: str) -> None:
+        word: SignalWord = parse_signal(text)
+        with self.session.lock:
+            trace = self.session.model.trace
+            rows = trace.rows(trace.first, trace.count)
+            heard = ((row.heard, row.decoded) for row in rows)
+            self.graph.add(word, ((one, meant) for one, meant in heard if isinstance(one, Heard)))
+        self._texts.append(text)
+
+    def _remove(self, text: str) -> None:
+        if text not in self._texts:
+            raise ValueError(f"{text!r} is none of {', '.join(self._texts)}")
+        number = self._texts.index(text)
+        with self.session.lock:
+            self.graph.remove(number)
+        del self._texts[number]
+        self.look()
+
+    def _write(self, text: str) -> None:
+        path = Path(text)
+        try:
+            check_graph_path(path)
+            with self.session.lock:
+                series, view = deepcopy(self.graph.series), self.graph.view()
+            write_graph(path, series, view, PICTURE)
+        except click.ClickException as error:
+            raise ValueError(error.message) from None
+        self.notify(f"{path} is written", markup=False)
+
+    def _state(self) -> str:
+        graph = self.graph
+        words = [str(graph.sight), f"window {graph.window_us / 1e6:g} s", f"axis {graph.axis}"]
+        if graph.cursor_us is not None:
+            words.append(f"cursor at {graph.view().seconds(graph.cursor_us):.6f} s")
+        return "   ".join(words)
+
+
+def time_text(time_us: int) -> str:
+    """Write a time so that it is read again.
+
+    >>> time_text(10_000_000), time_text(1_500), time_text(2_000)
+    ('10s', '1500us', '2ms')
+    """
+    for unit, size_us in (("s", 1_000_000), ("ms", 1_000)):
+        if time_us % size_us == 0:
+            return f"{time_us // size_us}{unit}"
+    return f"{time_us}us"

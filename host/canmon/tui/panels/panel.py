@@ -1,0 +1,74 @@
+"""What every tab of the monitor is: the contract between the frame and its panels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from textual.containers import Vertical
+
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.tui.line_view import LineView
+
+
+class Panel(Vertical):
+    """A tab.
+
+    While it is shown, the frame calls `look` ten times a second; so may the
+    panel itself after a key. Keys are Textual `BINDINGS`, each with a
+    description; `HELP` is Markdown. Both are shown by F1.
+
+    A panel that hears every frame, or sends, puts a `Task` into
+    `session.tasks` when it is made.
+
+    Args:
+        session: what is heard, and how to send.
+
+    Attributes:
+        title: of the tab.
+        section: its table in the workspace, and the id of its widget.
+        session: what is heard, and how to send.
+    """
+
+    title: ClassVar[str] = ""
+    section: ClassVar[str] = ""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(id=self.section)
+        self.session = session
+
+    def enter(self) -> None:
+        """Let the keys go to it; it has come onto the screen."""
+        for widget in (*self.query(LineView), *self.query("*")):
+            if widget.focusable:
+                widget.focus()
+                return
+
+    def look(self) -> None:
+        """Take a snapshot of the model, and paint it."""
+        with self.session.lock:
+            self.snapshot(self.session.model)
+        self.paint()
+
+    def snapshot(self, model: Model) -> None:
+        """Keep what of the model is painted; the session waits meanwhile, so be quick."""
+
+    def paint(self) -> None:
+        """Show what the snapshot kept; the panel is on the screen."""
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take settings of the workspace, before the panel is on a screen.
+
+        Keys that are not its own it leaves alone: they survive in the file.
+
+        Raises:
+            SettingError: a value that is none; says which.
+        """
+
+    def save(self) -> dict[str, Any]:
+        """Return all its settings as TOML values: tables, arrays, text, numbers, truth.
+
+        It is asked also while the panel is on no screen: do not look at widgets.
+        """
+        return {}

@@ -1,0 +1,241 @@
+"""The tab of the sequences: an editor, and what a sequence does when it runs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.widgets import Static, TextArea
+
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.sending_bus import checked_bus, next_bus
+from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
+from tickrig.host.canmon.tui.tasks.sequence_texts import (
+    NEW,
+    read_texts,
+    sequence_name,
+    texts_settings,
+)
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.widgets.ask_line import AskLine
+from tickrig.host.canmon.tui.widgets.title_line import TitleLine
+from tickrig.host.monitor.sequence.line_sequence import SequenceError
+from tickrig.host.monitor.sequence.note_text import note_line
+from tickrig.host.monitor.sequence.sequence_run import Mark, Note
+from tickrig.host.monitor.sequence.steps import Sequence, outline
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
+
+STYLES: Final = {Mark.MET: "green", Mark.MISSED: "bold red", Mark.END: "bold"}
+_PLACE: Final = re.compile(r".*?:([0-9]+): ")
+
+
+class SequencePanel(Panel):
+    """Sequences, one of them in the editor."""
+
+    title = "sequence"
+    section = "sequence"
+    HELP = """
+    # Sequence
+
+    Steps send, wait, expect and repeat, as for `canmon seq`; a text that begins with `+` or `loop`
+    has plain lines. F5 runs the sequence of the editor, once the monitor is armed (A); F9 stops it
+    and all else. F7 shows its steps and sends nothing. Escape leaves the editor, e goes back.
+
+        name = "start"
+
+        [[step]]
+        send = ["000#0105", "5.rpdo1 target=100"]
+
+        [[step]]
+        expect = "705#05"           # or a filter: 5.statusword.fault
+        within = "300ms"
+        on-fail = "go-on"           # "stop", or a list of steps
+
+        [[step]]
+        repeat = 3                  # or "forever"
+        steps = [{send = "080#"}, {wait = "10ms"}]
+    """
+    DEFAULT_CSS = """
+    SequencePanel #state { background: $boost; }
+    SequencePanel #mistake { display: none; height: auto; color: $error; }
+    SequencePanel LineView { width: 1fr; height: 1fr; }
+    SequencePanel TextArea { width: 1fr; height: 1fr; border: none; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("f5", "run", "run", key_display="F5"),
+        Binding("f6", "stop", "stop", key_display="F6"),
+        Binding("f7", "steps", "steps", key_display="F7"),
+        Binding("e", "edit", "edit"),
+        Binding("escape", "leave", "leave the editor", show=False),
+        Binding("comma", "turn(-1)", "other", key_display=", ."),
+        Binding("full_stop", "turn(1)", "next", show=False),
+        Binding("n", "new", "new"),
+        Binding("x", "remove", "remove", show=False),
+        Binding("o", "open", "open a file", show=False),
+        Binding("s", "write", "write a file", show=False),
+        Binding("b", "bus", "bus"),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.runner = SequenceTask(session.model.eds)
+        session.tasks.append(self.runner)
+        self.texts, self.number = [NEW], 0
+        self._steps: list[str] = []
+        self._notes: list[Note] = []
+        self._going = False
+
+    def compose(self) -> ComposeResult:
+        """Lay out what happens and the editor."""
+        yield TitleLine("state")
+        with Horizontal():
+            yield LineView()
+            yield TextArea(self.texts[self.number], tab_behavior="focus", show_line_numbers=True)
+        yield Static(id="mistake", markup=False)
+        yield AskLine()
+
+    def snapshot(self, model: Model) -> None:
+        """Keep what happened."""
+        self._notes, self._going = list(self.runner.notes), self.runner.running
+
+    def paint(self) -> None:
+        """Show it, the latest in view; or the steps."""
+        self.query_one("#state", TitleLine).show(self._state())
+        view = self.query_one(LineView)
+        follows = view.follows
+        lines = [plain(line) for line in self._steps] or list(map(_line, self._notes))
+        view.show(lines or [plain("F5 runs it, F7 shows its steps")])
+        if follows:
+            view.show_end()
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take the bus and the sequences."""
+        self.runner.channel = checked_bus(self.session, settings)
+        self.texts = read_texts(settings) or [NEW]
+
+    def save(self) -> dict[str, Any]:
+        """Return them."""
+        return {"bus": self.runner.channel, "item": texts_settings(self.texts)}
+
+    def on_text_area_changed(self, event: TextArea.Changed) -> None:
+        """Keep what is written."""
+        self.texts[self.number] = event.text_area.text
+
+    def action_run(self) -> None:
+        """Carry out the sequence of the editor."""
+        sequence = self._read()
+        if sequence is None:
+            return
+        if not self.session.armed:
+            self.notify("not armed: nothing is sent; A arms", markup=False)
+            return
+        self._steps = []
+        with self.session.lock:
+            self.runner.start(sequence)
+        self.look()
+
+    def action_stop(self) -> None:
+        """Give it up."""
+        with self.session.lock:
+            self.runner.stop()
+        self.look()
+
+    def action_steps(self) -> None:
+        """Show the steps; nothing is sent."""
+        sequence = self._read()
+        if sequence is not None:
+            self._steps = outline(sequence.steps)
+            self.look()
+
+    def action_edit(self) -> None:
+        """Go to the editor."""
+        self.query_one(TextArea).focus()
+
+    def action_leave(self) -> None:
+        """Leave the editor."""
+        self.query_one(LineView).focus()
+
+    def action_turn(self, steps: int) -> None:
+        """Edit another sequence."""
+        self._open((self.number + steps) % len(self.texts))
+
+    def action_new(self) -> None:
+        """Begin a new sequence."""
+        self.texts.append(NEW)
+        self._open(len(self.texts) - 1)
+
+    def action_remove(self) -> None:
+        """Forget the sequence of the editor."""
+        del self.texts[self.number]
+        self.texts = self.texts or [NEW]
+        self._open(min(self.number, len(self.texts) - 1))
+
+    def action_open(self) -> None:
+        """Ask for a file, and read a sequence from it."""
+        self.query_one(AskLine).ask("read a sequence from file", "", self._read_file)
+
+    def action_write(self) -> None:
+        """Ask for a file, and write the sequence to it."""
+        name = f"{self._called()}.toml"
+        self.query_one(AskLine).ask("write the sequence to file", name, self._write_file)
+
+    def action_bus(self) -> None:
+        """Send on the next bus."""
+        with self.session.lock:
+            self.runner.stop()
+            self.runner.channel = next_bus(self.session, self.runner.channel)
+        self.look()
+
+    def _read(self) -> Sequence | None:
+        """Return the sequence of the editor; say what is wrong with it, and go there."""
+        wrong, area = self.query_one("#mistake", Static), self.query_one(TextArea)
+        try:
+            sequence = self.runner.parse(area.text, self._called())
+        except SequenceError as error:
+            wrong.update(str(error))
+            wrong.display = True
+            place = _PLACE.match(str(error))
+            area.move_cursor((int(place[1]) - 1 if place else 0, 0))
+            return None
+        wrong.display = False
+        return sequence
+
+    def _open(self, number: int) -> None:
+        self.number, self._steps = number, []
+        self.query_one(TextArea).text = self.texts[number]
+        self.look()
+
+    def _read_file(self, text: str) -> None:
+        try:
+            found = Path(text).read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ValueError(f"{text}: {getattr(error, 'strerror', '') or 'is no text'}") from None
+        self.texts.append(found)
+        self._open(len(self.texts) - 1)
+
+    def _write_file(self, text: str) -> None:
+        try:
+            Path(text).write_text(self.texts[self.number], "utf-8")
+        except OSError as error:
+            raise ValueError(f"{text}: {error.strerror}") from None
+        self.notify(f"{text} is written", markup=False)
+
+    def _called(self) -> str:
+        return sequence_name(self.texts[self.number], self.number + 1)
+
+    def _state(self) -> str:
+        words = [f"{self._called()} ({self.number + 1} of {len(self.texts)})"]
+        words += [f"bus {self.runner.channel}"] * bool(self.runner.channel)
+        words += ["runs"] * self._going
+        return "   ".join(words)
+
+
+def _line(note: Note) -> Line:
+    return plain(note_line(note), STYLES.get(note.mark, ""))

@@ -1,0 +1,91 @@
+"""The tab of the statistics: all identifiers, their rates, gaps, jitter, missed cycles, bits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.settings import choice, truth
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.widgets.ansi_line import ansi_line
+from tickrig.host.monitor.views.top_table import UNBOUNDED, Order
+from tickrig.host.tui.line import Line, plain
+from tickrig.host.tui.line_view import LineView
+
+TITLE: Final = "CAN-ID"
+"""Is in the last line above the rows."""
+
+
+class StatisticsPanel(Panel):
+    """The table of `canmon top`."""
+
+    title = "statistics"
+    section = "statistics"
+    HELP = """
+    # Statistics
+
+    For each bus: frames, load of the latest second with stuff bits, error frames, the state of the
+    controller, mean and peak. For each identifier: frames, rate, the gaps between frames (min,
+    avg, p99, max), jitter, missed cycles, and the latest bytes or what they mean. A narrow window
+    leaves columns out.
+
+    Bits: `·` never changed, `▁` seldom to `█` with each frame; notch hides what changed until now.
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "press(' ')", "hold"),
+        Binding("b", "press('b')", "bits"),
+        Binding("d", "press('d')", "decode"),
+        Binding("n", "press('n')", "notch"),
+        Binding("s", "press('s')", "sort"),
+        Binding("c", "press('c')", "clear"),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self._lines: list[Line] = []
+
+    def compose(self) -> ComposeResult:
+        """Lay out the table."""
+        yield LineView()
+
+    def snapshot(self, model: Model) -> None:
+        """Keep the table as wide as the screen, and as long as it is."""
+        top = model.top
+        top.view = replace(top.view, keys=False)
+        lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
+        heads = next((number for number, line in enumerate(lines, 1) if TITLE in line), 0)
+        self._lines = [
+            plain(line, "bold") if number < heads else ansi_line(line)
+            for number, line in enumerate(lines)
+        ]
+
+    def paint(self) -> None:
+        """Show it."""
+        self.query_one(LineView).show(self._lines)
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take order and what is shown."""
+        top = self.session.model.top
+        order = choice(settings, "sort", top.view.order, list(Order))
+        bits = truth(settings, "bits", top.view.bits)
+        top.view = replace(top.view, order=Order(order), bits=bits)
+        if truth(settings, "decode", False):
+            top.press("d")
+
+    def save(self) -> dict[str, Any]:
+        """Return them."""
+        view = self.session.model.top.view
+        decode = view.meaning is not None
+        return {"sort": str(view.order), "bits": view.bits, "decode": decode}
+
+    def action_press(self, key: str) -> None:
+        """Act as `canmon top` does."""
+        with self.session.lock:
+            self.session.model.top.press(key)
+        self.look()

@@ -1,0 +1,247 @@
+"""The tab of the trace: frames one below the other, or the latest of each identifier."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.widgets import Input, Static
+
+from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings.settings import choice, text_of, truth
+from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.session import NEVER, Session
+from tickrig.host.canmon.tui.widgets.trace_line import TraceLines
+from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.monitor.decode.filter.filter import Filter, parse_filter
+from tickrig.host.monitor.decode.filter.filter_error import FilterError
+from tickrig.host.monitor.frames.dump_line import Stamp
+from tickrig.host.monitor.views.sieve import Latest, Sieve
+from tickrig.host.monitor.views.trace import Ring
+from tickrig.host.tui.line_view import Line, LineView, line_text
+from tickrig.wire.can import Frames
+
+STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
+CHANNEL_MAX: Final = 12
+
+
+class TracePanel(Panel):
+    """Frames as they come, filtered, decoded, with what changed in colour."""
+
+    title = "trace"
+    section = "trace"
+    HELP = """
+    # Trace
+
+    Each frame with its time, the time since the one before it with the same CAN-ID, its bytes and
+    what it means. Bytes that differ from those before are coloured. Frames that this program sent
+    have a coloured CAN-ID. It follows the latest frame while that is in view.
+
+    A filter: `node=3 and (pdo or emcy)`, `181-18F`, `sdo[6040h]`, `statusword.fault`,
+    `123:7FF,#FF`.
+    """
+    DEFAULT_CSS = """
+    TracePanel #wanted { display: none; height: 1; border: none; }
+    TracePanel #head { height: 1; }
+    TracePanel #wrong { display: none; height: auto; color: $error; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "pause", "pause"),
+        Binding("o", "overwrite", "overwrite"),
+        Binding("slash", "filter", "filter", key_display="/"),
+        Binding("d", "meaning", "decode"),
+        Binding("b", "bits", "bits"),
+        Binding("t", "stamp", "time"),
+        Binding("c", "clear", "clear"),
+        Binding("escape", "leave", "leave the filter", show=False),
+    ]
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.overwrite, self.filter_text = False, ""
+        self.paused: tuple[Ring, list[Latest]] | None = None
+        self._look = TraceLines()
+        self._sieve = Sieve(session.model.trace)
+        self._follower = _Follower(self)
+        session.tasks.append(self._follower)
+        self._begin = self._total = 0
+        self._head = ""
+        self._lines: list[Line] = []
+
+    def compose(self) -> ComposeResult:
+        """Lay out filter, titles and lines."""
+        yield Input(self.filter_text, placeholder="filter", id="wanted", compact=True)
+        yield Static(id="wrong", markup=False)
+        yield Static(id="head", markup=False)
+        yield LineView()
+
+    def on_mount(self) -> None:
+        """Show the filter if there is one."""
+        self.query_one("#wanted").display = bool(self.filter_text)
+
+    def follow(self) -> None:
+        """Take new rows of the trace."""
+        self._sieve.follow()
+
+    def snapshot(self, model: Model) -> None:
+        """Keep the rows that are in view."""
+        view = self.query_one(LineView)
+        passed, latest = self.paused or (self._sieve.passed, self._sieve.latest())
+        self._fit(passed, latest)
+        if self.overwrite:
+            self._begin, self._total = 0, len(latest)
+            self._lines = [self._look.line(row, count) for row, count in latest]
+            return
+        self._total = passed.count - passed.first
+        self._begin = max(0, self._total - view.rows) if self._follows(view) else view.top
+        rows = passed.rows(passed.first + self._begin, view.rows)
+        self._lines = [self._look.line(row) for row in rows]
+
+    def paint(self) -> None:
+        """Show them; the latest one if it was in view."""
+        view = self.query_one(LineView)
+        follows = self._follows(view)
+        if self._head != (head := self._title()):
+            self._head = head
+            self.query_one("#head", Static).update(head)
+        view.show(self._lines, self._begin, self._total)
+        if follows and not self.overwrite:
+            view.show_end()
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take mode, time stamp, filter and what is shown."""
+        self.overwrite = truth(settings, "overwrite", self.overwrite)
+        stamp = choice(settings, "time", self._look.stamp, [str(one) for one in STAMPS])
+        self._look = replace(
+            self._look,
+            stamp=Stamp(stamp),
+            bits=truth(settings, "bits", self._look.bits),
+            meaning=truth(settings, "decode", self._look.meaning),
+        )
+        text = text_of(settings, "filter", self.filter_text)
+        try:
+            self.sift(text)
+        except FilterError as error:
+            raise SettingError(("filter",), str(error)) from None
+
+    def save(self) -> dict[str, Any]:
+        """Return them."""
+        return {
+            "overwrite": self.overwrite,
+            "time": str(self._look.stamp),
+            "bits": self._look.bits,
+            "decode": self._look.meaning,
+            "filter": self.filter_text,
+        }
+
+    def sift(self, text: str) -> None:
+        """Show only what a filter passes; FilterError if it is none."""
+        wanted: Filter | None = parse_filter(text) if text else None
+        with self.session.lock:
+            self._sieve = Sieve(self.session.model.trace, wanted)
+        self.filter_text, self.paused = text, None
+
+    def on_line_view_moved(self) -> None:
+        """Bring the lines that came into view."""
+        self.look()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Apply the filter, or say what is wrong with it."""
+        wrong = self.query_one("#wrong", Static)
+        try:
+            self.sift(event.value.strip())
+        except FilterError as error:
+            wrong.update(str(error))
+            wrong.display = True
+            return
+        wrong.display = False
+        self.action_leave()
+
+    def action_filter(self) -> None:
+        """Write a filter."""
+        field = self.query_one("#wanted", Input)
+        field.display = True
+        field.focus()
+
+    def action_leave(self) -> None:
+        """Go back to the lines."""
+        field = self.query_one("#wanted", Input)
+        field.value, field.display = self.filter_text, bool(self.filter_text)
+        self.query_one("#wrong").display = False
+        self.query_one(LineView).focus()
+        self.look()
+
+    def action_pause(self) -> None:
+        """Hold the picture, or go on; frames are taken meanwhile."""
+        with self.session.lock:
+            held = self._sieve.passed.copy(), self._sieve.latest()
+        self.paused = None if self.paused else held
+        self.look()
+
+    def action_overwrite(self) -> None:
+        """Show the latest frame of each identifier, or all."""
+        self.overwrite = not self.overwrite
+        self.look()
+
+    def action_meaning(self) -> None:
+        """Show or hide what frames mean."""
+        self._look = replace(self._look, meaning=not self._look.meaning)
+        self.look()
+
+    def action_bits(self) -> None:
+        """Show bits or bytes."""
+        self._look = replace(self._look, bits=not self._look.bits)
+        self.look()
+
+    def action_stamp(self) -> None:
+        """Show another time: since the first frame, since the one before, absolute, date."""
+        place = (STAMPS.index(self._look.stamp) + 1) % len(STAMPS)
+        self._look = replace(self._look, stamp=STAMPS[place])
+        self.look()
+
+    def action_clear(self) -> None:
+        """Begin anew."""
+        with self.session.lock:
+            self._sieve.clear()
+        self.paused = None
+        self.look()
+
+    def _follows(self, view: LineView) -> bool:
+        return view.follows and self.paused is None
+
+    def _fit(self, passed: Ring, latest: Sequence[Latest]) -> None:
+        """Make room for what is there: buses, and the first time."""
+        buses = {one.row.heard.channel for one in latest}
+        width = min(CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
+        first = passed.rows(0, 1) if passed.first == 0 else []
+        origin_us = first[0].heard.at_us if first else self._look.origin_us
+        self._look = replace(
+            self._look, channel_width=width, counts=self.overwrite, origin_us=origin_us
+        )
+
+    def _title(self) -> str:
+        words = ["paused"] * (self.paused is not None)
+        words += [f"filter {self.filter_text}"] * bool(self.filter_text)
+        note = f"   [{', '.join(words)}]" if words else ""
+        return line_text(self._look.head()) + note
+
+
+class _Follower:
+    """The task that keeps a panel's sieve up to date, whichever tab is shown."""
+
+    channel = ""
+    due_us = NEVER
+
+    def __init__(self, panel: TracePanel) -> None:
+        self._panel = panel
+
+    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        """Follow; it sends nothing."""
+        self._panel.follow()
+        return ()
+
+    def stop(self) -> None:
+        """Do nothing: it sends nothing."""

@@ -1,0 +1,1 @@
+"""What goes on behind the tabs: sources, rules, sequences, SDO; nothing is painted here."""

@@ -1,0 +1,73 @@
+"""All that panels show of a source: frames in, nothing painted, no clock and no thread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
+from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.serial.heard_line import Listened
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.views.top_model import TopModel
+from tickrig.host.monitor.views.trace import Trace
+
+Meant = tuple[Heard, Decoded]
+"""A frame and what it means."""
+
+
+class Model:
+    """What was heard, decoded and counted.
+
+    Args:
+        eds: what files say, by node-ID.
+        dbc: DBC files.
+        bit_rate: of the buses, None if it is not known.
+
+    Attributes:
+        eds: what files say, by node-ID.
+        decoder: decodes all that is taken here.
+        board: the nodes.
+        top: the traffic, and how the statistics show it.
+        trace: the latest frames.
+        frames: how many were taken, error frames among them.
+        now_us: the time at the source.
+        lost: frames that were there and did not get here.
+        unread: what came and is no frame of classic CAN.
+        failed: why the source ended before its time; empty if it did not.
+        ended: no more will come.
+    """
+
+    def __init__(
+        self,
+        eds: Mapping[int, EdsObjects] | None = None,
+        dbc: Sequence[Path] = (),
+        bit_rate: int | None = None,
+    ) -> None:
+        self.eds = dict(eds or {})
+        self.decoder = Decoder(self.eds, dbc)
+        self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
+        self.top = TopModel(bit_rate)
+        self.trace = Trace()
+        self.frames = self.now_us = self.lost = self.unread = 0
+        self.failed, self.ended = "", False
+
+    def take(self, heards: Sequence[Listened]) -> list[Meant]:
+        """Take what was heard; return the frames with what they mean."""
+        meant: list[Meant] = []
+        for heard in heards:
+            if isinstance(heard, Heard):
+                decoded = self.decoder.take(heard)
+                self.board.take(heard, decoded)
+                self.trace.take(heard, decoded)
+                meant.append((heard, decoded))
+            else:
+                self.trace.take(heard, heard.decoded)
+                self.top.take((heard,))
+        self.top.take_meant(meant)
+        self.frames += len(meant)
+        if heards:
+            self.now_us = heards[-1].at_us
+        return meant

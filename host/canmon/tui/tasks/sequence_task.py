@@ -1,0 +1,92 @@
+"""A sequence that is carried out on a session."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from tickrig.host.canmon.tui.tasks.model import Meant
+from tickrig.host.canmon.tui.tasks.session import NEVER
+from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+from tickrig.host.monitor.sequence.heard_condition import HeardCondition
+from tickrig.host.monitor.sequence.line_sequence import parse_lines
+from tickrig.host.monitor.sequence.sequence_run import Mark, Note, SequenceRun
+from tickrig.host.monitor.sequence.steps import Sequence as Steps
+from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
+from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.wire.can import Frames
+
+KEPT: Final = 1_000
+"""Notes that are kept."""
+
+LINES: Final = ("+", "loop")
+"""What a sequence of plain lines begins with; others are TOML."""
+
+
+class SequenceTask:
+    """Carries out one sequence at a time.
+
+    Args:
+        eds: what files say, by node-ID.
+        channel: the bus it sends on; empty for the first.
+
+    Attributes:
+        notes: what happened, the latest last; times count from the beginning.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
+        self.channel = channel
+        self.notes: deque[Note] = deque(maxlen=KEPT)
+        self._pdos, self._heard = PdoWords(eds), HeardCondition()
+        self._run: SequenceRun | None = None
+        self._begin_us: int | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._run is not None
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame."""
+        return NEVER if self._run is None else self._run.due_us
+
+    def parse(self, text: str, name: str) -> Steps:
+        """Read a sequence, plain lines or TOML; SequenceError if it is none."""
+        lines = (line.strip() for line in text.splitlines())
+        begin = next((line for line in lines if line and not line.startswith("#")), "")
+        if begin.startswith(LINES):
+            return parse_lines(text, name)
+        resolve, condition = self._pdos.frame, self._heard.condition
+        return TomlSequence(text, name, resolve=resolve, condition=condition).parse()
+
+    def start(self, sequence: Steps) -> None:
+        """Carry it out from the next call on, in the place of one that runs."""
+        self.notes.clear()
+        self._begin_us, self._run = None, SequenceRun(sequence)
+
+    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        """Take what was heard; return what the sequence sends."""
+        run = self._run
+        if run is None:
+            return ()
+        if self._begin_us is None:
+            self._begin_us = now_us
+        out = list(run.tick(now_us))
+        for one, decoded in heard:
+            self._heard.take(one, decoded)
+            out += run.tick(now_us, (one,))
+        begin_us = self._begin_us
+        self.notes += (note._replace(at_us=note.at_us - begin_us) for note in run.notes)
+        run.notes.clear()
+        if run.done:
+            self._run = None
+        return tuple(out)
+
+    def stop(self) -> None:
+        """Give it up."""
+        if self._run is not None:
+            self._run = None
+            at_us = self.notes[-1].at_us if self.notes else 0
+            self.notes.append(Note(at_us, Mark.END, "stopped"))

@@ -1,0 +1,182 @@
+"""A source that is read in a thread, and what is sent on its buses."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Final, Protocol
+
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.output.stopwatch import Stopwatch
+from tickrig.host.canmon.sources.source import AnySource
+from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.monitor.decode.serial.heard_line import Listened
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.wire.can import CanFrame, Frames
+
+POLL_US: Final = 20_000
+NEVER: Final = 1 << 62
+"""When a task that wants nothing is due."""
+
+Send = Callable[[CanFrame], None]
+"""Sends a frame on one bus; SourceFailed if it cannot."""
+
+
+class Task(Protocol):
+    """Something that hears all frames, and may send some. It is called in the session's thread.
+
+    Attributes:
+        channel: the bus it sends on; empty for the first.
+    """
+
+    channel: str
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame; `NEVER` if not."""
+        ...
+
+    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        """Take what was heard, those that this program sent among it; return what to send.
+
+        Args:
+            now_us: the session's time, not that of the frames.
+            heard: frames since the last call.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Send no more: the operator has disarmed."""
+        ...
+
+
+class Session:
+    """Reads a source, feeds the model and the tasks, and sends what these want to send.
+
+    Nothing is sent while it is not armed: such frames are withheld, and counted.
+    Whoever reads the model or touches a task holds `lock`.
+
+    Args:
+        source: where frames come from.
+        model: takes them.
+        buses: what sends, by channel; empty for a log.
+        clock: the session's time in microseconds.
+
+    Attributes:
+        lock: of the model and the tasks.
+        tasks: what hears and sends.
+        armed: frames are sent.
+        sent: how many were.
+        withheld: how many were not, because it was not armed.
+        trouble: why a frame could not be sent; empty if all could.
+    """
+
+    def __init__(
+        self,
+        source: AnySource[Listened],
+        model: Model,
+        buses: Mapping[str, Send] | None = None,
+        clock: Callable[[], int] = lambda: time.monotonic_ns() // 1_000,
+    ) -> None:
+        self.source, self.model, self.buses = source, model, dict(buses or {})
+        self.lock = threading.RLock()
+        self.tasks: list[Task] = []
+        self.armed, self.trouble = False, ""
+        self.sent = self.withheld = 0
+        self._clock, self._watch = clock, Stopwatch()
+        self._echo: list[Heard] = []
+        self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
+        self._thread: Future[None] | None = None
+
+    @property
+    def now_us(self) -> int:
+        """The session's time, for tasks."""
+        return self._clock()
+
+    @property
+    def can_send(self) -> bool:
+        """Whether there is a bus to send on."""
+        return bool(self.buses)
+
+    def arm(self) -> None:
+        """Let tasks send, if there is a bus."""
+        with self.lock:
+            self.armed, self.trouble = self.can_send, ""
+
+    def disarm(self) -> None:
+        """Stop all tasks; nothing is sent from now on."""
+        with self.lock:
+            self.armed = False
+            for task in self.tasks:
+                task.stop()
+
+    def start(self) -> None:
+        """Begin to read, in a thread of its own."""
+        self._thread = self._pool.submit(self._run)
+
+    def check(self) -> None:
+        """Raise what ended the thread, if anything did."""
+        if self._thread is not None and self._thread.done():
+            self._thread.result()
+
+    def close(self) -> None:
+        """End the thread, and send no more; the source stays open for whoever reports on it."""
+        self.armed = False  # else a slow bus would take all that is due first
+        self._stop.set()
+        self._pool.shutdown()
+
+    def step(self, timeout_us: int = 0) -> None:
+        """Wait for a first frame or a task that is due, and take all that is there."""
+        due_us = min((task.due_us for task in self.tasks), default=NEVER)
+        heards = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
+        with self.lock:
+            out = self._take([*self._echo, *heards])
+            model, source = self.model, self.source
+            model.lost, model.unread = source.lost, source.unread
+            model.failed, model.ended = source.failed, source.ended
+        for channel, frame in out:
+            self._send(channel, frame)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self.step(POLL_US)
+            if self.source.ended:
+                self._stop.wait(POLL_US / 1e6)
+
+    def _take(self, heards: Sequence[Listened]) -> list[tuple[str, CanFrame]]:
+        self._echo = []
+        self._watch.take(heards)
+        meant = self.model.take(heards)
+        if self.source.live:
+            self.model.now_us = self._source_us()
+        now_us = self._clock()
+        wanted = [
+            (task.channel, frame)
+            for task in self.tasks
+            if meant or task.due_us <= now_us
+            for frame in task.tick(now_us, meant)
+        ]
+        if self.armed:
+            return wanted
+        self.withheld += len(wanted)
+        return []
+
+    def _send(self, channel: str, frame: CanFrame) -> None:
+        if not self.armed:  # somebody has stopped all meanwhile
+            self.withheld += 1
+            return
+        name = channel or next(iter(self.buses))
+        try:
+            self.buses[name](frame)
+        except SourceFailed as error:
+            self.disarm()
+            self.trouble = error.message
+            return
+        self.sent += 1
+        self._echo.append(Heard(self._source_us(), name, frame, sent=True))
+
+    def _source_us(self) -> int:
+        """Return the time at the source: that of this machine until a frame has told it."""
+        return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000

@@ -1,0 +1,1 @@
+"""Small things on the screen that know no tab."""

@@ -1,0 +1,1 @@
+"""The verbs of `canmon`, a module each, and the options that several share."""

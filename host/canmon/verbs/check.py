@@ -1,0 +1,187 @@
+"""The verb `check`: rules against traffic."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
+from tickrig.host.canmon.output.stopwatch import Stopwatch
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.sources.source import Source, explain_sources, open_source
+from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
+from tickrig.host.canmon.verbs.check_options import read_rules, rule_options
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.junit import junit
+from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.frames.heard import Heard
+
+BROKEN: Final = 1
+"""Exit status where a rule does not hold."""
+
+RULE_FILE: Final = ".toml"
+NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", nargs=-1)
+@rule_options
+@span_option
+@click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report.")
+@click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@bus_options
+def command(
+    *,
+    source: Sequence[str],
+    span_us: int | None,
+    report_path: Path | None,
+    jsonl: bool,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Hold traffic against rules; exit status 1 if one does not hold, 5 if there was none.
+
+    Rules are options, or a TOML file with the same names: no_emcy = true,
+    heartbeat = ["3=100ms±20%"]. Each finding is a line with time and frame.
+
+    \b
+    canmon check run.log --no-emcy --no-sdo-abort --nodes 3,16-18
+    canmon check run.log rules.toml --junit out.xml
+    canmon check can0 -b 500000 --for 60s --max-load 60 --heartbeat 3=100ms±20%
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    words = [word for word in source if not word.endswith(RULE_FILE)]
+    rules = read_rules([Path(word) for word in source if word.endswith(RULE_FILE)], options)
+    bus = BusOptions(**{name: options[name] for name in NAMES})
+    bit_rate = _bit_rate(rules, words, bus)
+    log = whole_log(words)
+    frames = log or open_source(words, bus)
+    verdict = Verdict(jsonl)
+    try:
+        if log is not None:
+            verdict.frames = len(log.columns)
+            verdict.take(_at_once(log, rules, bit_rate))
+        else:
+            checker = Checker(rules, bit_rate)
+            _one_by_one(frames, checker, verdict, span_us or patience_us(frames, words))
+    finally:
+        frames.close()
+    unjudged = "" if verdict.frames else _no_frame(frames, words)
+    suite, why = " ".join(words), frames.failed or unjudged
+    _write(report_path, junit(suite, rules.names(), verdict.findings, why))
+    if not why or verdict.findings:
+        click.echo(verdict.summary(), err=True)
+    report(frames, strict)
+    if verdict.findings:
+        click.get_current_context().exit(BROKEN)
+    if unjudged:
+        raise NothingJudged(unjudged)
+
+
+class NothingJudged(click.ClickException):
+    """One line on standard error, and exit status 5."""
+
+    exit_code = 5
+
+
+class Verdict:
+    """Findings, shown as they come.
+
+    Attributes:
+        findings: all of them.
+        frames: how many were held against the rules.
+    """
+
+    def __init__(self, jsonl: bool) -> None:
+        self.findings: list[Finding] = []
+        self.frames = 0
+        self._text = finding_json if jsonl else str
+
+    def take(self, findings: Sequence[Finding]) -> None:
+        """Show findings."""
+        if findings:
+            self.findings += findings
+            with until_unread():
+                click.echo("\n".join(map(self._text, findings)))
+
+    def summary(self) -> str:
+        """Say how it ended."""
+        if not self.findings:
+            return "all rules hold"
+        rules = Counter(finding.rule for finding in self.findings)
+        counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(rules.items()))
+        return f"{len(self.findings)} findings: {counts}"
+
+
+def finding_json(finding: Finding) -> str:
+    """Write a finding as an object; its frame as candump does."""
+    heard = finding.heard
+    said: dict[str, object] = {
+        "v": 1,
+        "t": finding.at_us / 1e6,
+        "rule": finding.rule,
+        "text": finding.text,
+    }
+    if heard is not None:
+        said |= {"ch": heard.channel, "frame": str(heard.frame)}
+    return json.dumps(said, ensure_ascii=False)
+
+
+def _no_frame(source: Source, words: Sequence[str]) -> str:
+    """Say why nothing was judged."""
+    where = "no frame came" if source.live else f"no frame in {' '.join(words)}"
+    return f"nothing was judged: {where}"
+
+
+def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
+    """Return the bit rate; Refused if a rule needs it and nobody names it."""
+    bit_rate = bit_rate_of(words, bus)
+    try:
+        rules.load(bit_rate)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    return bit_rate
+
+
+def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]:
+    from tickrig.host.monitor.check.column_check import check_columns  # noqa: PLC0415 - numpy
+
+    return check_columns(log.columns, rules, bit_rate, log.losses())
+
+
+def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int | None) -> None:
+    watch = Stopwatch()
+
+    def take(heards: Sequence[Heard]) -> None:
+        watch.take(heards)
+        verdict.frames += len(heards)
+        verdict.take([finding for heard in heards for finding in checker.take(heard)])
+
+    with until_interrupted():
+        listen(source, take, span_us)
+    lost = source.losses()
+    verdict.take(checker.end(watch.now_us if source.live else watch.latest_us, lost))
+
+
+def _write(path: Path | None, text: str) -> None:
+    if path is None:
+        return
+    try:
+        path.write_text(text, "utf-8")
+    except OSError as error:
+        refuse_path("--junit", error)
+
+
+explain_sources(command)

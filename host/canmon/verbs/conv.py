@@ -1,0 +1,61 @@
+"""The verb `conv`: log files into another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+import click
+
+from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.log_file import LogFile
+from tickrig.host.canmon.output.meaning import Meaning
+from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.verbs.decode_options import (
+    decode_options,
+    filter_option,
+    make_decoder,
+    read_filter,
+)
+from tickrig.host.canmon.verbs.dump import pass_on
+from tickrig.host.cli.options import PATH
+
+
+@click.command()
+@click.argument("source", nargs=-1, required=True)
+@click.argument("log", type=PATH)
+@filter_option
+@decode_options
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+def command(  # noqa: PLR0913 - options
+    *,
+    source: Sequence[str],
+    log: Path,
+    wanted: str | None,
+    eds: Sequence[str],
+    dbc: Sequence[Path],
+    strict: bool,
+) -> None:
+    """Write what SOURCE holds into the file LOG; its name says the format.
+
+    Several files are merged by time. What a format cannot hold is said on
+    standard error.
+
+    \b
+    canmon conv a.blf b.log
+    canmon conv left.log right.asc.gz both.log
+    canmon conv run.log,123:7FF run.csv
+    canmon conv run.log faults.log -F 'emcy or error'
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    chosen = read_filter(wanted)
+    decoder = None if chosen is None else make_decoder(eds, dbc)
+    meaning, frames = Meaning(decoder, chosen), open_source(source)
+    with closing(frames), closing(LogFile(log, source)) as out, until_interrupted():
+        pass_on(frames, meaning, out.take)
+    report(frames, strict, meaning.words())
+
+
+explain_sources(command)

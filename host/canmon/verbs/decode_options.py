@@ -1,0 +1,121 @@
+"""The options of verbs that decode: EDS, DBC and filter.
+
+The decoder is imported when it is wanted: a verb that does without starts faster.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from tickrig.host.cli.eds_warnings import tell_findings
+from tickrig.host.cli.options import PATH, add_options
+from tickrig.host.cli.refused import Refused, refuse_path
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoder import Decoder
+    from tickrig.host.monitor.decode.filter.filter import Filter
+    from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+
+_EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
+
+eds_option: Final = click.option(
+    "--eds",
+    multiple=True,
+    metavar="NODE=FILE",
+    help="An EDS or DCF of a node, as 3=drive.eds; once for each node.",
+)
+dbc_option: Final = click.option(
+    "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."
+)
+decode_options: Final = add_options(eds_option, dbc_option)
+"""Add `--eds` and `--dbc`; `make_decoder` takes what they give."""
+
+filter_option: Final = click.option(
+    "-F",
+    "--filter",
+    "wanted",
+    metavar="FILTER",
+    help="Only these: 'node=3 and (pdo or emcy)', 181-18F, 123:7FF,#FF, 'sdo[6040h]',"
+    " 'statusword.fault'.",
+)
+"""Add `-F`, as `wanted`; `read_filter` takes what it gives."""
+
+
+def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
+    """Read what `--eds` names; Refused if there is no such node or file, or it is no EDS."""
+    return read_eds_paths(eds_paths(words))
+
+
+def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
+    """Read files by node-ID; Refused if one cannot be read, or is no EDS.
+
+    What is wrong in a file, and not used, is told on standard error.
+    """
+    found = {node: _read(node, path) for node, path in paths.items()}
+    tell_findings(odd for objects in found.values() for odd in objects.findings)
+    return found
+
+
+def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
+    """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
+    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - slow
+
+    objects = read_eds_files(eds)
+    with refusing_dbc():
+        return Decoder(objects, dbc)
+
+
+@contextmanager
+def refusing_dbc() -> Iterator[None]:
+    """Refuse, as `--dbc` does, files that are no DBC."""
+    from tickrig.host.monitor.decode.pdo.dbc_file import DbcError  # noqa: PLC0415 - slow
+
+    try:
+        yield
+    except OSError as error:
+        refuse_path("--dbc", error)
+    except DbcError as error:
+        raise Refused(f"--dbc {error}") from None
+
+
+def eds_paths(words: Sequence[str]) -> dict[int, Path]:
+    """Return the files that `--eds` names, by node-ID; Refused if a word is wrong."""
+    return dict(map(_split, words))
+
+
+def read_filter(text: str | None) -> Filter | None:
+    """Read what `-F` says; Refused with the column if it is no filter."""
+    if text is None:
+        return None
+    from tickrig.host.monitor.decode.filter.filter import parse_filter  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.filter.filter_error import FilterError  # noqa: PLC0415
+
+    try:
+        return parse_filter(text)
+    except FilterError as error:
+        raise Refused(str(error)) from None
+
+
+def _split(word: str) -> tuple[int, Path]:
+    match = _EDS.fullmatch(word)
+    if match is None or not 1 <= int(match[1], 0) <= 127:
+        raise Refused(f"--eds {word!r} is not NODE=FILE with a node-ID 1..127, as 3=drive.eds")
+    return int(match[1], 0), Path(match[2])
+
+
+def _read(node: int, path: Path) -> EdsObjects:
+    from tickrig.host.monitor.decode.objects.eds_objects import read_eds  # noqa: PLC0415 - slow
+    from tickrig.wire.canopen.eds.eds_finding import EdsError  # noqa: PLC0415
+
+    try:
+        return read_eds(path, node)
+    except OSError as error:
+        refuse_path("--eds", error)
+    except EdsError as error:
+        raise Refused(f"--eds {error}") from None

@@ -1,0 +1,118 @@
+"""The verb `nodes`: the state of all nodes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any, Final
+
+import click
+
+from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.listening import listen, patience_us, span_option
+from tickrig.host.canmon.output.painting import paint
+from tickrig.host.canmon.output.stopwatch import Stopwatch
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.nodes.board_text import board_json, render_board
+from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
+from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+from tickrig.host.monitor.frames.heard import Heard
+
+MANY: Final = 1_000
+"""Lines, and columns where nobody's terminal sets them."""
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", nargs=-1)
+@eds_option
+@span_option
+@click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@bus_options
+def command(
+    *,
+    source: Sequence[str],
+    eds: Sequence[str],
+    span_us: int | None,
+    jsonl: bool,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Show all nodes: NMT state, heartbeat, boot-ups, drive state, EMCYs, SDO errors.
+
+    It listens only, and knows what it hears: the heartbeat period by SDO
+    traffic or an EDS, else learnt (~). An arrow shows a state that was
+    commanded and is not confirmed yet. Of a log file it shows the final state.
+
+    \b
+    canmon nodes can0
+    canmon nodes can0 --eds 3=drive.eds --for 5s --jsonl
+    canmon nodes run.log
+
+    Keys: q quit.
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    view = NodesView(read_eds_files(eds))
+    frames = open_source(source, BusOptions(**options))
+    try:
+        with until_interrupted():
+            if frames.live and sys.stdout.isatty() and not jsonl:
+                paint(frames, view.take, view.painted, span_us)
+            else:
+                listen(frames, view.take, span_us or patience_us(frames, source))
+        with until_unread():
+            for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
+                click.echo(line)
+    finally:
+        frames.close()
+    report(frames, strict)
+
+
+class NodesView:
+    """A node board, fed and shown.
+
+    Args:
+        eds: what files say, by node-ID; these nodes are on the board from the beginning.
+    """
+
+    def __init__(self, eds: dict[int, EdsObjects]) -> None:
+        self._decoder = Decoder(eds)
+        self._board = NodeBoard(self._decoder, {node: found.name for node, found in eds.items()})
+        self._watch = Stopwatch()
+
+    def take(self, heards: Sequence[Heard]) -> None:
+        """Take what was heard."""
+        for heard in heards:
+            self._board.take(heard, self._decoder.take(heard))
+        self._watch.take(heards)
+
+    def lines(self, *, live: bool) -> list[str]:
+        """Return the board for paper, or as wide as the terminal is."""
+        columns = _columns() if sys.stdout.isatty() else MANY
+        return render_board(self._board, self._now_us(live), columns, MANY)
+
+    def json(self, *, live: bool) -> list[str]:
+        """Return the board as JSON, an object a node."""
+        return board_json(self._board, self._now_us(live))
+
+    def painted(self, now_us: int, width: int, height: int) -> list[str]:
+        """Return the board for a screen."""
+        return render_board(self._board, now_us, width, height)
+
+    def _now_us(self, live: bool) -> int:
+        """Return the time at a live source, of a file its last frame's."""
+        return self._watch.now_us if live else self._board.now_us
+
+
+def _columns() -> int:
+    from shutil import get_terminal_size  # noqa: PLC0415 - slow, and no pipe wants it
+
+    return get_terminal_size().columns
+
+
+explain_sources(command)

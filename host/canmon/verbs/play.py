@@ -1,0 +1,181 @@
+"""The verb `play`: a log, sent again."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.host.canmon.output.ending import until_interrupted
+from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.output.pace import Pace
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.sources.source import log_path
+from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.logs.reading.log_reader import LogError, LogReader, read_log
+from tickrig.host.monitor.replay.lateness import Lateness
+from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, ReplayPlan
+from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import FieldError, WireError
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.output.transmitter import Transmitter
+
+POLL_US: Final = 100_000
+_CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
+
+
+@click.command()
+@click.argument("log")
+@click.argument("buses", nargs=-1, required=True, metavar="BUS|BUS=RECORDED...")
+@click.option("--speed", default="1", metavar="FACTOR", help="2 is twice as fast; max.")
+@click.option("--from", "from_", metavar="TIME", default="0s", help="Begin 3s after its start.")
+@click.option("--to", metavar="TIME", help="End 9s after its start.")
+@click.option("--loop", default="1", metavar="N", help="How often, or forever.")
+@click.option("--step", is_flag=True, help="Wait for Enter before each frame.")
+@click.option("--wait-rx", metavar="ID", help="Begin when this CAN-ID, as 581, is received.")
+@bus_options
+def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
+    """Send the frames of LOG again, with the gaps that were recorded.
+
+    BUS takes all of it, BUS=RECORDED what was recorded on one bus; the frames
+    of others are left out. Error frames are not sent. At the end it says how
+    late the frames went out.
+
+    \b
+    canmon play run.log vcan0
+    canmon play run.log vcan2=can0 vcan3=can1 --speed 2 --loop forever
+    canmon play run.blf can0 --from 3s --to 9s --wait-rx 581
+    """  # noqa: D301 - click wants the backspace
+    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
+
+    wait_rx = _can_id(options.pop("wait_rx"))
+    words, route = _routes(buses)
+    path = log_path(log)
+    reader = read_log(path)
+    plan = _plan(reader, route, options)
+    hears = wait_rx is not None
+    with transmitters(words, BusOptions(**options), hears=hears) as opened:
+        _play(plan, dict(zip(words, opened, strict=True)), step, wait_rx)
+    for word in reader.tally.words(str(path)):
+        click.echo(word, err=True)
+
+
+def _routes(words: Sequence[str]) -> tuple[list[str], Callable[[str], str | None]]:
+    """Return the buses to open, and where what was recorded goes."""
+    recorded: dict[str, str] = {}
+    rest: str | None = None
+    for word in words:
+        bus, equals, channel = word.rpartition("=")
+        if not equals:
+            if rest is not None:
+                raise Refused(f"{rest} and {word} both take all of it; write {word}=RECORDED")
+            rest = word
+        elif not bus or channel in recorded:
+            raise Refused(f"{word!r} is not BUS=RECORDED, once for each recorded bus")
+        else:
+            recorded[channel] = bus
+    buses = dict.fromkeys([*recorded.values(), *([rest] if rest else [])])
+    return list(buses), lambda channel: recorded.get(channel, rest)
+
+
+def _plan(
+    log: LogReader, route: Callable[[str], str | None], options: dict[str, Any]
+) -> ReplayPlan:
+    speed, loop, to = (options.pop(name) for name in ("speed", "loop", "to"))
+    try:
+        return ReplayPlan(
+            log,
+            route,
+            _speed(speed),
+            parse_time_us(options.pop("from_")),
+            None if to is None else parse_time_us(to),
+            _loops(loop),
+        )
+    except ValueError as error:
+        raise Refused(str(error)) from None
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = 0.0 if text == "max" else float(text)
+    except ValueError:
+        speed = -1.0
+    if not (text == "max" or 1e-6 <= speed <= 1e6):
+        raise Refused(f"--speed {text!r} is neither a factor above 0, as 2 or 0.5, nor max")
+    return speed
+
+
+def _loops(text: str) -> int:
+    if text == "forever":
+        return FOREVER
+    if not (text.isdecimal() and int(text)):
+        raise Refused(f"--loop {text!r} is neither 1 or more nor forever")
+    return int(text)
+
+
+def _can_id(text: str | None) -> CanFrame | None:
+    """Return a frame with the CAN-ID that is waited for."""
+    if text is None:
+        return None
+    try:
+        if _CAN_ID.fullmatch(text) is None:
+            raise FieldError(f"{text!r} is no CAN-ID of 3 or 8 hex digits, as 581")
+        return CanFrame.parse(f"{text}#")
+    except WireError as error:
+        raise Refused(f"--wait-rx {error}") from None
+
+
+def _play(
+    plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: CanFrame | None
+) -> None:
+    late, pace = Lateness(), Pace()
+    with until_interrupted(), until_unread():
+        if wait_rx is not None:
+            _wait_for(wait_rx, list(buses.values()))
+            pace = Pace()
+        for at_us, channel, frame in _due(plan):
+            if step:
+                _ask(f"{buses[channel].name} {frame}")
+                at_us = pace.now_us  # noqa: PLW2901 - now is when it is due
+            late.add(pace.wait_until(at_us))
+            buses[channel].send(frame)
+    told = [f"{late.count} frames in {pace.now_us / 1e6:.3f} s"]
+    told += [str(late)] if plan.speed and not step else []
+    told += [f"{plan.left_out} left out"] if plan.left_out else []
+    click.echo("; ".join(told), err=True)
+
+
+def _due(plan: ReplayPlan) -> Iterator[Due]:
+    """Yield what is planned; SourceFailed if the log cannot be read."""
+    try:
+        yield from plan
+    except OSError as error:
+        raise SourceFailed(f"{error.filename}: {error.strerror}") from error
+    except LogError as error:
+        raise SourceFailed(str(error)) from error
+
+
+def _wait_for(wanted: CanFrame, buses: Sequence[Transmitter]) -> None:
+    """Return when one of the buses carried a frame with this CAN-ID."""
+    while True:
+        for bus in buses:
+            for _, _, frame, _ in bus.poll(POLL_US // len(buses)):
+                if isinstance(frame, CanFrame) and _same_id(frame, wanted):
+                    return
+
+
+def _same_id(one: CanFrame, other: CanFrame) -> bool:
+    return (one.can_id, one.extended) == (other.can_id, other.extended)
+
+
+def _ask(what: str) -> None:
+    """Show what comes next, and wait for Enter; the end of the input ends the replay."""
+    click.echo(what)
+    if not sys.stdin.readline():
+        raise KeyboardInterrupt

@@ -1,0 +1,123 @@
+"""The verb `send`: frames, once or again and again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tickrig.host.canmon.output.ending import until_interrupted
+from tickrig.host.canmon.output.pace import Pace
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
+from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.frame_fields import (
+    FrameFields,
+    parse_checksum,
+    parse_counter,
+)
+from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.wire.can import CanFrame
+from tickrig.wire.candump import LogLine
+from tickrig.wire.errors import WireError
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.output.transmitter import Transmitter
+
+
+@click.command()
+@click.argument("bus")
+@click.argument("frames", nargs=-1, required=True, metavar="FRAME...")
+@click.option("--every", metavar="TIME", help="Send again each 10ms, 1s, until Ctrl-C.")
+@click.option("--count", type=click.IntRange(1), metavar="N", help="Stop after N times.")
+@click.option("--counter", multiple=True, metavar="BYTE:LOW..HIGH", help="Count in 0:0..255.")
+@click.option("--checksum", multiple=True, metavar="BYTE:KIND", help="Compute 7:crc8, 7:xor:0..6.")
+@eds_option
+@click.option("-q", "--quiet", is_flag=True, help="Do not print what is sent.")
+@bus_options
+def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any) -> None:
+    """Send frames on BUS: by bytes as 123#DEADBEEF, or a PDO by the names of its objects.
+
+    Objects that are not named have the value of the EDS, else 0. What is sent
+    is printed as candump logs it. Bits of a byte are counted with
+    0.4+4:0..14. Checksums: xor, sum8, neg8, crc8 (SAE J1850), crc8-2f
+    (AUTOSAR), crc8-07 (SMBus), over all other bytes or those of 7:crc8:1..6.
+
+    \b
+    canmon send can0 123#DEADBEEF 00000605#40 705#R
+    canmon send can0 5.rpdo1 target_velocity=100 --eds 5=drive.eds
+    canmon send can0 080# --every 10ms --count 100
+    canmon send can0 100#0000 --every 20ms --counter 0:0..14 --checksum 1:crc8
+    """  # noqa: D301 - click wants the backspace
+    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
+
+    every, count, quiet = options.pop("every"), options.pop("count"), options.pop("quiet")
+    fields = _fields(options.pop("counter"), options.pop("checksum"))
+    made = _frames(frames, eds)
+    period_us = _period_us(every, count)
+    cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
+    with transmitters([bus], BusOptions(**options)) as (out,), until_interrupted(), until_unread():
+        _run(cyclic, out, quiet)
+    missed = sum(one.missed for one in cyclic)
+    if missed:
+        click.echo(f"{missed} periods passed whole and were left out", err=True)
+
+
+def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame]:
+    """Return the frames; words with `=` belong to the PDO before them."""
+    texts: list[str] = []
+    for word in words:
+        if texts and "#" not in word and "=" in word and "#" not in texts[-1]:
+            texts[-1] += f" {word}"
+        else:
+            texts.append(word)
+    named = PdoWords(read_eds_files(eds))
+    try:
+        return [CanFrame.parse(text) if "#" in text else named.frame(text) for text in texts]
+    except (ValueError, WireError) as error:
+        raise Refused(str(error)) from None
+
+
+def _fields(counters: Sequence[str], checksums: Sequence[str]) -> FrameFields:
+    try:
+        return FrameFields(
+            tuple(map(parse_counter, counters)), tuple(map(parse_checksum, checksums))
+        )
+    except ValueError as error:
+        raise Refused(str(error)) from None
+
+
+def _period_us(every: str | None, count: int | None) -> int:
+    if every is None:
+        if count is not None:
+            raise Refused("--count says how often --every sends; give --every TIME")
+        return NEVER
+    try:
+        return parse_time_us(every)
+    except ValueError as error:
+        raise Refused(f"--every {error}") from None
+
+
+def _cyclic(
+    frames: Sequence[CanFrame], period_us: int, count: int, fields: FrameFields
+) -> list[Cyclic]:
+    try:
+        return [Cyclic(frame, period_us, 0, count, fields) for frame in frames]
+    except ValueError as error:
+        raise Refused(str(error)) from None
+
+
+def _run(cyclic: Sequence[Cyclic], out: Transmitter, quiet: bool) -> None:
+    pace = Pace()
+    while (due_us := min(one.due_us for one in cyclic)) < NEVER:
+        pace.wait_until(due_us)
+        for one in cyclic:
+            for frame in one.tick(pace.now_us):
+                out.send(frame)
+                if not quiet:
+                    click.echo(str(LogLine(time.time_ns() // 1_000, out.name, frame)))

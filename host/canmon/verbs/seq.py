@@ -1,0 +1,128 @@
+"""The verb `seq`: send and expect, step by step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.host.canmon.output.ending import until_interrupted
+from tickrig.host.canmon.output.pace import Pace
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.output.watch import Watch
+from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.sequence import steps
+from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
+from tickrig.host.monitor.sequence.note_text import note_line
+from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
+from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
+from tickrig.host.monitor.sequence.variables import parse_variable
+from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.wire.can import Frames
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.output.transmitter import Transmitter
+
+POLL_US: Final = 100_000
+FAILED: Final = 1
+
+
+@click.command(cls=BusCommand)
+@click.argument("bus")
+@click.argument("file", type=PATH)
+@click.option("--var", "variables", multiple=True, metavar="NAME=NUMBER", help="Set id=3.")
+@eds_option
+@click.option("--dry-run", is_flag=True, help="Print the steps; open no bus.")
+@click.option("-q", "--quiet", is_flag=True, help="Print only what was missed.")
+@bus_options
+@click.pass_context
+def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> None:
+    """Carry out the sequence FILE on BUS; exit status 1 if an expectation was missed.
+
+    A TOML file has steps that send, wait, expect and repeat; any other file has
+    lines as '+10 123#DEADBEEF': so many ms after the line above.
+
+    \b
+    [vars]
+    id = 5
+    [[step]]
+    send = "000#01{id}"
+    [[step]]
+    expect = "{0x700+id:3}#05"       # or "node=5 and heartbeat"; [...] for several
+    within = "300ms"
+    on-fail = "go-on"                # or "stop", or steps
+
+    \b
+    canmon seq can0 start.toml --var id=3
+    canmon seq can0 start.toml --dry-run
+    """  # noqa: D301 - click wants the backspace
+    variables, eds = options.pop("variables"), options.pop("eds")
+    dry_run, quiet = options.pop("dry_run"), options.pop("quiet")
+    watch = Watch(read_eds_files(eds))
+    sequence = _read(file, variables, watch)
+    if dry_run:
+        click.echo("\n".join(steps.outline(sequence.steps)))
+        return
+    run = SequenceRun(sequence)
+    _carry_out(run, bus, BusOptions(**options), watch, quiet)
+    if not run.done:
+        click.echo("interrupted before its end", err=True)
+    if run.missed or not run.done:
+        context.exit(FAILED)
+
+
+def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
+    try:
+        variables = dict(map(parse_variable, words))
+        text = file.read_text("utf-8")
+        for name in variables:
+            if name not in text:
+                raise Refused(f"--var {name}: {file} does not name it")
+        if file.suffix != ".toml":
+            return parse_lines(text, str(file))
+        resolve = PdoWords(watch.eds).frame
+        return TomlSequence(
+            text, str(file), variables, resolve=resolve, condition=watch.condition
+        ).parse()
+    except OSError as error:
+        refuse_path("sequence", error)
+    except UnicodeDecodeError:
+        raise Refused(f"{file} is no text") from None
+    except (SequenceError, ValueError) as error:
+        raise Refused(str(error)) from None
+
+
+def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, quiet: bool) -> None:
+    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
+
+    with transmitters([bus], options, hears=True) as (out,), until_interrupted(), until_unread():
+        pace = Pace()
+        _send(out, watch, run.tick(pace.now_us))
+        while not run.done:
+            _show(run, quiet)
+            for heard in out.poll(max(0, min(POLL_US, run.due_us - pace.now_us))):
+                watch.take(heard)
+                _send(out, watch, run.tick(pace.now_us, (heard,)))
+            _send(out, watch, run.tick(pace.now_us))
+    _show(run, quiet)
+
+
+def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
+    for frame in frames:
+        out.send(frame)
+        watch.take(Heard(time.time_ns() // 1_000, out.name, frame, sent=True))
+
+
+def _show(run: SequenceRun, quiet: bool) -> None:
+    """Print what happened since the last time."""
+    for note in run.notes:
+        if not quiet or note.mark is Mark.MISSED:
+            click.echo(note_line(note))
+    run.notes.clear()

@@ -1,0 +1,88 @@
+"""The verb `stats`: statistics of all identifiers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
+from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.sources.whole_log import whole_log
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
+from tickrig.host.monitor.views.stats_json import bus_json, id_json, node_json
+from tickrig.host.monitor.views.stats_table import bus_lines, by_id, by_node, node_rows
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", nargs=-1)
+@click.option(
+    "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
+)
+@span_option
+@click.option("--jsonl", is_flag=True, help="One JSON object a row.")
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@bus_options
+def command(
+    *,
+    source: Sequence[str],
+    by: str,
+    span_us: int | None,
+    jsonl: bool,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Count a log: rates, gaps, jitter, missed cycles, exact load, error frames.
+
+    Gaps are of all frames; p99 is at most 1/64 too long. A cycle is told where
+    most gaps are near the median; missed are its frames that did not come.
+    Jitter is how much a gap differs from the one before, on average. Loads
+    count stuff bits and are a share of the bit rate that -b gives.
+
+    \b
+    canmon stats run.log -b 500000
+    canmon stats run.blf --by node
+    canmon stats can0 --for 10s --jsonl
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    bus = BusOptions(**options)
+    bit_rate = bit_rate_of(source, bus)
+    log = whole_log(source)
+    frames = log or open_source(source, bus)
+    traffic = Traffic()
+
+    def take(heards: Sequence[Heard]) -> None:
+        for heard in heards:
+            traffic.take(heard)
+
+    try:
+        with until_interrupted():
+            listen(frames, take, span_us or patience_us(frames, source))
+    finally:
+        frames.close()
+    snapshot = log.snapshot() if log else traffic.snapshot()
+    with until_unread():
+        for line in (_jsonl if jsonl else _tables)(snapshot, by, bit_rate):
+            click.echo(line)
+    report(frames, strict)
+
+
+def _tables(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
+    lines = [line for bus in snapshot.buses for line in bus_lines(bus, bit_rate)]
+    return [*lines, "", *(by_id if by == "id" else by_node)(snapshot)]
+
+
+def _jsonl(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
+    lines = [bus_json(bus, bit_rate) for bus in snapshot.buses]
+    if by == "id":
+        return lines + [id_json(row) for row in snapshot.rows]
+    return lines + [node_json(row) for row in node_rows(snapshot.rows)]
+
+
+explain_sources(command)

@@ -1,0 +1,110 @@
+"""The verb `tui`: the monitor as a full-screen program."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.output.ending import report
+from tickrig.host.canmon.sources.source import explain_sources
+from tickrig.host.canmon.verbs.decode_options import (
+    decode_options,
+    eds_paths,
+    read_eds_paths,
+    refusing_dbc,
+)
+from tickrig.host.canmon.workspace import Workspace, WorkspaceError
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.tui.app import Monitor
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", nargs=-1)
+@click.option(
+    "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
+)
+@decode_options
+@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@bus_options
+def command(
+    *,
+    source: Sequence[str],
+    path: Path | None,
+    eds: Sequence[str],
+    dbc: Sequence[Path],
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Show all there is in tabs: trace, nodes, statistics and more (extra tickrig[tui]).
+
+    It listens only, until it is armed (A). With -w all settings are recalled
+    from a TOML file and kept there, buses and EDS files with them; what the
+    command line says goes before.
+
+    \b
+    canmon tui can0 -b 500000
+    canmon tui can0 --eds 3=drive.eds -w bench.toml
+    canmon tui -w bench.toml
+    canmon tui run.log
+    ssh robot canmon dump can0 --jsonl | canmon tui -
+
+    Keys: 1 to 9 tabs, F1 help, ctrl+p commands, A arm, F9 stop all, q quit.
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    said = BenchSetup(
+        source=tuple(source), options=BusOptions(**options), eds=eds_paths(eds), dbc=tuple(dbc)
+    )
+    monitor = _monitor(path, said)
+    if not sys.stdout.isatty():
+        monitor.session.source.close()
+        raise Refused("canmon tui needs a terminal; canmon top prints a table without one")
+    try:
+        monitor.run_session()
+    finally:
+        monitor.session.source.close()
+    report(monitor.session.source, strict)
+
+
+def _monitor(path: Path | None, said: BenchSetup) -> Monitor:
+    """Make the program, its panels with the settings of the workspace."""
+    try:
+        with loading():
+            from tickrig.host.canmon.tui.app import Monitor  # noqa: PLC0415 - an extra
+            from tickrig.host.canmon.tui.panels.panels import PANELS  # noqa: PLC0415
+    except ImportError as error:
+        raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
+    from tickrig.host.canmon.tui.settings.bench import Bench  # noqa: PLC0415 - an extra
+    from tickrig.host.canmon.tui.tasks.model import Model  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.tui.tasks.opening import open_session  # noqa: PLC0415
+
+    try:
+        workspace = Workspace() if path is None else Workspace.read(path)
+        setup = BenchSetup.read(workspace).under(said)
+        objects = read_eds_paths(setup.eds)
+        with refusing_dbc():
+            model = Model(objects, setup.dbc, setup.options.bitrate)
+        session = open_session(setup.source, setup.options, model)
+        try:
+            panels = [panel(session) for panel in PANELS]
+            bench = Bench(workspace, setup, panels)
+            bench.load()
+        except BaseException:
+            session.source.close()
+            raise
+    except WorkspaceError as error:
+        raise Refused(str(error)) from None
+    return Monitor(session, panels, bench)
+
+
+explain_sources(command)

@@ -1,0 +1,79 @@
+"""A byte link to a serial port, real, pseudo or remote, by any pyserial URL."""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+import serial
+
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.serial_trouble import trouble
+
+NEGOTIATED: Final = ("rfc2217:",)
+"""URLs under which each change of a port setting is a dialogue of 100 ms with the other end."""
+
+NEGOTIATED_WAIT_S: Final = 0.002
+
+
+class SerialLink:
+    """A `Link[bytes]` over pyserial.
+
+    Args:
+        url: a device path or pyserial URL: `/dev/ttyACM0`, `COM3`,
+            `socket://host:port`, `rfc2217://host:port`, `loop://`.
+        baud: bit rate in bit/s, 8N1.
+        exclusive: whether to keep out other programs that ask in the same way, by flock as
+            pyserial's own tools do; of two readers each would get a part.
+
+    Raises:
+        LinkClosed: the port cannot be opened, or another program uses it.
+    """
+
+    def __init__(self, url: str, baud: int = 115_200, *, exclusive: bool = True) -> None:
+        self._url, self._negotiated = url, url.startswith(NEGOTIATED)
+        wait_s = NEGOTIATED_WAIT_S if self._negotiated else 0
+        write_timeout_s = None if self._negotiated else 1  # pyserial has none there
+        try:
+            self._port = serial.serial_for_url(
+                url,
+                baudrate=baud,
+                timeout=wait_s,
+                write_timeout=write_timeout_s,
+                exclusive=exclusive or None,
+            )
+        except (serial.SerialException, ValueError, OSError) as error:
+            raise LinkClosed(f"cannot open {url!r}: {trouble(url, error)}") from error
+
+    @property
+    def now_us(self) -> int:
+        """The machine's monotonic clock."""
+        return time.monotonic_ns() // 1_000
+
+    def send(self, traffic: bytes, /) -> None:
+        """Write bytes; LinkClosed if the port is gone or takes none for 1 s."""
+        try:
+            self._port.write(traffic)
+        except (serial.SerialException, OSError, TypeError) as error:
+            raise LinkClosed(f"cannot write to {self._url!r}: {error}") from error
+
+    def receive(self, timeout_us: int, /) -> bytes:
+        """Wait for a first byte, then return all that are there."""
+        try:
+            first = self._wait_for_byte(timeout_us)
+            return first + self._port.read(self._port.in_waiting) if first else b""
+        except (serial.SerialException, OSError, TypeError) as error:
+            raise LinkClosed(f"cannot read from {self._url!r}: {error}") from error
+
+    def close(self) -> None:
+        """Close the port."""
+        self._port.close()
+
+    def _wait_for_byte(self, timeout_us: int) -> bytes:
+        if not self._negotiated:
+            self._port.timeout = timeout_us / 1e6
+            return self._port.read(1)
+        until_us = self.now_us + timeout_us
+        while not (first := self._port.read(1)) and self.now_us < until_us:
+            continue
+        return first

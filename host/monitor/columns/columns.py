@@ -1,0 +1,140 @@
+"""A log as columns of numpy: an array for each property of a frame.
+
+numpy comes with the extra `fast`; this module is imported only where it is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from tickrig.host.monitor.frames.candump_filter import flagged_id
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.reading.log_reader import LogError
+from tickrig.host.monitor.logs.tally import BadLines, Tally
+from tickrig.wire.can_error import ErrorFrame
+
+MOST_CHANNELS: Final = 256
+
+_Parts = tuple[
+    npt.NDArray[np.int64],
+    npt.NDArray[np.uint32],
+    npt.NDArray[np.uint8],
+    npt.NDArray[np.uint64],
+    npt.NDArray[np.uint8],
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """Frames, column by column, in the order of the log.
+
+    Attributes:
+        at_us: when each had ended, microseconds.
+        ident: identifier; bit 31 extended, bit 30 remote, bit 29 error frame.
+        dlc: data length code, 0 to 8.
+        payload: data as a little-endian number, zeros behind it.
+        channel: place of the bus in `channels`.
+        channels: names of the buses, in the order in which they appeared.
+        tally: what was no frame.
+    """
+
+    at_us: npt.NDArray[np.int64]
+    ident: npt.NDArray[np.uint32]
+    dlc: npt.NDArray[np.uint8]
+    payload: npt.NDArray[np.uint64]
+    channel: npt.NDArray[np.uint8]
+    channels: tuple[str, ...] = ()
+    tally: Tally = field(default_factory=Tally)
+
+    @property
+    def bad_lines(self) -> BadLines:
+        """Lines that were none of the log."""
+        return self.tally.bad_lines
+
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return len(self.at_us)
+
+
+class ChannelNames:
+    """Names of buses in the order in which they appear."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names."""
+        return tuple(self._places)
+
+    def place(self, name: str) -> int:
+        """Return the place of a name; LogError if there are too many."""
+        place = self._places.setdefault(name, len(self._places))
+        if place >= MOST_CHANNELS:
+            raise LogError(f"more than {MOST_CHANNELS} buses in a log")
+        return place
+
+
+class Rows:
+    """Columns of some frames, of which not all are known yet.
+
+    Attributes:
+        at_us, ident, dlc, payload, channel: as in `Columns`; 0 where nothing is known.
+        known: which rows hold a frame.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.at_us = np.zeros(count, np.int64)
+        self.ident = np.zeros(count, np.uint32)
+        self.dlc = np.zeros(count, np.uint8)
+        self.payload = np.zeros(count, np.uint64)
+        self.channel = np.zeros(count, np.uint8)
+        self.known = np.zeros(count, np.bool_)
+
+    @classmethod
+    def of(cls, frames: list[Heard], channels: ChannelNames) -> Rows:
+        """Return rows of frames."""
+        rows = cls(len(frames))
+        for row, heard in enumerate(frames):
+            rows.put(row, heard, channels.place(heard.channel))
+        return rows
+
+    def put(self, row: int, heard: Heard, channel: int) -> None:
+        """Write one row."""
+        frame = heard.frame
+        self.at_us[row], self.ident[row] = heard.at_us, flagged_id(heard)
+        self.dlc[row] = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+        self.payload[row] = int.from_bytes(frame.data, "little")
+        self.channel[row], self.known[row] = channel, True
+
+    def columns(self) -> _Parts:
+        """Return the columns of the rows that are known."""
+        columns = (self.at_us, self.ident, self.dlc, self.payload, self.channel)
+        if self.known.all():
+            return columns
+        return (
+            self.at_us[self.known],
+            self.ident[self.known],
+            self.dlc[self.known],
+            self.payload[self.known],
+            self.channel[self.known],
+        )
+
+
+def joined(parts: Iterable[Rows], channels: ChannelNames, tally: Tally) -> Columns:
+    """Return the rows that are known as columns."""
+    kept = [Rows(0).columns(), *(rows.columns() for rows in parts)]
+    return Columns(
+        np.concatenate([columns[0] for columns in kept]),
+        np.concatenate([columns[1] for columns in kept]),
+        np.concatenate([columns[2] for columns in kept]),
+        np.concatenate([columns[3] for columns in kept]),
+        np.concatenate([columns[4] for columns in kept]),
+        channels.names,
+        tally,
+    )

@@ -1,0 +1,1 @@
+"""Filters: their text, and what they ask of a frame."""

@@ -1,0 +1,1 @@
+"""What was heard of each node, and the board of all."""

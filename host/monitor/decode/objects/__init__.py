@@ -1,0 +1,1 @@
+"""What is known of objects: by standard, by EDS, by what was heard."""

@@ -1,0 +1,1 @@
+"""PDOs decoded: by mapping, by evidence, by DBC."""

@@ -1,0 +1,1 @@
+"""SDO frames put together to transfers, as a third party hears them."""

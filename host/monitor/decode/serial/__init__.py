@@ -1,0 +1,1 @@
+"""Lines of serial ports, decoded into the trace of the buses."""

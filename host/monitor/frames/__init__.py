@@ -1,0 +1,1 @@
+"""One frame: what was taken in, its identifier, its text."""

@@ -1,0 +1,105 @@
+"""Frames as lines of text, as candump shows them.
+
+>>> lines = DumpLines(Stamp.ZERO)
+>>> lines.line(Heard(1_000_000, "can0", CanFrame.parse("705#7F")))
+' (000.000000)  can0  705   [1]  7F'
+>>> lines.line(Heard(1_250_000, "can0", CanFrame.parse("185#R5")))
+' (000.250000)  can0  185   [5]  remote request'
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Final, assert_never
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
+
+DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
+
+
+class Stamp(StrEnum):
+    """What stands before a frame, as candump's `-t` names it."""
+
+    NONE = ""
+    ABSOLUTE = "a"
+    DELTA = "d"
+    ZERO = "z"
+    DATE = "A"
+
+
+class DumpLines:
+    """Writes one line for each frame.
+
+    Identifiers of 11 bits are indented once one of 29 bits was there.
+
+    Args:
+        stamp: what stands before a frame.
+        extra: show whether the frame was received or sent.
+    """
+
+    def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
+        self._stamp, self._extra = stamp, extra
+        self._first_us: int | None = None
+        self._last_us, self._width = 0, 3
+
+    def line(self, heard: Heard, text: str = "") -> str:
+        """Return the line, with what the frame means behind it."""
+        ident = _ident(heard.frame)
+        self._width = max(self._width, len(ident))
+        direction = f"  {'TX' if heard.sent else 'RX'} - -" if self._extra else ""
+        stamp = self.stamp(heard.at_us)
+        data = f"{_data(heard.frame):<{DATA_WIDTH}}   {text}" if text else _data(heard.frame)
+        return f"{stamp}  {heard.channel}{direction}  {ident:>{self._width}}   {data}"
+
+    def stamp(self, at_us: int) -> str:
+        """Return what stands before what was heard at this time."""
+        if self._stamp is Stamp.NONE:
+            return ""
+        if self._first_us is None:
+            self._first_us = self._last_us = at_us
+        last_us, self._last_us = self._last_us, at_us
+        match self._stamp:
+            case Stamp.ABSOLUTE:
+                return f" ({seconds_text(at_us, 10)})"
+            case Stamp.DATE:
+                return f" ({date_text(at_us)})"
+            case Stamp.ZERO:
+                return f" ({seconds_text(at_us - self._first_us, 3)})"
+            case Stamp.DELTA:
+                return f" ({seconds_text(at_us - last_us, 3)})"
+            case _:
+                assert_never(self._stamp)
+
+
+def _ident(frame: CanFrame | ErrorFrame) -> str:
+    if isinstance(frame, ErrorFrame):
+        return f"{ERROR_FLAG | frame.error_class:08X}"
+    return f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
+
+
+def _data(frame: CanFrame | ErrorFrame) -> str:
+    data = frame.data.hex(" ").upper()
+    if isinstance(frame, ErrorFrame):
+        return f"[{len(frame.data)}]  {data}   ERRORFRAME"
+    if frame.remote:
+        return f"[{frame.remote_length}]  remote request"
+    return f"[{len(frame.data)}] {' ' * bool(data)}{data}"
+
+
+def seconds_text(span_us: int, digits: int) -> str:
+    """Write seconds; a time that runs backwards has a sign."""
+    seconds, micros = divmod(abs(span_us), 1_000_000)
+    return f"{'-' * (span_us < 0)}{seconds:0{digits}d}.{micros:06d}"
+
+
+def date_text(at_us: int) -> str:
+    """Write a time since the epoch as the local date and time; without a date after 9999."""
+    from datetime import datetime  # noqa: PLC0415 - seldom wanted
+
+    seconds, micros = divmod(at_us, 1_000_000)
+    try:
+        return f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}.{micros:06d}"
+    except (ValueError, OverflowError, OSError):
+        return seconds_text(at_us, 10)

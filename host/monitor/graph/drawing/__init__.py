@@ -1,0 +1,1 @@
+"""Curves drawn: braille, SVG, PNG, HTML, CSV."""

@@ -1,0 +1,1 @@
+"""Log files read, one module a format."""

@@ -1,0 +1,118 @@
+"""Lines that candump and `canmon dump` show on a screen, with or without time.
+
+>>> tally, clock = Tally(), ScreenClock()
+>>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
+>>> heard = parse_screen_line(shown, tally, clock)
+>>> heard.at_us, heard.channel, str(heard.frame), heard.sent
+(250, 'can0', '705#7F', True)
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from typing import Final
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.reading.frame_notation import parse_frame
+from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, SERIAL_LINES, Tally
+from tickrig.wire.errors import WireError
+
+HEAD: Final = 1 << 13
+"""Bytes of a text by which it is told what its stamps are."""
+
+LATE_US: Final = 10_000
+"""Frames of several buses are shown out of order by less."""
+
+_STAMP: Final = (
+    r"\((?:(-?)([0-9]{1,12})|([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}))"
+    r"\.([0-9]{1,9})\)\s+"
+)
+_FRAME: Final = re.compile(
+    rf"(?:{_STAMP})?(\S{{1,32}})\s+(?:([RT])X [-B] [-E]\s+)?"
+    r"([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})\s+\[([0-9]{1,4})\](?:\s+(.*))?",
+    re.ASCII,
+)
+_SERIAL: Final = re.compile(rf"(?:{_STAMP})?\S+  [<>]  .*", re.ASCII)
+_WORDS: Final = re.compile(r"\t+[a-z]+-[a-z-]+(?:\{.*\})?\s*", re.ASCII)
+_COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
+_SPANS: Final = re.compile(
+    r"^\s*\((-?)([0-9]{3,9})\.([0-9]{6})\)\s+\S+\s.*\[[0-9]", re.ASCII | re.MULTILINE
+)
+_DIGITS: Final = re.compile(r"[0-9A-Fa-f]{2}")
+_ABSOLUTE: Final = 10
+"""Digits of the seconds since the epoch; with fewer it is a span of time."""
+
+
+class ScreenClock:
+    """Tells the time of a frame from the stamp before it.
+
+    Args:
+        deltas: spans count from the frame before (`-t d`), not from the first (`-t z`).
+    """
+
+    def __init__(self, deltas: bool = False) -> None:
+        self.deltas, self._now_us = deltas, 0
+
+    @classmethod
+    def of(cls, text: str) -> ScreenClock:
+        """Return the clock of a text: of deltas, where its first spans fall often or by much."""
+        head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
+        spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
+        falls = [before - after for before, after in pairwise(spans) if after < before]
+        return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > LATE_US)
+
+    def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
+        """Return the time of a stamp; of the frame before, where there is none.
+
+        Raises:
+            ValueError: a date that there is not.
+        """
+        micros = int(f"{fraction or '':0<6.6}")
+        if date is not None:
+            from datetime import datetime  # noqa: PLC0415 - seldom wanted
+
+            self._now_us = int(datetime.fromisoformat(date).timestamp()) * 1_000_000 + micros
+        elif seconds is not None:
+            span_us = int(f"{sign}1") * (int(seconds) * 1_000_000 + micros)
+            before_us = self._now_us if self.deltas and len(seconds) < _ABSOLUTE else 0
+            self._now_us = max(0, before_us + span_us)
+        return self._now_us
+
+
+def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Heard | str | None:
+    """Return a frame, what was counted or is no fault instead, or None for a bad line."""
+    text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
+    match = _FRAME.fullmatch(text)
+    if match is None:
+        return _beside(line, text, tally)
+    sign, seconds, date, fraction, channel, direction, ident, length, shown = match.groups()
+    if len(length) > 1:
+        kind = CAN_FD if len(length) == len("08") else CAN_XL
+        tally.passed_over[kind] += 1
+        return kind
+    try:
+        frame = parse_frame(f"{ident}#{_notation(int(length), shown or '')}")
+        at_us = clock.at_us(sign, seconds, date, fraction)
+    except (WireError, ValueError, OverflowError, OSError):
+        return None
+    tally.untimed += fraction is None
+    return Heard(at_us, channel, frame, direction == "T")
+
+
+def _beside(line: str, text: str, tally: Tally) -> str | None:
+    """Return what stands between frames: lines of serial ports, and error frames in words."""
+    if _SERIAL.fullmatch(text):
+        tally.passed_over[SERIAL_LINES] += 1
+        return SERIAL_LINES
+    return text if _WORDS.fullmatch(line) else None
+
+
+def _notation(length: int, shown: str) -> str:
+    """Return data in the notation of a log; what stands behind them is passed over."""
+    if shown.startswith("remote request"):
+        return f"R{length}"
+    digits = shown.split()[:length]
+    if len(digits) < length or not all(map(_DIGITS.fullmatch, digits)):
+        raise ValueError(f"{shown!r} is not {length} bytes")
+    return "".join(digits)

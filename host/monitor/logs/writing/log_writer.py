@@ -1,0 +1,127 @@
+"""Frames into a log file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO, Final, Protocol, cast
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, LogFormat, log_format
+from tickrig.host.monitor.logs.reading.csv_line import LOG_HEADER, csv_row
+from tickrig.host.monitor.logs.reading.json_line import json_line
+from tickrig.wire.candump import LogLine
+
+BLOCK_LINES: Final = 256
+
+
+class LogWriter(Protocol):
+    """A log file that is written."""
+
+    def write(self, heard: Heard, /) -> None:
+        """Add a frame."""
+        ...
+
+    def flush(self) -> None:
+        """Give what was added to the operating system, as far as the format can."""
+        ...
+
+    def close(self) -> None:
+        """End the log; closing twice is no error."""
+        ...
+
+    def words(self) -> list[str]:
+        """Say what the format could not hold, one line each."""
+        ...
+
+
+def write_log(path: Path) -> LogWriter:
+    """Begin a log; a file that exists is replaced.
+
+    Raises:
+        LogFormatError: the file's name tells no format.
+        OSError: it cannot be written.
+        LogError: its format needs a library that is not there.
+    """
+    kind = log_format(path)
+    if kind in TEXT:
+        return CsvLogWriter(path) if kind is LogFormat.CSV else TextLogWriter(create(path), kind)
+    from tickrig.host.monitor.logs.writing.can_log_writer import (  # noqa: PLC0415 - python-can is slow
+        CanLogWriter,
+    )
+
+    return CanLogWriter(path, kind)
+
+
+def create(path: Path) -> BinaryIO:
+    """Open a file for writing, through gzip where its name says so."""
+    if path.suffix.lower() != COMPRESSED:
+        return path.open("wb")
+    import gzip  # noqa: PLC0415 - seldom wanted
+
+    return cast("BinaryIO", gzip.open(path, "wb"))  # it is written like one
+
+
+def log_line(heard: Heard) -> str:
+    """Write a frame as `candump -L` does; what we sent ends in T, as `candump -L -x` has it."""
+    line = str(LogLine(heard.at_us, heard.channel, heard.frame))
+    return f"{line} T" if heard.sent else line
+
+
+_LINES: Final = {
+    LogFormat.CANDUMP: log_line,
+    LogFormat.JSONL: json_line,
+    LogFormat.CSV: csv_row,
+}
+
+
+class TextLogWriter:
+    """A log in lines: candump's, JSON or CSV."""
+
+    def __init__(self, file: BinaryIO, kind: LogFormat) -> None:
+        self._file, self._lines = file, list[str]()
+        self._text = _LINES[kind]
+
+    def write(self, heard: Heard, /) -> None:
+        """Add a line."""
+        self._lines.append(self._text(heard))
+        if len(self._lines) >= BLOCK_LINES:
+            self._give()
+
+    def flush(self) -> None:
+        """Give what was added to the operating system."""
+        self._give()
+        self._file.flush()
+
+    def close(self) -> None:
+        """End the log."""
+        if not self._file.closed:
+            self._give()
+            self._file.close()
+
+    def words(self) -> list[str]:
+        """Nothing: these formats hold all there is."""
+        return []
+
+    def _give(self) -> None:
+        self._file.write("".join(f"{line}\n" for line in self._lines).encode())
+        self._lines.clear()
+
+
+class CsvLogWriter(TextLogWriter):
+    """Rows below a header; they do not name their bus."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(create(path), LogFormat.CSV)
+        self._name, self._channels = path.name, dict[str, None]()
+        self._lines.append(LOG_HEADER)
+
+    def write(self, heard: Heard, /) -> None:
+        """Add a row."""
+        self._channels[heard.channel] = None
+        super().write(heard)
+
+    def words(self) -> list[str]:
+        """Say which buses became one."""
+        if len(self._channels) < 2:
+            return []
+        return [f"{self._name}: csv does not tell buses apart: {', '.join(self._channels)}"]

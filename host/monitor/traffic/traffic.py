@@ -1,0 +1,150 @@
+"""The traffic of all buses: one row for each identifier, one for each bus.
+
+>>> traffic = Traffic()
+>>> traffic.take(Heard(0, "can0", CanFrame.parse("705#7F")))
+>>> traffic.take(Heard(100_000, "can0", CanFrame.parse("705#05")))
+>>> row = traffic.snapshot().rows[0]
+>>> row.frames, row.gap_us, row.changed.latest == 0x7F ^ 0x05
+(2, 100000, True)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.ident import ident_of
+from tickrig.host.monitor.traffic.controller import Controller, ErrorRow
+from tickrig.host.monitor.traffic.load import Load, LoadRow
+from tickrig.host.monitor.traffic.tally import IdRow, Tally
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+
+class BusRow(NamedTuple):
+    """What one bus did.
+
+    Attributes:
+        channel: its name.
+        frames: data and remote frames.
+        first_us: when the first came, or the first error frame.
+        last_us: when the latest came.
+        load: how busy it was.
+        errors: what error frames said.
+        went_back: how many frames had an earlier time than the one before.
+    """
+
+    channel: str
+    frames: int
+    first_us: int
+    last_us: int
+    load: LoadRow
+    errors: ErrorRow
+    went_back: int
+
+
+class Snapshot(NamedTuple):
+    """All rows at one moment; they never change.
+
+    Attributes:
+        at_us: the moment.
+        buses: by name.
+        rows: by bus and identifier.
+    """
+
+    at_us: int = 0
+    buses: tuple[BusRow, ...] = ()
+    rows: tuple[IdRow, ...] = ()
+
+
+class BusTally:
+    """Counts one bus."""
+
+    def __init__(self, channel: str, first_us: int) -> None:
+        self._channel = channel
+        self._first_us = self._last_us = first_us
+        self._ids: dict[int, Tally] = {}
+        self._load, self._errors = Load(first_us), Controller()
+        self._frames = self._went_back = 0
+
+    def take(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+        """Count a frame."""
+        if at_us < self._last_us:
+            self._went_back += 1
+        self._last_us = at_us
+        if isinstance(frame, ErrorFrame):
+            self._errors.take(frame)
+            return
+        self._frames += 1
+        ident = ident_of(frame)
+        tally = self._ids.get(ident)
+        if tally is None:
+            tally = self._ids[ident] = Tally(at_us, frame)
+        else:
+            tally.take(at_us, frame)
+        self._load.take(at_us, tally.length)
+
+    def notch(self) -> None:
+        """Take all bits that have changed as known."""
+        for tally in self._ids.values():
+            tally.memory.notch()
+
+    def row(self, now_us: int) -> BusRow:
+        """Return what the bus did."""
+        return BusRow(
+            self._channel,
+            self._frames,
+            self._first_us,
+            self._last_us,
+            self._load.row(now_us),
+            self._errors.row(),
+            self._went_back,
+        )
+
+    def id_rows(self) -> list[IdRow]:
+        """Return what its identifiers did, in their order."""
+        return [tally.row(self._channel, ident) for ident, tally in sorted(self._ids.items())]
+
+
+class Traffic:
+    """Counts all frames of all buses; what it keeps grows with identifiers, not with frames.
+
+    Not counted: what was lost before it was heard; see `Loss`.
+    """
+
+    def __init__(self) -> None:
+        self._buses: dict[str, BusTally] = {}
+        self._last_us = 0
+
+    def take(self, heard: Heard) -> None:
+        """Count a frame or an error frame."""
+        at_us, channel, frame, _ = heard
+        bus = self._buses.get(channel)
+        if bus is None:
+            bus = self._buses[channel] = BusTally(channel, at_us)
+        bus.take(at_us, frame)
+        self._last_us = at_us
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._buses.clear()
+
+    def notch(self) -> None:
+        """Take all bits that have changed as known: only others are shown from now on."""
+        for bus in self._buses.values():
+            bus.notch()
+
+    def snapshot(self, now_us: int | None = None) -> Snapshot:
+        """Return all rows.
+
+        Args:
+            now_us: the time; that of the latest frame if it is not given.
+        """
+        at_us = self._last_us if now_us is None else now_us
+        buses = [self._buses[name] for name in sorted(self._buses)]
+        rows = tuple(row for bus in buses for row in bus.id_rows())
+        return Snapshot(at_us, self.buses(at_us), rows)
+
+    def buses(self, now_us: int) -> tuple[BusRow, ...]:
+        """Return the rows of the buses alone, which takes less time."""
+        return tuple(self._buses[name].row(now_us) for name in sorted(self._buses))

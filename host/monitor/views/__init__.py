@@ -1,0 +1,1 @@
+"""What is shown of traffic: tables, trace and statistics as text, JSON and rows."""

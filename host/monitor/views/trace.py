@@ -1,0 +1,147 @@
+"""The latest frames one below the other, with the times between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import islice
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.ident import ERROR, ident_of
+from tickrig.wire.can import CanFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.serial.heard_line import Listened
+
+LINE: Final = 1 << 32
+"""In a key: a line of a serial port; 1 above it for those to the device."""
+
+CAPACITY: Final = 100_000
+
+Key = tuple[str, int]
+"""Bus and identifier."""
+
+
+class TraceRow(NamedTuple):
+    """One frame of the trace, or one line of a serial port.
+
+    Attributes:
+        number: of the frame since the trace began, from 0.
+        heard: the frame.
+        since_us: since the frame before it on any bus; None for the first.
+        gap_us: since the frame before it with this identifier on this bus; None for the first.
+        changed: bits in which its payload differs from that one's; see `BitRow`.
+        decoded: what it means, where that was asked.
+    """
+
+    number: int
+    heard: Listened
+    since_us: int | None
+    gap_us: int | None
+    changed: int = 0
+    decoded: Decoded | None = None
+
+
+class Ring:
+    """Rows with running numbers, the latest kept.
+
+    Args:
+        capacity: how many are kept.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._rows: deque[TraceRow] = deque(maxlen=capacity)
+        self._count = 0
+
+    @property
+    def count(self) -> int:
+        """How many rows were taken."""
+        return self._count
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest row that is kept."""
+        return self._count - len(self._rows)
+
+    def append(self, row: TraceRow) -> None:
+        """Add a row at the end."""
+        self._rows.append(row)
+        self._count += 1
+
+    def rows(self, begin: int, count: int) -> list[TraceRow]:
+        """Return rows by number; those that are given up or not there yet are left out."""
+        first = min(max(begin, self.first), self._count)
+        end = min(max(begin + count, first), self._count)
+        if first - self.first < self._count - end:
+            return list(islice(self._rows, first - self.first, end - self.first))
+        found = islice(reversed(self._rows), self._count - end, self._count - first)
+        return list(found)[::-1]  # the latest are near this end
+
+    def tail(self, count: int) -> list[TraceRow]:
+        """Return the latest rows."""
+        return self.rows(self._count - count, count)
+
+    def copy(self) -> Ring:
+        """Return one that no further row is added to."""
+        found = Ring(self._rows.maxlen or CAPACITY)
+        found._rows.extend(self._rows)
+        found._count = self._count
+        return found
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._rows.clear()
+        self._count = 0
+
+
+class Trace(Ring):
+    """Keeps the latest frames; what is older is given up, and counted.
+
+    Times that go back count as 0.
+
+    Args:
+        capacity: how many frames are kept.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        super().__init__(capacity)
+        self._latest: dict[Key, tuple[int, int]] = {}
+        self._last_us: int | None = None
+
+    def take(self, heard: Listened, decoded: Decoded | None = None) -> TraceRow:
+        """Add a frame or a line at the end."""
+        at_us, key = heard.at_us, key_of(heard)
+        data = heard.frame.data if isinstance(heard, Heard) else heard.data
+        payload = int.from_bytes(data, "little")
+        before_us, before = self._latest.get(key, (None, payload))
+        row = TraceRow(
+            self.count,
+            heard,
+            _since(at_us, self._last_us),
+            _since(at_us, before_us),
+            payload ^ before,
+            decoded,
+        )
+        self.append(row)
+        self._latest[key] = at_us, payload
+        self._last_us = at_us
+        return row
+
+    def clear(self) -> None:
+        """Begin anew."""
+        super().clear()
+        self._latest.clear()
+        self._last_us = None
+
+
+def key_of(heard: Listened) -> Key:
+    """Return bus and identifier; error frames are a kind of their own, and so are lines."""
+    if not isinstance(heard, Heard):
+        return heard.channel, LINE + heard.sent
+    frame = heard.frame
+    return heard.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+
+
+def _since(at_us: int, before_us: int | None) -> int | None:
+    return None if before_us is None else max(0, at_us - before_us)

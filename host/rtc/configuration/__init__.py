@@ -1,0 +1,1 @@
+"""Configuration sets, parameters and their constraints (OMG SDO)."""

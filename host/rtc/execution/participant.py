@@ -1,0 +1,130 @@
+"""One component in one execution context: its state, and the callbacks of each move.
+
+| from | to | callbacks, in order |
+|---|---|---|
+| Inactive | Active | on_activated |
+| Active | Inactive | on_deactivated; if it fails, on_aborting, and the state is Error |
+| Active | Error | on_deactivated, on_aborting |
+| Inactive | Error | on_aborting |
+| Error | Inactive | on_reset; if it fails, the state stays Error |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.rtc.component_action import ComponentAction, guarded
+from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+
+if TYPE_CHECKING:
+    from tickrig.host.rtc.component import RtComponent
+    from tickrig.host.rtc.execution.execution_context import ExecutionContext
+
+_OK: Final = ReturnCode.RTC_OK
+_CREATED: Final = LifeCycleState.CREATED
+_INACTIVE: Final = LifeCycleState.INACTIVE
+_ACTIVE: Final = LifeCycleState.ACTIVE
+_ERROR: Final = LifeCycleState.ERROR
+
+Callback = Callable[["ExecutionContext"], ReturnCode]
+
+
+class Participant:
+    """A component as its execution context sees it.
+
+    Attributes:
+        state: the present state; Created after it was removed.
+        wanted: the state it is to be moved to in the next pre-pass, if any.
+    """
+
+    __slots__ = ("_context", "_updates", "component", "state", "wanted")
+
+    def __init__(self, component: RtComponent, context: ExecutionContext) -> None:
+        self.component, self._context = component, context
+        self.state: LifeCycleState = _INACTIVE
+        self.wanted: LifeCycleState | None = None
+        base = ComponentAction.on_state_update
+        self._updates = type(component).on_state_update is not base
+
+    def request(self, source: LifeCycleState, wanted: LifeCycleState) -> ReturnCode:
+        """Ask for a move; PRECONDITION_NOT_MET unless in `source` and not on the way to Error."""
+        if self.state is not source or self.wanted is _ERROR:
+            return ReturnCode.PRECONDITION_NOT_MET
+        self.wanted = wanted
+        return _OK
+
+    def abort(self) -> None:
+        """Move to Error in the next pre-pass; nothing if it is there."""
+        if self.state is not _ERROR:
+            self.wanted = _ERROR
+
+    def tell(self, callback: Callback) -> None:
+        """Run a callback that belongs to no state; if it fails, Error comes next."""
+        if self._call(callback) is not _OK:
+            self.abort()
+
+    def pre(self) -> None:
+        """First pass of a period: make the move that is wanted."""
+        if self.component.configuration.changed:
+            self.tell(self._update_configuration)
+        if (wanted := self.wanted) is not None:
+            self.wanted = None
+            _MOVES[self.state, wanted](self)
+
+    def do(self) -> None:
+        """Second pass of a period: the work of the state."""
+        if self.state is _ACTIVE:
+            if self.wanted is not _ERROR and self._call(self.component.on_execute) is not _OK:
+                self.wanted = _ERROR
+        elif self.state is _ERROR:
+            self._call(self.component.on_error)
+
+    def post(self) -> None:
+        """Third pass of a period, after the second one of all participants."""
+        if self._updates and self.state is _ACTIVE and self.wanted is not _ERROR:
+            self.tell(self.component.on_state_update)
+
+    def leave(self) -> None:
+        """Leave Active at once, as a component that ends does; the state is Created."""
+        if self.state is _ACTIVE:
+            self._call(self.component.on_deactivated)
+        self.state, self.wanted = _CREATED, None
+
+    def _update_configuration(self, ec: ExecutionContext) -> ReturnCode:
+        self.component.configuration.update()
+        return _OK
+
+    def _activate(self) -> None:
+        self.state = _ACTIVE
+        self.tell(self.component.on_activated)
+
+    def _deactivate(self) -> None:
+        if self._call(self.component.on_deactivated) is _OK:
+            self.state = _INACTIVE
+        else:
+            self._enter_error()
+
+    def _abort_active(self) -> None:
+        self._call(self.component.on_deactivated)
+        self._enter_error()
+
+    def _enter_error(self) -> None:
+        self.state = _ERROR
+        self._call(self.component.on_aborting)
+
+    def _reset(self) -> None:
+        if self._call(self.component.on_reset) is _OK:
+            self.state = _INACTIVE
+
+    def _call(self, callback: Callback) -> ReturnCode:
+        return guarded(self.component.instance_name, callback, self._context)
+
+
+_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], None]]] = {
+    (_INACTIVE, _ACTIVE): Participant._activate,
+    (_INACTIVE, _ERROR): Participant._enter_error,
+    (_ACTIVE, _INACTIVE): Participant._deactivate,
+    (_ACTIVE, _ERROR): Participant._abort_active,
+    (_ERROR, _INACTIVE): Participant._reset,
+}

@@ -1,0 +1,112 @@
+"""Execution contexts and pushing connectors of one system, run by time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from tickrig.host.links.link import NEVER
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.ports.connector import Connector
+
+
+class Item(Protocol):
+    """Something that a schedule ticks beside execution contexts and connectors."""
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do; `NEVER` if that is not known."""
+        ...
+
+    def tick(self, now_us: int, /) -> None:
+        """Go on to `now_us`."""
+
+
+class Schedule:
+    """Runs what is due. It has no clock: `tick` is told the time.
+
+    In one tick other items go on first, then the execution contexts run in the
+    order in which they were added, then connectors push, then what was put off
+    is done. In virtual time `run_to` ticks; in real time somebody else waits
+    for `due_us` and ticks.
+
+    Attributes:
+        now_us: the time it was told last.
+    """
+
+    def __init__(self) -> None:
+        self.now_us = 0
+        self._items: tuple[Item, ...] = ()
+        self._contexts: list[ExecutionContext] = []
+        self._publishing: list[Connector[Any]] = []
+        self._put_off: list[Callable[[], None]] = []
+        self._ticking = False
+
+    @property
+    def due_us(self) -> int:
+        """The next time at which there is something to do; the present if it is overdue."""
+        due_us = min((context.due_us for context in self._contexts), default=NEVER)
+        for connector in self._publishing:
+            due_us = min(due_us, connector.due_us)
+        for item in self._items:
+            due_us = min(due_us, item.due_us)
+        return max(due_us, self.now_us)
+
+    def tick(self, now_us: int) -> None:
+        """Go on to `now_us`, and run what is due.
+
+        Who skips a `due_us` skips its periods: each execution context runs one at most.
+        """
+        self.now_us, self._ticking = now_us, True
+        for item in self._items:
+            item.tick(now_us)
+        for context in self._contexts:
+            context.tick(now_us)
+        for connector in self._publishing:
+            connector.tick(now_us)
+        self._ticking = False
+        while self._put_off:
+            self._put_off.pop(0)()
+
+    def run_to(self, t_us: int) -> None:
+        """Run all that is due up to and at `t_us`, without waiting."""
+        while (due_us := self.due_us) <= t_us:
+            self.tick(due_us)
+            if due_us == t_us:
+                return
+        self.tick(t_us)
+
+    def run_for(self, duration_us: int) -> None:
+        """Run what is due in the next `duration_us`."""
+        self.run_to(self.now_us + duration_us)
+
+    def put_off(self, action: Callable[[], None]) -> None:
+        """Do something at once, or at the end of the tick if one is running."""
+        if self._ticking:
+            self._put_off.append(action)
+        else:
+            action()
+
+    def run_context(self, context: ExecutionContext) -> None:
+        """Run an execution context from now on; one that is run already is no error."""
+        if context not in self._contexts:
+            context.tick(self.now_us)
+            self._contexts.append(context)
+
+    def drop_context(self, context: ExecutionContext) -> None:
+        """Run an execution context no more."""
+        self._contexts.remove(context)
+
+    def run_item(self, item: Item) -> None:
+        """Tick something else, too, from now on."""
+        self._items += (item,)
+
+    def drop_item(self, item: Item) -> None:
+        """Tick it no more."""
+        self._items = tuple(other for other in self._items if other is not item)
+
+    def run_connector(self, connector: Connector[Any]) -> None:
+        """Let a connector push from now on, if it pushes later than it is written to."""
+        self._publishing = [other for other in self._publishing if other.joined]
+        if connector.publishes:
+            self._publishing.append(connector)

@@ -1,0 +1,94 @@
+"""Make connectors between ports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.connector import Connector
+from tickrig.host.rtc.ports.connector_options import ConnectorOptions
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
+from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServiceConnector, ServicePort
+
+Properties = Mapping[str, str]
+
+
+def connect(
+    first: AnyPort, second: AnyPort, properties: Properties | None = None, *, name: str = ""
+) -> ConnectorBase:
+    """Join an OutPort and an InPort, or two service ports; their order does not matter.
+
+    Args:
+        first: a port.
+        second: the other one.
+        properties: `dataport.*` of data ports; see `ConnectorOptions.parse`.
+        name: of the connector; made of those of the ports if left out.
+
+    Raises:
+        RtcRefused: ports that do not fit, are joined already, or properties that cannot be.
+    """
+    if first is second:
+        raise RtcRefused(f"{first.full_name} is one port; a connector joins two")
+    if first.connector_to(second):
+        message = f"{first.full_name} and {second.full_name} are connected"
+        raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
+    connector = _connector(first, second, properties or {}, name)
+    connector.begin()
+    return connector
+
+
+def _connector(first: AnyPort, second: AnyPort, properties: Properties, name: str) -> ConnectorBase:
+    match first, second:
+        case OutPort(), InPort():
+            return _data_connector(first, second, properties, name)
+        case InPort(), OutPort():
+            return _data_connector(second, first, properties, name)
+        case ServicePort(), ServicePort():
+            return _service_connector(first, second, properties, name)
+    kinds = f"{first.port_type} {first.full_name}, {second.port_type} {second.full_name}"
+    raise RtcRefused(f"{kinds} do not fit: an OutPort and an InPort, or service ports do")
+
+
+def _profile(
+    first: AnyPort, second: AnyPort, properties: Properties, name: str
+) -> ConnectorProfile:
+    ports = (first.full_name, second.full_name)
+    connector_id = "_".join(ports)
+    return ConnectorProfile(name or connector_id, connector_id, ports, properties)
+
+
+def _data_connector(
+    out: OutPort[Any], in_: InPort[Any], properties: Properties, name: str
+) -> ConnectorBase:
+    if out.data_type is not in_.data_type:
+        raise RtcRefused(
+            f"{out.full_name} carries {out.data_type.idl_id()},"
+            f" {in_.full_name} {in_.data_type.idl_id()}"
+        )
+    options = ConnectorOptions.parse(properties)
+    stated = {"dataport.data_type": out.data_type.idl_id(), **options.stated, **properties}
+    return Connector(_profile(out, in_, stated, name), (out, in_), options)
+
+
+def _service_connector(
+    first: ServicePort, second: ServicePort, properties: Properties, name: str
+) -> ConnectorBase:
+    pairs = (*_pairs(first, second), *_pairs(second, first))
+    if not pairs:
+        raise RtcRefused(f"{first.full_name} and {second.full_name} share no interface type")
+    return ServiceConnector(_profile(first, second, properties, name), (first, second), pairs)
+
+
+def _pairs(
+    calling: ServicePort, called: ServicePort
+) -> Iterator[tuple[Consumer[Any], Provider[Any]]]:
+    """Find a provider for each consumer: one of its type, best one of its instance name, too."""
+    for consumer in calling.consumers:
+        wanted = consumer.profile
+        fitting = [p for p in called.providers if p.profile.type_name == wanted.type_name]
+        fitting.sort(key=lambda p: p.profile.instance_name != wanted.instance_name)
+        if fitting and not consumer.connected:
+            yield consumer, fitting[0]

@@ -1,0 +1,131 @@
+"""The buffer of a connector (OpenRTM-aist 1.x, RingBuffer)."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Generic, TypeVar
+
+from tickrig.host.rtc.ports.port_status import PortStatus
+
+T = TypeVar("T")
+
+DEFAULT_LENGTH: Final = 8
+MAX_LENGTH: Final = 1_000_000
+
+
+class FullPolicy(StrEnum):
+    """What writing into a full buffer does (`buffer.write.full_policy`)."""
+
+    OVERWRITE = "overwrite"
+    DO_NOTHING = "do_nothing"
+    BLOCK = "block"
+
+
+class EmptyPolicy(StrEnum):
+    """What reading from an empty buffer does (`buffer.read.empty_policy`)."""
+
+    READBACK = "readback"
+    DO_NOTHING = "do_nothing"
+    BLOCK = "block"
+
+
+class ReadPolicy(StrEnum):
+    """Which of the waiting values is read; those before it are dropped (`buffer.read.policy`)."""
+
+    FIFO = "fifo"
+    LAST = "last"
+    SKIP = "skip"
+
+
+@dataclass(frozen=True, slots=True)
+class BufferOptions:
+    """How a buffer behaves.
+
+    Attributes:
+        length: how many values it holds, 1 to 1 000 000.
+        full: what writing does when it is full.
+        empty: what reading does when it is empty.
+        read: which value is read.
+        skip_count: how many are dropped before each one that is read, with `skip`.
+
+    Raises:
+        ValueError: a length out of its range, or a skip_count that is not below the length.
+    """
+
+    length: int = DEFAULT_LENGTH
+    full: FullPolicy = FullPolicy.OVERWRITE
+    empty: EmptyPolicy = EmptyPolicy.READBACK
+    read: ReadPolicy = ReadPolicy.FIFO
+    skip_count: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not 1 <= self.length <= MAX_LENGTH:
+            raise ValueError(f"buffer length {self.length} is not in 1..{MAX_LENGTH}")
+        if not 0 <= self.skip_count < self.length:
+            raise ValueError(f"skip_count {self.skip_count} is not in 0..{self.length - 1}")
+
+
+class RingBuffer(Generic[T]):
+    """Values in the order of their arrival, up to a length.
+
+    Nothing waits: where OpenRTM would block, its time-out is over at once.
+    """
+
+    __slots__ = ("_last", "_options", "_skip", "_values")
+
+    def __init__(self, options: BufferOptions = BufferOptions()) -> None:
+        self._options = options
+        self._skip = options.skip_count if options.read is ReadPolicy.SKIP else 0
+        self._values: deque[T] = deque(maxlen=options.length)
+        self._last: T | None = None
+
+    def __len__(self) -> int:
+        """Return how many values wait."""
+        return len(self._values)
+
+    @property
+    def readable(self) -> bool:
+        """Whether `read` finds a new value."""
+        return len(self._values) > self._skip
+
+    def write(self, value: T) -> PortStatus:
+        """Put a value behind the others.
+
+        Returns:
+            PORT_OK, also when the oldest was overwritten; if it is full BUFFER_FULL with
+            `do_nothing`, BUFFER_TIMEOUT with `block`.
+        """
+        values, options = self._values, self._options
+        if len(values) == options.length and options.full is not FullPolicy.OVERWRITE:
+            blocks = options.full is FullPolicy.BLOCK
+            return PortStatus.BUFFER_TIMEOUT if blocks else PortStatus.BUFFER_FULL
+        values.append(value)
+        return PortStatus.PORT_OK
+
+    def read(self) -> T | None:
+        """Take a value.
+
+        Returns:
+            If there is no new one: with `readback` the value read last, else None.
+        """
+        values = self._values
+        if not self.readable:
+            return self._last if self._options.empty is EmptyPolicy.READBACK else None
+        skip = len(values) - 1 if self._options.read is ReadPolicy.LAST else self._skip
+        for _ in range(skip):
+            values.popleft()
+        self._last = values.popleft()
+        return self._last
+
+    def pop(self) -> tuple[T, ...]:
+        """Take the oldest value, if there is one."""
+        return (self._values.popleft(),) if self._values else ()
+
+    def clear(self) -> tuple[T, ...]:
+        """Take all values; what was read last stays."""
+        values = tuple(self._values)
+        self._values.clear()
+        return values

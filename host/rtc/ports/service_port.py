@@ -1,0 +1,113 @@
+"""Service ports: interfaces that one component provides and another calls."""
+
+from __future__ import annotations
+
+from typing import Any, Generic, TypeVar
+
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.ports.port import (
+    AnyPort,
+    ConnectorBase,
+    ConnectorProfile,
+    InterfaceProfile,
+    Port,
+)
+
+T = TypeVar("T")  # an interface: a Protocol
+
+
+class Provider(Generic[T]):
+    """An interface that a port provides.
+
+    Args:
+        instance_name: its name on the port.
+        type_name: the name of its interface type; only consumers of the same type fit.
+        servant: what carries the calls out.
+    """
+
+    def __init__(self, instance_name: str, type_name: str, servant: T) -> None:
+        self.servant = servant
+        self.profile = InterfaceProfile(instance_name, type_name, "PROVIDED")
+
+
+class Consumer(Generic[T]):
+    """An interface that a port calls: `Consumer[RefHard]("refhard", "RefHard")`.
+
+    Calls are plain method calls: they return before anything else happens, and
+    raise in the caller what the provider raises.
+    """
+
+    def __init__(self, instance_name: str, type_name: str) -> None:
+        self.profile = InterfaceProfile(instance_name, type_name, "REQUIRED")
+        self._provider: Provider[T] | None = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a provider."""
+        return self._provider is not None
+
+    @property
+    def service(self) -> T:
+        """The provider's servant; RtcRefused (PRECONDITION_NOT_MET) without one."""
+        if self._provider is None:
+            message = f"{self.profile.instance_name} is not connected"
+            raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
+        return self._provider.servant
+
+    def take(self, provider: Provider[T] | None) -> None:
+        """Call this provider from now on; none ends it."""
+        self._provider = provider
+
+
+Interface = Provider[Any] | Consumer[Any]
+
+
+class ServicePort(Port["ServiceConnector"]):
+    """A port with interfaces, each provided or required."""
+
+    port_type = "CorbaPort"
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.providers: list[Provider[Any]] = []
+        self.consumers: list[Consumer[Any]] = []
+
+    def provide(self, provider: Provider[T]) -> Provider[T]:
+        """Add an interface that others may call, and return it."""
+        self.providers.append(provider)
+        return provider
+
+    def require(self, consumer: Consumer[T]) -> Consumer[T]:
+        """Add an interface that is to be called, and return it."""
+        self.consumers.append(consumer)
+        return consumer
+
+    def _interfaces(self) -> tuple[InterfaceProfile, ...]:
+        interfaces: list[Interface] = [*self.providers, *self.consumers]
+        return tuple(interface.profile for interface in interfaces)
+
+
+class ServiceConnector(ConnectorBase):
+    """Gives the consumers of each port the providers of the other."""
+
+    def __init__(
+        self,
+        profile: ConnectorProfile,
+        ports: tuple[AnyPort, AnyPort],
+        pairs: tuple[tuple[Consumer[Any], Provider[Any]], ...],
+    ) -> None:
+        super().__init__(profile, ports)
+        self._pairs = pairs
+
+    def begin(self) -> None:
+        """Give the consumers their providers, then tell the listeners of both ports."""
+        for consumer, provider in self._pairs:
+            consumer.take(provider)
+        super().begin()
+
+    def end(self) -> None:
+        """Take the providers away, then tell the listeners of both ports."""
+        for consumer, _ in self._pairs if self.joined else ():
+            consumer.take(None)
+        super().end()

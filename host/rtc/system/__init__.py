@@ -1,0 +1,1 @@
+"""Whole systems: their manager, their names, and the files they are saved in."""

@@ -1,0 +1,228 @@
+"""The manager of a system: it makes and ends components, joins their ports, and runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import Final, TypeVar
+
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.schedule import Schedule
+from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc.ports.connect import Properties, connect
+from tickrig.host.rtc.ports.connector import Connector
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
+from tickrig.host.rtc.system.name_service import NameService
+
+Factory = Callable[[str], RtComponent]
+"""Makes a component of an instance name; a class of components is one."""
+
+R = TypeVar("R", bound=RtComponent)
+
+DEFAULT_RATE_HZ: Final = 1_000.0
+
+
+class Manager(Schedule):
+    """Components with their names, ports and execution contexts (OpenRTM-aist 1.x, Manager).
+
+    Not emulated: loading of modules from files, and managers that command others.
+
+    Args:
+        host: naming context of its components.
+
+    Attributes:
+        names: its components, such as `localhost/ConsoleIn0.rtc`.
+    """
+
+    def __init__(self, host: str = "localhost") -> None:
+        super().__init__()
+        self.names = NameService[RtComponent]()
+        self._host = host
+        self._factories: dict[str, Factory] = {}
+        self._components: dict[str, RtComponent] = {}
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Names of the types that can be created."""
+        return tuple(self._factories)
+
+    @property
+    def components(self) -> tuple[RtComponent, ...]:
+        """The components, in the order in which they were added."""
+        return tuple(self._components.values())
+
+    @property
+    def connectors(self) -> tuple[ConnectorProfile, ...]:
+        """All connectors between its components, each once."""
+        ports = [port for component in self.components for port in component.ports.values()]
+        own = {port.full_name for port in ports}
+        profiles = {
+            connector.profile.connector_id: connector.profile
+            for port in ports
+            for connector in port.connectors
+            if own.issuperset(connector.profile.ports)
+        }
+        return tuple(profiles.values())
+
+    def register(self, kind: type[RtComponent]) -> None:
+        """Let components of a class be created."""
+        self._factories[kind.spec.type_name] = kind
+
+    def create(
+        self,
+        type_name: str,
+        instance_name: str = "",
+        rate_hz: float = DEFAULT_RATE_HZ,
+        context: ExecutionContext | None = None,
+    ) -> RtComponent:
+        """Create a component of a registered type, and add it; see `add`.
+
+        Args:
+            type_name: as registered.
+            instance_name: the type name with the lowest number that is free, if left out.
+            rate_hz: of its own execution context.
+            context: an execution context to take part in, in place of an own one.
+        """
+        if (factory := self._factories.get(type_name)) is None:
+            known = ", ".join(self.types) or "none"
+            raise RtcRefused(f"no component type {type_name!r}; known: {known}")
+        component = factory(instance_name or self.free_name(type_name))
+        return self.add(component, rate_hz, context)
+
+    def add(
+        self,
+        component: R,
+        rate_hz: float = DEFAULT_RATE_HZ,
+        context: ExecutionContext | None = None,
+    ) -> R:
+        """Initialize a component, name it, and start its execution context.
+
+        Raises:
+            RtcRefused: its name is taken, or on_initialize failed.
+            ValueError: a rate that no execution context can have.
+        """
+        name = component.instance_name
+        if name in self._components:
+            raise RtcRefused(f"a component {name!r} is there already")
+        if context is None:
+            component.own(own := ExecutionContext(rate_hz))
+            self.run_context(own)
+        else:
+            context.add_component(component)
+            self.run_context(context)
+        if (code := component.initialize()) is not ReturnCode.RTC_OK:
+            self._leave(component)
+            raise RtcRefused(f"on_initialize of {name} returned {code.name}", code)
+        self._components[name] = component
+        self.names.bind(self.path(name), component)
+        return component
+
+    def delete(self, name: str) -> None:
+        """End a component; asked for in a callback, at the end of the tick.
+
+        Raises:
+            RtcRefused: no such component.
+        """
+        component = self.find(name)
+        self.put_off(lambda: self._end(component))
+
+    def find(self, name: str) -> RtComponent:
+        """Return a component by its instance name or its path; RtcRefused if there is none."""
+        if "/" in name:
+            return self.names.resolve(name)
+        if (component := self._components.get(name)) is None:
+            known = ", ".join(self._components) or "none"
+            raise RtcRefused(f"no component {name!r}; known: {known}")
+        return component
+
+    def port(self, name: str) -> AnyPort:
+        """Return a port by its full name or path: `ConsoleIn0.out`, `localhost/ConsoleIn0.rtc:out`.
+
+        Raises:
+            RtcRefused: no such component or port.
+        """
+        owner, _, port_name = name.rpartition(":" if ":" in name else ".")
+        component = self.find(owner)
+        if (port := component.ports.get(port_name)) is None:
+            known = ", ".join(component.ports) or "none"
+            raise RtcRefused(f"{owner} has no port {port_name!r}; known: {known}")
+        return port
+
+    def connect(
+        self, first: str, second: str, properties: Properties | None = None, *, name: str = ""
+    ) -> ConnectorProfile:
+        """Join two ports by their names; see `connect.connect` and `port`."""
+        connector = connect(self.port(first), self.port(second), properties, name=name)
+        if isinstance(connector, Connector):
+            self.run_connector(connector)
+        return connector.profile
+
+    def disconnect(self, first: str, second: str) -> None:
+        """End the connector between two ports; RtcRefused if there is none."""
+        connector = self.port(first).connector_to(self.port(second))
+        if connector is None:
+            raise RtcRefused(f"{first} and {second} are not connected")
+        connector.end()
+
+    def context_of(self, name: str) -> ExecutionContext:
+        """Return the first execution context of a component; RtcRefused if it has none."""
+        if not (contexts := self.find(name).contexts):
+            raise RtcRefused(f"{name} takes part in no execution context")
+        return contexts[0]
+
+    def state_of(self, name: str) -> LifeCycleState:
+        """Return the state of a component in its first execution context."""
+        return self.context_of(name).state_of(self.find(name))
+
+    def activate(self, *names: str) -> None:
+        """Ask for Active; RtcRefused for the first one whose context refuses."""
+        for name in names:
+            code = self.context_of(name).activate_component(self.find(name))
+            self._demand(code, name, "activate")
+
+    def deactivate(self, *names: str) -> None:
+        """Ask for Inactive; RtcRefused for the first one whose context refuses."""
+        for name in names:
+            code = self.context_of(name).deactivate_component(self.find(name))
+            self._demand(code, name, "deactivate")
+
+    def reset(self, *names: str) -> None:
+        """Ask for Error to Inactive; RtcRefused for the first one whose context refuses."""
+        for name in names:
+            code = self.context_of(name).reset_component(self.find(name))
+            self._demand(code, name, "reset")
+
+    def free_name(self, type_name: str) -> str:
+        """Return the type name with the lowest number that is free: `ConsoleIn0`."""
+        return next(
+            name for number in count() if (name := f"{type_name}{number}") not in self._components
+        )
+
+    def path(self, name: str) -> str:
+        """Return the path of a component in the name service."""
+        return f"{self._host}/{name}.rtc"
+
+    def _demand(self, code: ReturnCode, name: str, what: str) -> None:
+        if code is not ReturnCode.RTC_OK:
+            state = self.state_of(name).name
+            raise RtcRefused(f"{what} {name}: {code.name}, it is {state}", code)
+
+    def _end(self, component: RtComponent) -> None:
+        """End a component, unless that happened meanwhile."""
+        name = component.instance_name
+        if self._components.get(name) is component:
+            contexts = tuple(component.own_contexts)
+            component.exit()
+            for context in contexts:
+                self.drop_context(context)
+            self.names.unbind(self.path(name))
+            del self._components[name]
+
+    def _leave(self, component: RtComponent) -> None:
+        """Take a component that could not be initialized out of its context."""
+        for own in component.own_contexts:
+            self.drop_context(own)
+        for context in tuple(component.contexts):
+            context.remove_component(component)

@@ -1,0 +1,130 @@
+"""A system as it is saved: its components, their configuration, and what joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.configuration.configuration import DEFAULT
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
+
+Sets = Mapping[str, Mapping[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentEntry:
+    """A component of a system.
+
+    Attributes:
+        name: its instance name.
+        type_name: what is created for it.
+        rate_hz: of its execution context.
+        context: a word that components in one execution context share; empty for an own one.
+        active: whether it is activated.
+        configuration_set: the active one.
+        configuration: values of each set.
+    """
+
+    name: str
+    type_name: str
+    rate_hz: float = DEFAULT_RATE_HZ
+    context: str = ""
+    active: bool = False
+    configuration_set: str = DEFAULT
+    configuration: Sets = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionEntry:
+    """A connector of a system, by the full names of its ports."""
+
+    ports: tuple[str, str]
+    name: str = ""
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """All components and connectors, in the order in which they are made.
+
+    Not saved: values in ports and buffers, and what a component keeps in itself.
+    """
+
+    components: tuple[ComponentEntry, ...] = ()
+    connections: tuple[ConnectionEntry, ...] = ()
+
+
+def describe(manager: Manager) -> System:
+    """Return the system of a manager as it is."""
+    shared: dict[int, str] = {}
+    return System(
+        tuple(_entry(component, shared) for component in manager.components),
+        tuple(ConnectionEntry(c.ports, c.name, dict(c.properties)) for c in manager.connectors),
+    )
+
+
+def restore(manager: Manager, system: System) -> None:
+    """Make the components and connectors of a system, and ask for Active where it says so.
+
+    Raises:
+        RtcRefused: something cannot be made; then nothing is left of it.
+    """
+    made: list[str] = []
+    try:
+        _make(manager, system, made)
+    except ValueError:
+        for name in reversed(made):
+            manager.delete(name)
+        raise
+
+
+def _entry(component: RtComponent, shared: dict[int, str]) -> ComponentEntry:
+    context, configuration = component.contexts[0], component.configuration
+    own = context in component.own_contexts
+    return ComponentEntry(
+        component.instance_name,
+        component.spec.type_name,
+        context.rate_hz,
+        "" if own else shared.setdefault(id(context), f"shared{len(shared)}"),
+        context.state_of(component) is LifeCycleState.ACTIVE,
+        configuration.active_id,
+        {set_id: dict(values) for set_id, values in configuration.sets.items() if values},
+    )
+
+
+def _make(manager: Manager, system: System, made: list[str]) -> None:
+    contexts: dict[str, ExecutionContext] = {}
+    for entry in system.components:
+        context = _context(entry, contexts)
+        component = manager.create(entry.type_name, entry.name, entry.rate_hz, context)
+        made.append(entry.name)
+        _configure(component, entry)
+    for connection in system.connections:
+        manager.connect(*connection.ports, connection.properties, name=connection.name)
+    for context in contexts.values():
+        context.start()
+    manager.activate(*(entry.name for entry in system.components if entry.active))
+
+
+def _context(
+    entry: ComponentEntry, contexts: dict[str, ExecutionContext]
+) -> ExecutionContext | None:
+    if not entry.context:
+        return None
+    if entry.context not in contexts:
+        contexts[entry.context] = ExecutionContext(entry.rate_hz)
+    return contexts[entry.context]
+
+
+def _configure(component: RtComponent, entry: ComponentEntry) -> None:
+    configuration = component.configuration
+    try:
+        for set_id, values in entry.configuration.items():
+            configuration.add_set(set_id, values)
+        configuration.activate(entry.configuration_set)
+    except RtcRefused as error:
+        raise RtcRefused(f"{entry.name}: {error}", error.code) from error

@@ -1,0 +1,1 @@
+"""One node as the server sees it: boot-up, life cycle, operations, supervision."""

@@ -1,0 +1,36 @@
+"""Something that is to be done in each period."""
+
+from __future__ import annotations
+
+from tickrig.host.links.link import NEVER
+
+
+class Beat:
+    """Says when a period is over; after a pause once, not for all that were missed.
+
+    >>> beat = Beat(100)
+    >>> beat.start(0)
+    >>> [beat.take(now_us) for now_us in (99, 100, 101, 450, 460, 500)]
+    [False, True, False, True, False, True]
+
+    Args:
+        period_us: the period, 0 for none.
+
+    Attributes:
+        due_us: when the next is over; `NEVER` before it was started, and if there is none.
+    """
+
+    def __init__(self, period_us: int) -> None:
+        self._period_us, self.due_us = period_us, NEVER
+
+    def start(self, now_us: int) -> None:
+        """Begin the first period."""
+        if self._period_us:
+            self.due_us = now_us + self._period_us
+
+    def take(self, now_us: int) -> bool:
+        """Say whether one is over; the next is over where it would be without a pause."""
+        if now_us < self.due_us:
+            return False
+        self.due_us = now_us - (now_us - self.due_us) % self._period_us + self._period_us
+        return True

@@ -1,0 +1,190 @@
+"""Keeps the life cycle of a proxy and the NMT state of its device together (ours: K14, K15)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
+from tickrig.host.canopen.script import Command, Script
+from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
+from tickrig.host.rtc_canopen.events import EventKind, Note
+from tickrig.host.rtc_canopen.node.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES
+from tickrig.host.rtc_canopen.node.restart import Restart
+from tickrig.host.rtc_canopen.proxy.proxy import Asked, ProxyRtc
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+
+STATES: Final = {
+    NmtState.PRE_OPERATIONAL: LifeCycleState.INACTIVE,
+    NmtState.OPERATIONAL: LifeCycleState.ACTIVE,
+    NmtState.STOPPED: LifeCycleState.ERROR,
+}
+"""The state of a proxy by that of its device (NEDO report, table 3)."""
+
+
+class Operations:
+    """Says on the bus what the RT side asks for, and follows what the device says.
+
+    Args:
+        entry: the node.
+        dialogue: what is said with it.
+        note: takes events.
+
+    Attributes:
+        proxy: the RT component, None without.
+        nmt_state: what the device reported last, None before.
+        now_us: the present.
+        resetting: between a reset that the RT side asked for and its result.
+        restart: how often it is brought back by itself.
+    """
+
+    def __init__(self, entry: NodeEntry, dialogue: Dialogue, note: Note) -> None:
+        self._entry, self._dialogue, self._note = entry, dialogue, note
+        self._life = LIFE_CYCLES[entry.role]
+        self.proxy: ProxyRtc | None = None
+        self.nmt_state: NmtState | None = None
+        self.now_us = 0
+        self.resetting = self._stopping = False
+        self.restart = Restart(entry.restart)
+
+    @property
+    def is_inactive(self) -> bool:
+        """Whether there is a proxy, Inactive."""
+        return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
+
+    def carry_out(self, *, lost: bool) -> None:
+        """Say on the bus what was asked for, unless the device is there already."""
+        if self.proxy is None or (asked := self.proxy.take_asked()) is Asked.NOTHING:
+            return
+        state = None if self._dialogue.moves else self.nmt_state
+        match asked:
+            case Asked.ACTIVATE if state is NmtState.OPERATIONAL:
+                self._activated(None)
+            case Asked.ACTIVATE:
+                self._run("activate", self._life.activate(self._entry), self._activated)
+            case Asked.DEACTIVATE if state is not NmtState.PRE_OPERATIONAL:
+                self._dialogue.clear()
+                self._run("deactivate", self._life.deactivate(self._entry))
+            case Asked.ABORT if lost or state is not NmtState.STOPPED:
+                self._dialogue.clear()
+                self._stop()
+            case Asked.RESET if not self.resetting:
+                self.resetting = True
+                self.restart.leave()
+                self._run("reset", self._life.reset(self._entry))
+
+    def follow(self, state: NmtState, *, changed: bool) -> None:
+        """Move the proxy to where the device says it is, unless that is about to change."""
+        proxy = self.proxy
+        if proxy is None or self._dialogue.moves or proxy.asked is not Asked.NOTHING:
+            return
+        if self._stopping:
+            self._stopping = state is not NmtState.STOPPED
+            if self._stopping:
+                self._stop()
+        elif STATES[state] is not proxy.state and not proxy.ready:
+            if changed:
+                text = f"{state.name} while the proxy is {proxy.state.name}"
+                self._note(EventKind.FOREIGN_TRANSITION, self._entry.id, text)
+            self._move(proxy, STATES[state])
+
+    def say(self, command: NmtCommand) -> None:
+        """Send a command after all that is under way."""
+        self._run("command", _say(command))
+
+    def begin(self) -> None:
+        """Forget what was asked for: the device begins anew."""
+        self._stopping = False
+
+    def booted(self) -> None:
+        """Let the proxy leave Error: its device is Pre-operational and set up."""
+        self.nmt_state, self.resetting = NmtState.PRE_OPERATIONAL, False
+        if self.proxy is not None:
+            self._leave_error(self.proxy)
+
+    def abort(self) -> None:
+        """Let the proxy go to Error, from which the restarts of its node may bring it back."""
+        self.resetting = False
+        if self.proxy is not None:
+            self.lose()
+            self.proxy.contexts[0].abort_component(self.proxy)
+
+    def lose(self) -> None:
+        """Note that the device is not what it was, without anybody's will."""
+        active = self.proxy is not None and self.proxy.state is LifeCycleState.ACTIVE
+        self.restart.lose(self.now_us, active=active)
+
+    def go_on(self) -> None:
+        """Reset a node that was lost and is heard again, if a restart is left."""
+        proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
+        if proxy is None or busy or proxy.asked is not Asked.NOTHING:
+            return
+        if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
+            proxy.contexts[0].reset_component(proxy)
+
+    def begin_restart(self) -> bool:
+        """Take a restart, and tell; False if none is left."""
+        which = self.restart.take(self.now_us)
+        kind = EventKind.RESTARTED if which else EventKind.NOT_RESTARTED
+        self._note(kind, self._entry.id, which or "no restart is left")
+        return bool(which)
+
+    def fail(self, failure: Failure) -> None:
+        """Note what failed, and let the proxy go to Error."""
+        self._note(kind_of(failure), self._entry.id, str(failure))
+        self.abort()
+
+    def _run(
+        self, what: str, script: Script[None], done: Callable[[Any], None] | None = None
+    ) -> None:
+        self._dialogue.start(self.now_us, Job(what, script, done or _nothing, self.fail))
+
+    def _move(self, proxy: ProxyRtc, wanted: LifeCycleState) -> None:
+        context = proxy.contexts[0]
+        if wanted is LifeCycleState.ERROR:
+            context.abort_component(proxy)
+        elif proxy.state is LifeCycleState.ERROR:
+            self._leave_error(proxy)
+        elif wanted is LifeCycleState.ACTIVE:
+            context.activate_component(proxy)
+        else:
+            context.deactivate_component(proxy)
+
+    def _leave_error(self, proxy: ProxyRtc) -> None:
+        proxy.ready = True
+        proxy.contexts[0].reset_component(proxy)
+
+    def _activated(self, _: object) -> None:
+        if (proxy := self.proxy) is None:
+            return
+        proxy.confirmed = True
+        if self._entry.role is Role.DRIVE:
+            for sink in proxy.sinks:
+                sink.preset(CONTROLWORD, ENABLING[-1][0])
+
+    def _stop(self) -> None:
+        """Stop it, and again with each heartbeat until it says that it is."""
+        self._stopping = True
+        self.say(NmtCommand.STOP)
+
+
+def kind_of(failure: Failure) -> EventKind:
+    """Return the event that a failure is."""
+    match failure:
+        case WrongIdentity():
+            return EventKind.WRONG_IDENTITY
+        case SdoAborted():
+            return EventKind.SDO_ABORTED
+        case SdoTimeout():
+            return EventKind.SDO_TIMEOUT
+    return EventKind.NOT_CONFIRMED
+
+
+def _say(command: NmtCommand) -> Script[None]:
+    yield Command(command)
+
+
+def _nothing(_: object) -> None:
+    """Do nothing more."""

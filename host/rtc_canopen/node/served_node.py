@@ -1,0 +1,314 @@
+"""One node as the server sees it: absent, booting, ready, gone."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Final, Protocol
+
+from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.host.links.link import NEVER
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
+from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
+from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.node.boot import boot, probe
+from tickrig.host.rtc_canopen.node.operations import Operations, kind_of
+from tickrig.host.rtc_canopen.node.twin_watch import TwinWatch
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
+from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
+
+FOREIGN_RESET_US: Final = 1_000_000
+"""A boot-up so soon after another master's reset is its doing."""
+
+RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
+
+
+class Phase(Enum):
+    """How far a node has come."""
+
+    ABSENT = "absent"
+    LISTENING = "listening"  # it booted though it was there: itself, or another of its node-ID
+    BOOTING = "booting"
+    READY = "ready"
+    REFUSED = "refused"
+    DUPLICATE = "duplicate"
+
+
+WATCHED: Final = (Phase.READY, Phase.DUPLICATE)
+"""Phases in which heartbeats are awaited."""
+
+LIVING: Final = (Phase.LISTENING, Phase.BOOTING, Phase.READY)
+"""Phases in which a twin is looked for."""
+
+
+class House(Protocol):
+    """What a node needs of its server."""
+
+    def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
+        """Take an event."""
+
+    def send(self, can_id: int, data: bytes, /) -> None:
+        """Send a frame."""
+
+    def wake(self, due_us: int, /) -> None:
+        """Let the node be ticked at a time."""
+
+    def booted(self, node: ServedNode, /) -> None:
+        """Make the proxy if there is none, links and connections."""
+
+    def gone(self, node: ServedNode, /) -> None:
+        """Remove the proxy."""
+
+
+class ServedNode:
+    """A node: sees it come and go, sets it up, keeps its proxy and it together.
+
+    Args:
+        entry: what the System Definition says of it.
+        file: what its EDS says.
+        writes: values that are written while it boots.
+        remove_us: after how long without heartbeat its proxy is removed.
+        house: the server.
+
+    Attributes:
+        entry, file, writes: as given.
+        phase: how far it has come.
+        heard_us: when it was heard last.
+        lost: its heartbeat is late.
+        problem: why it is refused, for people.
+        layouts: its PDOs.
+        to_start: it is to be activated in its turn.
+        dialogue: what is said with it.
+        operations: its proxy, and its NMT state.
+        due_us: when `tick` has something to do.
+    """
+
+    def __init__(
+        self,
+        entry: NodeEntry,
+        file: DeviceFile,
+        writes: tuple[SdoEntry, ...],
+        remove_us: int,
+        house: House,
+    ) -> None:
+        self.entry, self.file, self.writes, self._house = entry, file, writes, house
+        self._remove_us, self._consumer_us = remove_us, 3_000 * entry.heartbeat_ms
+        self.dialogue = Dialogue(entry.id, self._send)
+        self.operations = Operations(entry, self.dialogue, house.note)
+        self.phase, self.problem = Phase.ABSENT, ""
+        self.layouts: tuple[PdoLayout, ...] = ()
+        self._twins = TwinWatch(1_000 * entry.heartbeat_ms)
+        self.heard_us, self.due_us = 0, NEVER
+        self._looked_us = self._blind_us = 0
+        self._foreign_reset_us: int | None = None
+        self.lost = self.to_start = self._suspected = False
+
+    @property
+    def proxy(self) -> ProxyRtc | None:
+        """Its RT component, None without."""
+        return self.operations.proxy
+
+    @property
+    def nmt_state(self) -> NmtState | None:
+        """What it reported last, None before."""
+        return self.operations.nmt_state
+
+    def look(self, now_us: int) -> None:
+        """Look for it on the bus."""
+        self.operations.now_us = now_us
+        self.phase, self.lost = Phase.ABSENT, False
+        self._twins.forget()
+        job = Job("probe", probe(), lambda _: self._found(), self._not_booted)
+        self.dialogue.start(now_us, job)
+        self._plan()
+
+    def boot(self, now_us: int) -> None:
+        """Set it up, from whatever it is in."""
+        self.operations.now_us = now_us
+        self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._plan()
+
+    def refuse(self, problem: str) -> None:
+        """Leave it as it is until it boots again."""
+        self.phase, self.problem = Phase.REFUSED, problem
+
+    def unseen(self, now_us: int, span_us: int) -> None:
+        """Take note that nobody looked for so long: it may have spoken all the same."""
+        self._looked_us, self._blind_us = now_us, self._blind_us + span_us
+        self.dialogue.defer(span_us)
+        self._twins.forget()
+        self._plan()
+
+    def hear_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
+        """Take a boot-up or heartbeat of a time on the bus; anything else is passed over."""
+        try:
+            (number,) = data
+            state = NmtState(number)
+        except ValueError:
+            return
+        operations = self.operations
+        changed = state is not operations.nmt_state
+        operations.now_us, operations.nmt_state, self.heard_us = now_us, state, at_us
+        self._blind_us = 0
+        self.dialogue.hear_state(now_us, state)
+        self._take(state, changed=changed)
+        self._plan()
+
+    def hear_sdo(self, now_us: int, data: bytes) -> None:
+        """Take an SDO response."""
+        self.operations.now_us = now_us
+        self._twins.answer(data)
+        self.dialogue.hear_sdo(now_us, data)
+        self._judge()
+        self._plan()
+
+    def hear_foreign(self, at_us: int, command: int) -> None:
+        """Take an NMT command of another master."""
+        self._twins.command(command)
+        if command in RESETS:
+            self._foreign_reset_us = at_us
+
+    def run(self, now_us: int, job: Job) -> None:
+        """Run a job of somebody else."""
+        self.operations.now_us = now_us
+        self.dialogue.start(now_us, job)
+        self._plan()
+
+    def tick(self, now_us: int) -> None:
+        """Do what is due."""
+        self.operations.now_us = now_us
+        self.dialogue.tick(now_us)
+        if self.phase is Phase.LISTENING and now_us >= self._twins.sure_us:
+            self._boot()
+        elif self._deadline_us <= now_us:
+            self._lose(now_us)
+        self._plan()
+
+    def carry_out(self, now_us: int) -> None:
+        """Say on the bus what the RT side asked for."""
+        self.operations.now_us = now_us
+        operations, restart = self.operations, self.operations.restart
+        operations.carry_out(lost=self.lost)
+        if self.phase is Phase.READY and not self.lost:
+            operations.go_on()
+        if restart.to_activate and operations.is_inactive:
+            restart.to_activate, self.to_start = False, True
+        self._plan()
+
+    @property
+    def _deadline_us(self) -> int:
+        """When its heartbeat is late, or its proxy is to be removed."""
+        if self.phase not in WATCHED:
+            return NEVER
+        since_us = max(self.heard_us, self._looked_us)
+        return since_us + self._consumer_us + (self._remove_us if self.lost else 0)
+
+    def _send(self, can_id: int, data: bytes) -> None:
+        if can_id == NMT_COB_ID:
+            self._twins.command(data[0])
+        self._house.send(can_id, data)
+
+    def _plan(self) -> None:
+        due_us = min(self.dialogue.due_us, self._deadline_us)
+        if self.phase is Phase.LISTENING:
+            due_us = min(due_us, self._twins.sure_us)
+        if due_us != self.due_us:
+            self.due_us = due_us
+            self._house.wake(due_us)
+
+    def _take(self, state: NmtState, *, changed: bool) -> None:
+        """See to a state that was reported just now."""
+        self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
+        if self._judge():
+            return
+        if state is NmtState.INITIALISING:
+            self._booted_up()
+        elif self.phase is Phase.ABSENT:
+            self._found()
+        elif self.phase is Phase.READY:
+            self.lost = False
+            self.operations.follow(state, changed=changed)
+
+    def _booted_up(self) -> None:
+        self._house.note(EventKind.BOOT_UP, self.entry.id)
+        told_us = self._foreign_reset_us
+        foreign = told_us is not None and self.heard_us - told_us < FOREIGN_RESET_US
+        expected = self.lost or self.operations.resetting or foreign
+        if self.phase is Phase.READY and not expected:
+            self.phase = Phase.LISTENING
+            self.dialogue.clear()
+            self.operations.lose()
+        else:
+            self._boot()
+
+    def _found(self) -> None:
+        """Set it up though its boot-up was not heard; a Stopped one answers no SDO."""
+        if self.nmt_state is NmtState.STOPPED:
+            self.dialogue.clear()
+            self.operations.say(NmtCommand.RESET_NODE)
+        else:
+            self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+    def _boot(self, first: NmtCommand | None = None) -> None:
+        if not self.operations.resetting:
+            self._house.gone(self)
+        self.phase, self.problem, self.lost = Phase.BOOTING, "", False
+        self.operations.begin()
+        self._twins.forget()
+        self.dialogue.clear()
+        if first is not None:
+            self.operations.say(first)
+        script = boot(self.entry, self.file, self.writes)
+        job = Job("boot", script, self._booted, self._not_booted)
+        self.dialogue.start(self.operations.now_us, job)
+
+    def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:
+        self.phase, self.layouts, self.heard_us = Phase.READY, layouts, self.operations.now_us
+        self._twins.forget()
+        self.operations.booted()
+        self._house.booted(self)
+        if self.operations.restart.pending:
+            self.operations.begin_restart()
+
+    def _not_booted(self, failure: Failure) -> None:
+        self.operations.resetting, self.problem = False, str(failure)
+        self._house.note(kind_of(failure), self.entry.id, self.problem)
+        if isinstance(failure, SdoTimeout):
+            self._house.gone(self)
+            self.look(self.operations.now_us)
+        else:
+            self.phase = Phase.REFUSED
+
+    def _judge(self) -> bool:
+        """See whether it has a twin: then both are stopped; a suspicion is told once."""
+        twins = self._twins
+        if twins.sign and self.phase in LIVING:
+            self._refuse_twin(twins.sign)
+            return True
+        if twins.suspicion and not self._suspected and self.phase in LIVING:
+            self._suspected = True
+            self._house.note(EventKind.DUPLICATE_SUSPECTED, self.entry.id, twins.suspicion)
+        return False
+
+    def _refuse_twin(self, sign: str) -> None:
+        self.phase, self.problem = Phase.DUPLICATE, f"two nodes have this node-ID: {sign}"
+        self._house.note(EventKind.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}")
+        self.dialogue.clear()
+        self.operations.say(NmtCommand.STOP)
+        self.operations.abort()
+        self.operations.restart.forget()
+
+    def _lose(self, now_us: int) -> None:
+        if self.lost:
+            self._house.gone(self)
+            self.dialogue.clear()
+            self.look(now_us)
+            return
+        self.lost = True
+        text = f"silent for {(now_us - self.heard_us) // 1_000} ms"
+        if self._blind_us:
+            text += f"; for {self._blind_us // 1_000} ms of them the server did not look"
+        self._house.note(EventKind.HEARTBEAT_LOST, self.entry.id, text)
+        self.dialogue.clear()
+        self.operations.abort()

@@ -1,0 +1,1 @@
+"""A CANopen device as an RT component: its PDOs as ports (NEDO report, Fig. 109)."""

@@ -1,0 +1,99 @@
+"""ProxyRTC: a CANopen device as an RT component (NEDO report, Figs. 108 and 109)."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from typing import Final
+
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
+from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
+
+OK: Final = ReturnCode.RTC_OK
+
+
+class Asked(Enum):
+    """What the RT side asked for and the bus has not been told yet."""
+
+    NOTHING = auto()
+    ACTIVATE = auto()
+    DEACTIVATE = auto()
+    ABORT = auto()
+    RESET = auto()
+
+
+class ProxyRtc(RtComponent):
+    """An ordinary RT component that stands for a device.
+
+    Its callbacks note what they ask for; the server says it on the bus after the
+    period. A reset is refused by on_reset until the device has booted anew, so
+    Error lasts until then.
+
+    Not emulated: a CANopen node of its own on the bus (`visible_proxies` of K1).
+
+    Args:
+        entry: its node.
+        layouts: PDOs of the device.
+
+    Attributes:
+        sources: TPDOs of the device, whose data go to OutPorts.
+        sinks: RPDOs of the device, which take data from InPorts.
+        asked: what the callbacks asked for.
+        passing: between on_activated and on_deactivated: data of the device pass.
+        confirmed: the device has reported that it is Operational: data for it pass as well.
+        ready: the device is fit to leave Error.
+    """
+
+    spec = ModuleSpec("ProxyRTC", "A CANopen device", category="RTC-CANopen")
+
+    def __init__(self, entry: NodeEntry, layouts: tuple[PdoLayout, ...]) -> None:
+        super().__init__(entry.name)
+        self.asked, self.ready = Asked.NOTHING, False
+        self.passing = self.confirmed = False
+        named = [(layout, entry.ports.get(layout.name, layout.name)) for layout in layouts]
+        fit = [(layout, name) for layout, name in named if layout.fields and not layout.unknown]
+        self.sources = tuple(PdoSource(layout, name) for layout, name in fit if layout.sends)
+        self.sinks = tuple(PdoSink(layout, name) for layout, name in fit if not layout.sends)
+        for source in self.sources:
+            for out in source.ports:
+                self.add_port(out)
+        for sink in self.sinks:
+            for in_ in sink.ports:
+                self.add_port(in_)
+
+    @property
+    def state(self) -> LifeCycleState:
+        """Its state in its execution context; Created if it has none."""
+        return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
+
+    def take_asked(self) -> Asked:
+        """Take what was asked for."""
+        asked, self.asked = self.asked, Asked.NOTHING
+        return asked
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let data pass; ask for Operational."""
+        self.asked, self.passing, self.confirmed = Asked.ACTIVATE, True, False
+        for sink in self.sinks:
+            sink.clear()
+        return OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let no data pass; ask for Pre-operational."""
+        self.asked, self.passing, self.confirmed = Asked.DEACTIVATE, False, False
+        return OK
+
+    def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask for Stopped, which takes the place of what on_deactivated asked for."""
+        self.asked, self.ready = Asked.ABORT, False
+        return OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask for a reset of the device; RTC_OK once it has booted."""
+        if self.ready:
+            return OK
+        self.asked = Asked.RESET
+        return ReturnCode.RTC_ERROR

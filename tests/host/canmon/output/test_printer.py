@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import pytest
+
+from tickrig.host.canmon.output.printer import Output, printer_of
+from tickrig.host.monitor.decode.serial.heard_line import HeardLine
+from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
+from tickrig.host.monitor.frames.dump_line import Stamp
+from tickrig.host.monitor.logs.reading.log_lines import LogLines
+
+
+def line(data: bytes) -> HeardLine:
+    (found,) = RrcLines("tty").take(1_500_000, data, to_device=True)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("output", "text"),
+    [
+        (
+            Output.TEXT,
+            f" (000.000000)  tty  >  {'output1eff':<28}   rrc output v_pct=30 w_pct=-1",
+        ),
+        (
+            Output.JSONL,
+            '{"v":1,"ev":"line","t":1.500000,"ch":"tty","dir":"tx","data":"6F757470757431656666",'
+            '"kind":"rrc","text":"output v_pct=30 w_pct=-1",'
+            '"sig":{"command":"output","v_pct":30,"w_pct":-1}}',
+        ),
+        (Output.CSV, "1.500000,tty,,tx,10,6F757470757431656666,rrc,,output v_pct=30 w_pct=-1"),
+    ],
+)
+def test_a_line_of_a_serial_port_is_printed_like_this(output: Output, text: str) -> None:
+    found = line(b"output1eff\n")
+    assert printer_of(output, Stamp.ZERO, False, False)(found, found.decoded) == text
+
+
+def test_bytes_that_are_no_text_are_hex() -> None:
+    printed = printer_of(Output.TEXT, Stamp.NONE, False, True)
+    assert printed(line(b"\x01\xff\n"), None) == "  tty  >  01 FF"
+
+
+def test_a_log_reader_counts_lines_of_a_serial_port() -> None:
+    found, lines = line(b"device\n"), LogLines()
+    text = printer_of(Output.JSONL, Stamp.NONE, False, False)(found, found.decoded)
+    assert lines.push(text.encode() + b"\n") == []
+    assert lines.tally.words("pipe") == ["pipe: 1 lines of a serial port passed over"]

@@ -1,0 +1,204 @@
+from __future__ import annotations
+
+import gzip
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.sources import whole_log
+
+LOG = """\
+(1.000000) can0 703#05
+(1.050000) can0 083#3081110000000000
+(1.100000) can0 703#05
+(1.300000) can0 703#05
+"""
+EMCY = (
+    "(1.050000) no-emcy: node 3: EMCY 8130h life guard error or heartbeat error"
+    " [can0 083#3081110000000000]"
+)
+LATE = (
+    "(1.300000) heartbeat 3: node 3: 200.000 ms since its last heartbeat, at most 120.000 is right"
+    " [can0 703#05]"
+)
+HEARTBEAT = ("--heartbeat", "3=100ms+-20%")
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> str:
+    return write(tmp_path / "run.log", LOG)
+
+
+def write(path: Path, text: str) -> str:
+    path.write_text(text, "utf-8")
+    return str(path)
+
+
+def check(*words: str) -> Result:
+    return CliRunner().invoke(main, ["check", *words])
+
+
+def test_rules_that_hold_end_with_0(log: str) -> None:
+    result = check(log, "--no-sdo-abort", "--nodes", "3", "--no-loss")
+    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "all rules hold\n")
+
+
+def test_findings_are_lines_and_end_with_1(log: str) -> None:
+    result = check(log, "--no-emcy", *HEARTBEAT)
+    assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n{LATE}\n")
+    assert result.stderr == "2 findings: heartbeat 3: 1, no-emcy: 1\n"
+
+
+def test_a_file_holds_the_same_rules(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", 'no_emcy = true\n[heartbeat]\n3 = "100ms±20%"\n')
+    assert check(log, rules).stdout == f"{EMCY}\n{LATE}\n"
+
+
+def test_options_go_beside_a_file(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", 'no_emcy = true\nknown = "083"\n')
+    assert check(rules, log, "--known", "703").stdout == f"{EMCY}\n"
+
+
+def test_a_large_log_is_checked_the_same(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    result = check(log, "--no-emcy", *HEARTBEAT)
+    assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n{LATE}\n")
+
+
+def test_findings_are_lines_of_json(log: str) -> None:
+    (line,) = check(log, "--no-emcy", "--jsonl").stdout.splitlines()
+    assert json.loads(line) == {
+        "v": 1,
+        "t": 1.05,
+        "rule": "no-emcy",
+        "text": "node 3: EMCY 8130h life guard error or heartbeat error",
+        "ch": "can0",
+        "frame": "083#3081110000000000",
+    }
+
+
+def test_a_report_has_a_case_for_each_rule(log: str, tmp_path: Path) -> None:
+    report = tmp_path / "out.xml"
+    check(log, "--no-emcy", "--no-loss", *HEARTBEAT, "--junit", str(report))
+    suite = ET.fromstring(report.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert (suite.get("tests"), suite.get("failures")) == ("3", "2")
+    failed = {case.get("name"): case.findtext("failure") for case in suite}
+    assert failed == {"no-loss": None, "no-emcy": EMCY, "heartbeat 3": LATE}
+
+
+def test_a_report_holds_what_xml_does_not(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", LOG + "\x01 <&> \x02\n")
+    report = tmp_path / "out.xml"
+    assert check(log, "--no-loss", "--junit", str(report)).exit_code == 1
+    assert "<&>" in str(ET.fromstring(report.read_bytes()).findtext(".//failure"))
+
+
+def test_a_line_that_is_no_frame_breaks_no_loss(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", LOG + "what?\n")
+    result = check(log, "--no-loss")
+    assert result.exit_code == 1
+    assert "no-loss: " in result.stdout
+    assert "line 5 is no frame: 'what?'" in result.stdout
+
+
+def test_lost_frames_end_a_strict_check_with_4(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.jsonl", '{"v":1,"ev":"drop","n":12}\n')
+    assert check(log, "--no-emcy").exit_code == 5
+    assert check(log, "--no-emcy", "--strict").exit_code == 4
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+@pytest.mark.parametrize("text", ["", "what?\n", "(1.000000) can0 123##1AA\n"])
+def test_where_nothing_was_judged_nothing_is_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool, text: str
+) -> None:
+    if at_once:
+        monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    log = write(tmp_path / "run.log", text)
+    report = tmp_path / "out.xml"
+    result = check(log, "--no-emcy", "--junit", str(report))
+    assert (result.exit_code, result.stdout) == (5, "")
+    said = f"nothing was judged: no frame in {log}"
+    assert result.stderr.splitlines()[-1] == f"Error: {said}"
+    suite = ET.fromstring(report.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert [suite.get(name) for name in ("tests", "failures", "errors")] == ["1", "0", "1"]
+    assert [error.get("message") for error in suite.iter("error")] == [said]
+
+
+def test_a_silent_bus_is_no_good_bus() -> None:
+    result = check("virtual:silent", "--for", "20ms", "--no-emcy")
+    assert (result.exit_code, result.stderr) == (5, "Error: nothing was judged: no frame came\n")
+
+
+def test_what_must_come_is_judged_by_silence(tmp_path: Path) -> None:
+    result = check(write(tmp_path / "run.log", ""), "--nodes", "3", "--no-emcy")
+    assert (result.exit_code, result.stdout) == (1, "(0.000000) nodes: node 3 was never heard\n")
+
+
+def test_a_report_of_a_log_that_breaks_off_does_not_say_that_it_is_well(tmp_path: Path) -> None:
+    log, report = tmp_path / "run.log.gz", tmp_path / "out.xml"
+    log.write_bytes(gzip.compress(LOG.encode())[:-12])
+    assert check(str(log), "--no-sdo-abort", "--junit", str(report)).exit_code == 3
+    (error,) = ET.fromstring(report.read_bytes()).iter("error")
+    assert str(log) in (error.get("message") or "")
+
+
+def test_the_load_is_checked_against_the_bit_rate(log: str) -> None:
+    assert check(log, "--max-load", "50", "-b", "500000").exit_code == 0
+    result = check(log, "--max-load", "1", "-b", "10000")
+    assert result.stdout == "(1.000000) max-load: can0: load 3.0 %, at most 1 % is right\n"
+
+
+def test_a_rule_file_may_name_the_bit_rate(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", "max_load = 1\nbitrate = 10000\n")
+    assert check(log, rules).exit_code == 1
+    assert check(log, rules, "-b", "1000000").exit_code == 0
+    assert check(log, write(tmp_path / "none.toml", "bitrate = 10000\n")).exit_code == 2
+
+
+def test_a_source_may_name_the_bit_rate() -> None:
+    words = ("--for", "50ms", "--max-load", "50")
+    assert check("virtual:check@500k", *words).exit_code == 5
+    assert check("virtual:check", *words).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "reason"),
+    [
+        ((), 2, "no rule: give --no-emcy, --max-load or others, or a file rules.toml"),
+        (("--max-load", "50"), 2, "a limit of the load needs the bit rate: give -b, as -b 500000"),
+        (("--nodes", "x"), 2, "nodes 'x' is not like 3 or 3-7"),
+        (("none.toml",), 2, "rules none.toml: No such file or directory"),
+        (
+            ("--no-emcy", "--junit", "no/out.xml"),
+            2,
+            "--junit no/out.xml: No such file or directory",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_line(
+    log: str, words: tuple[str, ...], status: int, reason: str
+) -> None:
+    result = check(log, *words)
+    assert result.exit_code == status
+    assert result.stderr == f"Error: {reason}\n"
+
+
+def test_a_rule_file_that_is_wrong_is_named(log: str, tmp_path: Path) -> None:
+    for text in ("no_emcy = 1", "[[", "emcy = true"):
+        rules = write(tmp_path / "rules.toml", text)
+        result = check(log, rules)
+        assert result.exit_code == 2
+        assert result.stderr.startswith(f"Error: rules {rules}: ")
+        assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_log_that_is_not_there_ends_with_3() -> None:
+    result = check("none.log", "--no-emcy")
+    assert (result.exit_code, result.stderr) == (3, "Error: none.log: No such file or directory\n")

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.host.canmon.terminal import PROGRAM
+from tests.host.monitor.decode.drive_trace import TRACE
+from tickrig.host.canmon.cli import main
+
+EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
+
+
+def nodes(*words: str) -> Result:
+    return CliRunner().invoke(main, ["nodes", *words])
+
+
+def test_of_a_log_file_the_final_state_is_shown() -> None:
+    result = nodes(str(TRACE))
+    assert result.exit_code == 0, result.output
+    head, row, *_ = result.stdout.splitlines()
+    assert head.split("  ")[0] == "NODE"
+    assert row.split()[:5] == ["5", "EPOS", "pre-operational", "->", "stopped"]
+
+
+def test_each_node_is_a_json_object() -> None:
+    result = nodes(str(TRACE), "--jsonl")
+    (found,) = map(json.loads, result.stdout.splitlines())
+    assert (found["v"], found["node"], found["boots"], found["unasked_boots"]) == (1, 5, 2, 0)
+    assert [emcy["code"] for emcy in found["emcy"]] == [0x8210]
+
+
+def test_without_nodes_there_is_no_json(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    path.write_text("(1.000000) can0 181#00\n")
+    assert nodes(str(path), "--jsonl").stdout == ""
+    assert nodes(str(path)).stdout == "no node was heard\n"
+
+
+def test_standard_input_is_read_to_its_end() -> None:
+    said = "(1.000000) can0 705#05\n(1.100000) can0 705#05\n"
+    words = [sys.executable, "-c", PROGRAM, "nodes", "-", "--jsonl"]
+    result = subprocess.run(words, input=said, capture_output=True, text=True, check=True)
+    assert json.loads(result.stdout)["state"] == "operational"
+
+
+def test_an_eds_puts_its_node_on_the_board() -> None:
+    result = nodes(str(TRACE), "--eds", f"0x7={EPOS}")
+    assert result.stdout.splitlines()[2].split() == ["7", "EPOS", "?", "->", "stopped"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            ("--eds", "200=x"),
+            "--eds '200=x' is not NODE=FILE with a node-ID 1..127, as 3=drive.eds",
+        ),
+        (("--eds", "x"), "--eds 'x' is not NODE=FILE with a node-ID 1..127, as 3=drive.eds"),
+        (("--eds", "5=none.eds"), "--eds none.eds: No such file or directory"),
+        (("--for", "soon"), "--for 'soon' is not a time: write 1.5s, 200ms or 250us"),
+    ],
+)
+def test_a_mistake_is_one_line(words: tuple[str, ...], text: str) -> None:
+    result = nodes(str(TRACE), *words)
+    assert (result.exit_code, result.stderr) == (2, f"Error: {text}\n")
+
+
+def test_a_file_that_is_no_eds_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "bad.eds"
+    path.write_text("no EDS at all")
+    result = nodes(str(TRACE), "--eds", f"5={path}")
+    assert result.exit_code == 2
+    assert f"--eds {path}: line 1 is no keyword with a value: " in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_the_help_shows_examples_and_sources() -> None:
+    result = nodes("--help")
+    assert "canmon nodes can0 --eds 3=drive.eds --for 5s --jsonl" in result.output
+    assert "slcan:/dev/ttyACM0@500k" in result.output
+
+
+def test_lost_frames_end_a_strict_run(tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    path.write_text('{"v":1,"ev":"drop","n":12}\n', "ascii")
+    assert nodes(str(path), "--strict").exit_code == 4

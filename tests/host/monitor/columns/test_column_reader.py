@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.host.monitor.columns.candump_block import CandumpBlock
+from tickrig.host.monitor.columns.column_reader import read_columns
+from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
+from tickrig.host.monitor.frames.candump_filter import flagged_id
+from tickrig.host.monitor.logs.reading.log_lines import LogLines
+from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
+from tickrig.host.monitor.logs.tally import Tally
+
+HEX = "0123456789abcdefABCDEF"
+
+
+def text(alphabet: str, least: int, most: int) -> st.SearchStrategy[str]:
+    return st.text(alphabet, min_size=least, max_size=most)
+
+
+STAMPS = st.one_of(
+    st.tuples(text("0123456789", 10, 10), text("0123456789", 6, 6)).map(".".join),
+    st.tuples(text("0123456789", 1, 13), text("0123456789", 0, 10)).map(".".join),
+)
+NAMES = st.one_of(
+    st.sampled_from(["can0", "can1", "vcan0", "udp_multicast", "239.74.163.2", "x" * 17]),
+    text("abc:µ\0 \t", 0, 9),
+)
+IDENTS = st.one_of(text(HEX, 3, 3), text(HEX, 8, 8), text(HEX + " ", 0, 9))
+DATA = st.one_of(
+    st.binary(max_size=8).map(bytes.hex),
+    text(HEX, 0, 18),
+    st.sampled_from(["R", "R8", "#0AABB", "11.22", "0011223344556677_9", "#", "0g"]),
+)
+LINES = st.one_of(
+    st.builds(
+        "({}) {} {}#{}{}".format,
+        STAMPS,
+        NAMES,
+        IDENTS,
+        DATA,
+        st.sampled_from(["", " R", " T", "\r", " R\r", " X"]),
+    ),
+    st.sampled_from(["", "# comment", "\r", '{"v":1,"t":1.5,"ch":"can0","id":1,"x":0,"data":""}']),
+    text("()#. 0a\r\xb2\x85", 0, 40),
+)
+
+
+def log(folder: Path, text: str) -> Path:
+    path = folder / "run.log"
+    path.write_bytes(text.encode("latin-1"))
+    return path
+
+
+def rows_of(columns: Columns) -> list[tuple[object, ...]]:
+    arrays = (columns.at_us, columns.ident, columns.dlc, columns.payload, columns.channel)
+    rows = zip(*(array.tolist() for array in arrays), strict=True)
+    return [(*row, columns.channels[place]) for *row, place in rows]
+
+
+def rows_by_line(path: Path) -> tuple[list[tuple[object, ...]], Tally]:
+    reader = read_log(path)
+    rows: list[tuple[object, ...]] = []
+    for heard in reader:
+        length = getattr(heard.frame, "dlc", len(heard.frame.data))
+        payload = int.from_bytes(heard.frame.data, "little")
+        rows.append((heard.at_us, flagged_id(heard), length, payload, heard.channel))
+    return rows, reader.tally
+
+
+@given(lines=st.lists(LINES, max_size=12), end=st.sampled_from(["", "\n"]))
+def test_columns_are_what_single_lines_give(lines: list[str], end: str) -> None:
+    with TemporaryDirectory() as folder:
+        path = log(Path(folder), "\n".join(lines) + end)
+        columns = read_columns(path)
+        rows, tally = rows_by_line(path)
+    assert rows_of(columns) == rows
+    assert columns.tally == tally
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "(1436509052.249713) can0 044#2A366C2BBA",
+        "(0000000000.010000) vcan0 1FFFFFFF#0011223344556677 T",
+        "(9999999999.999999) udp_multicast 7ff#",
+    ],
+)
+def test_usual_lines_take_the_fast_way(line: str) -> None:
+    rows, channels = Rows(1), ChannelNames()
+    CandumpBlock(f"{line}\r\n".encode()).take(rows, channels)
+    (heard,) = LogLines().push(f"{line}\n".encode())
+    assert (rows.known.tolist(), rows.at_us.tolist()) == ([True], [heard.at_us])
+    assert rows.ident.tolist() == [flagged_id(heard)]
+
+
+def test_lines_longer_than_a_block_and_files_without_end_are_whole(tmp_path: Path) -> None:
+    line = "(0000000000.010000) can0 705#7F\n"
+    path = log(tmp_path, line * 40_000 + "x" * (1 << 20) + "\n" + line[:-1])
+    columns = read_columns(path)
+    assert (len(columns), columns.bad_lines.first[0][0]) == (40_001, 40_001)
+
+
+def test_a_compressed_log_that_was_cut_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.log.gz"
+    path.write_bytes(gzip.compress(b"(0000000000.010000) can0 705#7F\n")[:-9])
+    with pytest.raises(LogError, match="end-of-stream"):
+        read_columns(path)
+
+
+def test_more_buses_than_a_byte_numbers_are_refused(tmp_path: Path) -> None:
+    path = log(tmp_path, "".join(f"(0000000000.000000) can{n} 001#\n" for n in range(257)))
+    with pytest.raises(LogError, match="more than 256 buses"):
+        read_columns(path)
+
+
+def test_other_formats_are_read_frame_by_frame(tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    path.write_text('{"v":1,"t":1.5,"ch":"can0","id":1,"x":1,"dir":"rx","data":"0A"}\n')
+    assert rows_of(read_columns(path)) == [(1_500_000, 0x8000_0001, 1, 10, "can0")]

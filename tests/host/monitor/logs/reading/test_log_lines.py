@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.logs.reading.json_line import json_line
+from tickrig.host.monitor.logs.reading.log_line import parse_log_line
+from tickrig.host.monitor.logs.reading.log_lines import LogLines
+from tickrig.host.monitor.logs.reading.whole_lines import LONGEST, WholeLines
+from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.writing.log_writer import log_line
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+NO, YES = st.just(False), st.just(True)
+DATA = st.binary(max_size=8)
+FRAMES = st.one_of(
+    st.builds(CanFrame, st.integers(0, 0x7FF), DATA, NO, NO, st.just(0)),
+    st.builds(CanFrame, st.integers(0, 0x1FFF_FFFF), DATA, NO, YES, st.just(0)),
+    st.builds(CanFrame, st.integers(0, 0x7FF), st.just(b""), YES, NO, st.integers(0, 8)),
+    st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8)),
+)
+HEARDS = st.builds(
+    Heard,
+    st.integers(0, 4_000_000_000_000_000),
+    st.from_regex(r"[!-~]{1,16}", fullmatch=True),
+    FRAMES,
+    st.booleans(),
+)
+
+
+def read(line: str) -> tuple[Heard | None, Tally]:
+    tally = Tally()
+    return parse_log_line(line, 1, tally), tally
+
+
+@given(st.lists(HEARDS), st.booleans())
+def test_what_is_written_is_read_again(heards: list[Heard], as_json: bool) -> None:
+    write = json_line if as_json else log_line
+    lines = LogLines()
+    text = "".join(f"{write(heard)}\n" for heard in heards)
+    assert lines.push(text.encode()) == heards
+    assert lines.tally == Tally()
+
+
+@given(st.lists(st.binary(max_size=40)))
+def test_noise_in_pieces_is_counted_as_in_one(pieces: list[bytes]) -> None:
+    one, many = LogLines(), LogLines()
+    whole = one.push(b"".join(pieces)) + one.finish()
+    assert [heard for piece in pieces for heard in many.push(piece)] + many.finish() == whole
+    assert many.tally == one.tally
+
+
+@pytest.mark.parametrize(
+    ("line", "at_us", "frame"),
+    [
+        ("(1436509052.249713999) can0 705#7F", 1_436_509_052_249_713, "705#7F"),
+        ("(0.0) can0 705#7F", 0, "705#7F"),
+        ("(000.000012)  vcan0  00000605#40 R", 12, "00000605#40"),
+        ("(0.5) can0 123#11.22.33", 500_000, "123#112233"),
+        ("(0.5) can0 123#0011223344556677_C", 500_000, "123#0011223344556677"),
+        ("(0.5) can0 123#R8_9", 500_000, "123#R8"),
+        ("(0.5) can0 20000080#", 500_000, "20000080#0000000000000000"),
+        ("(0.5) can0 20000080#01", 500_000, "20000080#0100000000000000"),
+    ],
+)
+def test_lines_of_other_programs_are_read(line: str, at_us: int, frame: str) -> None:
+    heard, tally = read(line)
+    assert heard is not None
+    assert (heard.at_us, str(heard.frame), tally) == (at_us, frame, Tally())
+
+
+@pytest.mark.parametrize("line", ["", "  ", "# made by hand", "; note", "// note", "\r"])
+def test_empty_lines_and_comments_are_no_fault(line: str) -> None:
+    assert read(line) == (None, Tally())
+
+
+@pytest.mark.parametrize(
+    ("line", "kind"),
+    [
+        ("(0.5) can0 123##1" + "00" * 64, "CAN FD frames"),
+        ("(0.5) can0 45123#81:00:12345678#11223344", "CAN XL frames"),
+    ],
+)
+def test_frames_that_classic_can_does_not_have_are_passed_over(line: str, kind: str) -> None:
+    heard, tally = read(line)
+    assert (heard, tally.passed_over, tally.bad_lines.count) == (None, {kind: 1}, 0)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "(0.5) can0 800#",
+        "(0.5) can0 40000000#",
+        "(0.5) can0 123#001122334455667788",
+        "(0.5) can0 123#0",
+        "(0.5) can0 123",
+        "(.5) can0 123#",
+        "can0 123#",
+        "{}",
+        "[1]",
+        '{"v":1,"t":1e400,"ch":"can0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":-1.5,"ch":"can0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":1e12,"ch":"can0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":NaN,"ch":"can0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":1,"ch":"can 0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":1,"ch":"can0","id":2048,"x":0,"data":""}',
+        '{"v":1,"t":1,"ch":"can0","id":1,"x":0,"data":"0"}',
+        "{" * 10_000,
+    ],
+)
+def test_other_lines_are_bad(line: str) -> None:
+    assert read(line)[1].bad_lines.first == [(1, line)]
+
+
+def test_the_first_bad_lines_are_kept_and_all_are_counted() -> None:
+    lines = LogLines()
+    lines.push(b"x\n" * 7)
+    assert lines.tally.words("run.log")[0] == "run.log: line 1 is no frame: 'x'"
+    assert lines.tally.words("run.log")[-1] == (
+        "run.log: 7 lines are no frames; the first 5 are shown"
+    )
+
+
+def test_an_unknown_event_in_json_is_no_fault() -> None:
+    assert read('{"v":1,"ev":"hello"}') == (None, Tally())
+
+
+def test_a_text_without_a_line_end_is_held_only_up_to_a_limit() -> None:
+    whole = WholeLines()
+    assert not any(whole.push(bytes(1 << 16)) for _ in range(100))
+    assert len(whole.push(b"\nnext")) == LONGEST + 1
+    assert whole.finish() == b"next"
