@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.canopen.eds import read_eds
+from tickrig.emulators.canopen.eds.eds import read_eds
 from tickrig.wire.can import CanFrame
 
 EDS = Path(__file__).with_name("io_module.eds")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.emulators.rh3.convoy import Convoy
+from tickrig.emulators.rh3.cart.convoy import Convoy
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.game_pad import GamePad
 from tickrig.host.motion.options.pad import Hand

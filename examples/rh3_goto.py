@@ -9,7 +9,7 @@ Six components run in closed loop over an emulated base; `SerialRide` in place o
 from __future__ import annotations
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.drive import drive, start
 from tickrig.host.motion.geometry import Pose
 

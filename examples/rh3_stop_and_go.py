@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tickrig.device.urg.world import Post, World
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.guard import Guard
 

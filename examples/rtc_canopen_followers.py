@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.emulators.can_host import CanHost
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig

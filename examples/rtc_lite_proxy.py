@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.rig_clock import RigClock
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig_clock import RigClock
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.real_time import RealTime

@@ -14,7 +14,7 @@ VIOLATIONS = {
     "wire does I/O": ("wire/errors.py", "import os"),
     "device knows the host": ("device/core.py", "import tickrig.host.links.link"),
     "host knows the device": ("host/links/link.py", "import tickrig.device.core"),
-    "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.clock"),
+    "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.rig.clock"),
 }
 
 

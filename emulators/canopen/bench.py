@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from tickrig.emulators.can_emulator import CanEmulator
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.candump_file import CandumpFile
-from tickrig.emulators.canopen.body_spec import BodySpec
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.nodes import Nodes
-from tickrig.emulators.canopen.store_file import StoreFile
-from tickrig.emulators.clock import Clock
-from tickrig.emulators.rig import Station
-from tickrig.emulators.without_echo import CountingPort
+from tickrig.emulators.can.emulator import CanEmulator
+from tickrig.emulators.can.outside.without_echo import CountingPort
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.body.body_spec import BodySpec
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node.store_file import StoreFile
+from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.rig import Station
 from tickrig.host.log import log_of
 
 NAME: Final = "canopen-slave"

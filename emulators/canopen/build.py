@@ -9,16 +9,16 @@ from pathlib import Path
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.device_description import DeviceDescription
-from tickrig.emulators.canopen.eds_cache import EdsCache
+from tickrig.emulators.canopen.eds.device_description import DeviceDescription
+from tickrig.emulators.canopen.eds.eds_cache import EdsCache
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.canopen.rtc import describe_rtc
-from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.host.cli.eds_warnings import tell_findings
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.wire.canopen.eds.eds_finding import EdsError

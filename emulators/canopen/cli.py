@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.emulators.canopen.choices import AUTO, MODEL_FAULTS, MODELS, NODE_FAULTS, PROFILES
-from tickrig.emulators.run_options import run_options
+from tickrig.emulators.commands.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.can_host import CanHost
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig

@@ -11,7 +11,7 @@ import click
 
 from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
 from tickrig.emulators.canopen.build import describe_device
-from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
+from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.rtc import one_line_for
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun

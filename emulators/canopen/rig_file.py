@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.emulators.canopen.body_spec import BodySpec, read_body
+from tickrig.emulators.canopen.body.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.choices import MODELS, PROFILES
-from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
+from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.user_file import SUFFIX
 

@@ -12,8 +12,8 @@ import click
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.make import application_of, make_device_rtc, make_dictionary
-from tickrig.emulators.canopen.device_description import DeviceDescription
-from tickrig.emulators.canopen.node import NODE_INPUTS
+from tickrig.emulators.canopen.eds.device_description import DeviceDescription
+from tickrig.emulators.canopen.node.node import NODE_INPUTS
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.user_file import find_class, told
 from tickrig.wire.rtc_canopen.objects import device_info

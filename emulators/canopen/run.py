@@ -10,21 +10,21 @@ from typing import Final
 import click
 
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
-from tickrig.emulators.can_emulator import CanEmulator
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.candump_file import CandumpFile
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.can.emulator import CanEmulator
+from tickrig.emulators.can.outside.outside_bus import open_bus
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench, store_keeper
-from tickrig.emulators.canopen.body_spec import BodySpec
+from tickrig.emulators.canopen.body.body_spec import BodySpec
 from tickrig.emulators.canopen.build import Described, describe_nodes, make_nodes
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.node_spec import NodeSpec
-from tickrig.emulators.canopen.store_file import StoreError, StoreFile
-from tickrig.emulators.frame_transcript import FrameTranscript
-from tickrig.emulators.outside_bus import open_bus
-from tickrig.emulators.player import Player
-from tickrig.emulators.run import EmulatorRun, RunOptions, say
-from tickrig.emulators.scenario import Line, ScenarioParser, Send
-from tickrig.emulators.workbench import Workbench
+from tickrig.emulators.canopen.node.node_spec import NodeSpec
+from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions, say
+from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.record.frame_transcript import FrameTranscript
+from tickrig.emulators.scenario.player import Player
+from tickrig.emulators.scenario.scenario import Line, ScenarioParser, Send
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.wire.can import CanFrame

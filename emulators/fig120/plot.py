@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tickrig.emulators.commands.picture import new_figure, write_figure
 from tickrig.emulators.fig120.samples import Sample
-from tickrig.emulators.picture import new_figure, write_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,16 +10,16 @@ from typing import Final, Protocol
 import canopen
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.bench.child import running
+from tickrig.emulators.bench.emulated import look_at
+from tickrig.emulators.can.outside.sim_network import SimNetwork
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, Model
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.canopen.nodes import Nodes
-from tickrig.emulators.child import running
-from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.emulated import look_at
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.control.client import ControlClient
 from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.sim_network import SimNetwork
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.setting import Setting

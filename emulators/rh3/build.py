@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.trace import Config
+from tickrig.emulators.record.trace import Config
 
 NAME: Final = "rh3-base"
 

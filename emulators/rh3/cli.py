@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
+from tickrig.emulators.commands.serial_options import line_options
 from tickrig.emulators.rh3.base_options import base_options
-from tickrig.emulators.serial_options import line_options
 from tickrig.host.cli.start import loading
 
 

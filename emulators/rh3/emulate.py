@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tickrig.device.rh3.base import Rh3Base
-from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.build import NAME, config_to_trace
 from tickrig.emulators.rh3.frame_log import frame_splitter
 from tickrig.emulators.rh3.verbs import verbs
-from tickrig.emulators.rs485_line import Rs485Line
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.wire_log import WireLine
+from tickrig.emulators.serial.emulator import LineKind
+from tickrig.emulators.serial.rs485_line import Rs485Line
 
 CYCLE: Final = b"01 17 "
 """What -v leaves out: the traffic of each period."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from tickrig.device.modbus.registers import Register
 from tickrig.device.rh3.register_map import TABLE
-from tickrig.emulators.names import known
+from tickrig.emulators.bench.names import known
 from tickrig.emulators.rh3.frame_log import CRC_BYTES
-from tickrig.emulators.scenario import Send, Sender, parse_raw
+from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
 from tickrig.wire.modbus.rtu import encode_frame
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.trace import Config
+from tickrig.emulators.record.trace import Config
 
 NAME: Final = "rrc"
 

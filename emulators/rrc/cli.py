@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.serial_options import line_options
+from tickrig.emulators.commands.serial_options import line_options
 from tickrig.host.cli.start import loading
 
 

@@ -7,11 +7,11 @@ from typing import Any, Final
 
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.emulator import Emulator
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rrc.build import NAME, config_to_trace
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.trace import Mark
-from tickrig.emulators.wire_log import WireLine
+from tickrig.emulators.serial.emulator import Emulator
 from tickrig.wire.rrc.check import check_digit
 
 EVENTS: Final = (b"EV:", b"ER:")

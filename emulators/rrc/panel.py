@@ -11,11 +11,11 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Static
 
-from tickrig.emulators.inbox import EmulatorEnded
-from tickrig.emulators.requests import VERSION, Object
+from tickrig.emulators.control.inbox import EmulatorEnded
+from tickrig.emulators.control.requests import VERSION, Object
+from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
-from tickrig.emulators.trace import Mark
 from tickrig.host.cli.duration import format_time
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter

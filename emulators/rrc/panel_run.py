@@ -9,11 +9,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Final
 
-from tickrig.emulators.control import Control
-from tickrig.emulators.emulator import Emulator
-from tickrig.emulators.inbox import Inbox
-from tickrig.emulators.requests import Object
+from tickrig.emulators.bench.control import Control
+from tickrig.emulators.control.inbox import Inbox
+from tickrig.emulators.control.requests import Object
 from tickrig.emulators.rrc.panel import RrcPanel
+from tickrig.emulators.serial.emulator import Emulator
 
 SWITCH_S: Final = 0.000_2
 """How long the screen may keep the rig from running, a tick being 10 ms."""

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.ask import refused_by
-from tickrig.emulators.control_client import ControlClient
-from tickrig.emulators.requests import Object
+from tickrig.emulators.control.ask import refused_by
+from tickrig.emulators.control.client import ControlClient
+from tickrig.emulators.control.requests import Object
 from tickrig.host.cli.options import PATH, Decorator
 
 SYSTEM: Final = "system"

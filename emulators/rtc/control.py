@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.device.core import NEVER
-from tickrig.emulators.requests import Object, Requests, short, text_of, whole
+from tickrig.emulators.control.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
 from tickrig.host.cli.user_file import told
 from tickrig.host.rtc.configuration.configuration import Configuration

@@ -6,7 +6,7 @@ import re
 from contextlib import ExitStack, closing
 from typing import Final
 
-from tickrig.emulators.run import say
+from tickrig.emulators.commands.run import say
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.reopening_link import ReopeningLink

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.ask import refused_by
-from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.control.ask import refused_by
+from tickrig.emulators.control.client import ControlClient
 from tickrig.emulators.rtc.at import SYSTEM, at
 from tickrig.emulators.rtc.completion import complete_port
 from tickrig.emulators.rtc.texts import value_line

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import click
 
-from tickrig.emulators.control_server import ControlServer
+from tickrig.emulators.commands.run import say
+from tickrig.emulators.control.server import ControlServer
+from tickrig.emulators.control.serving_clock import ServingClock
+from tickrig.emulators.control.signals import stopped_by_signals
 from tickrig.emulators.rtc.console import Console
 from tickrig.emulators.rtc.control import SystemControl
 from tickrig.emulators.rtc.lite import attach_lite
 from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
-from tickrig.emulators.run import say
-from tickrig.emulators.serving_clock import ServingClock
-from tickrig.emulators.signals import stopped_by_signals
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.telling import warnings_told
 from tickrig.host.cli.user_file import find_class, told

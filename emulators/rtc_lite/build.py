@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.emulators.record.trace import Config
 from tickrig.emulators.rtc_lite.components import find_component
-from tickrig.emulators.trace import Config
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
 from tickrig.wire.rtc_lite.framing import Framing

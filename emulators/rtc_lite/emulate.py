@@ -8,14 +8,14 @@ import click
 
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.emulator import LineKind
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
 from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
 from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
-from tickrig.emulators.serial_run import Kind, Options, SerialRun
-from tickrig.emulators.wire_log import WireLine
+from tickrig.emulators.serial.emulator import LineKind
 from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.cli.user_file import told
 from tickrig.wire.rtc_lite.codes import Command, ContextType

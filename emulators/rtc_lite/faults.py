@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.emulators.byte_faults import BYTE_FAULTS
-from tickrig.emulators.faults import Fault, FaultKind
+from tickrig.emulators.rig.faults import Fault, FaultKind
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.wire.rtc_lite.codes import Command
 
 _PING_ANSWER: Final = re.compile(rb"\n" + Command.PING.value + rb"@..", re.DOTALL)

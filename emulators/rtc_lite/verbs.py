@@ -8,9 +8,9 @@ from typing import Any
 
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.emulators.byte_text import unescape
-from tickrig.emulators.names import known
-from tickrig.emulators.scenario import Send, Sender, parse_raw
+from tickrig.emulators.bench.names import known
+from tickrig.emulators.record.byte_text import unescape
+from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.host.cli.setting import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command

@@ -9,7 +9,7 @@ from typing import Any, Final
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, Wall, World
-from tickrig.emulators.trace import Config
+from tickrig.emulators.record.trace import Config
 
 NAME: Final = "urg"
 

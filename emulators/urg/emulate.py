@@ -9,10 +9,11 @@ from typing import Any, Final
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
-from tickrig.emulators.emulator import LineKind
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.serial_run import Kind, Options, SerialRun, by_miniterm
-from tickrig.emulators.trace import Mark
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun, by_miniterm
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.serial.emulator import LineKind
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.build import (
     NAME,
     config_to_trace,
@@ -21,7 +22,6 @@ from tickrig.emulators.urg.build import (
     parse_wall,
 )
 from tickrig.emulators.urg.cli import USB_BAUD
-from tickrig.emulators.wire_log import WireLine
 from tickrig.host.cli.refused import refused_at
 
 USUAL_BAUD: Final = 115_200

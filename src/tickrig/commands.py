@@ -22,7 +22,7 @@ def _start(name: str, module: str) -> None:
 
 def tickrig() -> None:
     """Call `tickrig`."""
-    _start("tickrig", "tickrig.emulators.cli")
+    _start("tickrig", "tickrig.emulators.commands.cli")
 
 
 def rrc_emu() -> None:
@@ -42,7 +42,7 @@ def canmon() -> None:
 
 def rh3() -> None:
     """Call `rh3`."""
-    _start("rh3", "tickrig.emulators.rh3.motion_cli")
+    _start("rh3", "tickrig.emulators.rh3.cart.motion_cli")
 
 
 def rh3_emu() -> None:

@@ -9,15 +9,15 @@ import canopen
 from canopen.profiles.p402 import BaseNode402
 
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
-from tests.emulators.can_bench import Log
+from tests.emulators.can.can_bench import Log
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.sim_network import SimNetwork
+from tickrig.emulators.can.outside.sim_network import SimNetwork
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 

@@ -15,11 +15,11 @@ from serial.rfc2217 import PortManager
 from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.emulators.clock import RealClock
-from tickrig.emulators.control import Control
-from tickrig.emulators.emulator import Emulator, Outside
-from tickrig.emulators.pty_port import PtyPort
-from tickrig.emulators.requests import VERSION, Object
+from tickrig.emulators.bench.control import Control
+from tickrig.emulators.control.requests import VERSION, Object
+from tickrig.emulators.rig.clock import RealClock
+from tickrig.emulators.serial.emulator import Emulator, Outside
+from tickrig.emulators.serial.pty_port import PtyPort
 
 JOIN_S = 5.0
 T = TypeVar("T")

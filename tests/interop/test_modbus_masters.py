@@ -9,7 +9,7 @@ import minimalmodbus
 import pytest
 from pymodbus.client import ModbusSerialClient
 
-from tickrig.emulators.child import running
+from tickrig.emulators.bench.child import running
 
 pytestmark = pytest.mark.realtime
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from hokuyolx import HokuyoLX
 
-from tickrig.emulators.child import running
+from tickrig.emulators.bench.child import running
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.urg.client import UrgClient
 from tickrig.host.urg.scan import Scan

@@ -13,8 +13,8 @@ import pytest
 
 from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
 
 ROOT = Path(__file__).parents[2]

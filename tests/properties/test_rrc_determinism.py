@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.device.rrc.terminals import INPUTS
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rrc import commands as cmd
 
 ROOT = Path(__file__).parents[2]

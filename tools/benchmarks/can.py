@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 
 from benchmarks.table import rates
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import frame_bits
 

@@ -12,9 +12,9 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.canopen.eds_cache import EdsCache
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.eds.eds_cache import EdsCache
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 

@@ -15,11 +15,11 @@ import can
 from benchmarks.canopen import tpdo_dictionary
 from benchmarks.table import percentiles
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_bridge import CanBridge
-from tickrig.emulators.can_bus_port import CanBusPort
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.clock import RealClock
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.outside.bridge import CanBridge
+from tickrig.emulators.can.outside.bus_port import CanBusPort
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.clock import RealClock
+from tickrig.emulators.rig.rig import Rig, Station
 
 CYCLE_S = 0.01
 SLAVES = (8, 16, 24, 32, 40)

@@ -13,8 +13,8 @@ from benchmarks.table import rates
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 
 DRIVES: Final = 32

@@ -6,9 +6,9 @@ from itertools import count
 
 from benchmarks.table import rates
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.rrc.commands import Output, StableMode, Status
 

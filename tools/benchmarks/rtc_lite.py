@@ -9,10 +9,10 @@ from contextlib import closing, contextmanager
 from benchmarks.table import percentiles, rates
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.emulators.child import running
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.bench.child import running
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect

@@ -7,10 +7,10 @@ import time
 from benchmarks.table import RUNS, row
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.guard import Guard
 from tickrig.host.urg.client import UrgClient

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.emulators.byte_text import escape
+from tickrig.emulators.record.byte_text import escape
+from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.trace import Mark
 from tickrig.host.links.link import Link
 from tickrig.wire.rtc_lite.codes import Command
 

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tests.emulators.can_bench import Log
+from tests.emulators.can.can_bench import Log
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import f_palette, motor_core_unit
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 

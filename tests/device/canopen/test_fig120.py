@@ -8,8 +8,8 @@ import pytest
 
 from tests.device.canopen.fig120 import MEASURED, POTENTIOMETER, SETUP, Demo, look, make_motor
 from tickrig.device.canopen.core.application import Application
-from tickrig.emulators.candump_port import CandumpPort
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.record.candump_port import CandumpPort
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.candump import parse_log
 
 ENCODER_DEG = 360 / 409_600

@@ -13,7 +13,7 @@ from tickrig.emulators.canopen.cli import main
 
 ROOT = Path(__file__).parents[3]
 EDS = "tests/golden/canopen/r1.eds"
-DCF = "tests/emulators/canopen/sample.dcf"
+DCF = "tests/emulators/canopen/eds/sample.dcf"
 PROGRAM = "from tickrig.emulators.canopen.cli import main; main(prog_name='canopen-slave-emu')"
 
 

@@ -11,9 +11,9 @@ from canopen.profiles.p402 import BaseNode402
 from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.sim_network import SimNetwork
+from tickrig.emulators.can.outside.sim_network import SimNetwork
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIGHT_WHEEL = 2

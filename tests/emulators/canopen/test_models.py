@@ -10,13 +10,13 @@ from canopen.objectdictionary import ODVariable, import_od
 
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.core.entry import Access, Entry
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.eds import read_eds
+from tickrig.emulators.canopen.eds.eds import read_eds
 from tickrig.emulators.canopen.models import MODELS, Model
-from tickrig.emulators.canopen.node import NODE_OUTPUTS
-from tickrig.emulators.canopen.node_spec import NodeSpec
+from tickrig.emulators.canopen.node.node import NODE_OUTPUTS
+from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 SHIPPED = Path(__file__).parents[3] / "examples" / "eds"

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.interop.buses import GROUP
-from tickrig.emulators.cli import main
+from tickrig.emulators.commands.cli import main
 from tickrig.emulators.fig120.demo import run_demo
 from tickrig.emulators.fig120.samples import Sample
 from tickrig.emulators.fig120.set_up import set_up

@@ -6,9 +6,9 @@ from math import pi
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.urg.world import Post, World
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
-from tickrig.emulators.rh3.convoy import place
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.convoy import place
+from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.game_pad import GamePad
 from tickrig.host.motion.options.guard import Guard

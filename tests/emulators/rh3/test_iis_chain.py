@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.iis.goal_interface import GoalInterface
 from tickrig.host.motion.iis.path_interface import PASSED, STOPPED, PathInterface

@@ -8,7 +8,7 @@ import pytest
 
 from tests.host.motion.port_bench import at
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.ref_hard import RefHardRh3
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import OutPort

@@ -11,8 +11,8 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from tickrig.emulators.child import running
-from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.bench.child import running
+from tickrig.emulators.control.client import ControlClient
 
 pytestmark = pytest.mark.realtime
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tickrig.emulators.cli import main as tickrig
+from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.rh3.cli import main as rh3_emu
 
 SCENARIO = """

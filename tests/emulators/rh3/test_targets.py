@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.drive import drive, expect, start
 from tickrig.host.motion.geometry import Pose

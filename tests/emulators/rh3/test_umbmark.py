@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.dead_reckoning import Wheels
 from tickrig.host.motion.drive import drive, start
 from tickrig.host.motion.geometry import Pose

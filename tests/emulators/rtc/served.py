@@ -9,8 +9,8 @@ from typing import Self
 from click.testing import CliRunner
 
 from tests.host.rtc.chain import Chain
-from tickrig.emulators.cli import main
-from tickrig.emulators.control_server import ControlServer
+from tickrig.emulators.commands.cli import main
+from tickrig.emulators.control.server import ControlServer
 from tickrig.emulators.rtc.control import SystemControl
 from tickrig.host.rtc.execution.real_time import RealTime
 

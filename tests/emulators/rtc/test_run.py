@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tickrig.emulators.child import running
-from tickrig.emulators.cli import main
-from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.bench.child import running
+from tickrig.emulators.commands.cli import main
+from tickrig.emulators.control.client import ControlClient
 from tickrig.emulators.rtc.at import default_path
 from tickrig.host.rtc.system.system_toml import parse_toml
 
@@ -158,7 +158,7 @@ class Run:
 
     def __init__(self, folder: Path, *options: str) -> None:
         self.path = folder / "ctl"
-        program = "from tickrig.emulators.cli import main; main()"
+        program = "from tickrig.emulators.commands.cli import main; main()"
         words = ["rtc", "run", "--control", str(self.path), "--console", *options]
         self.process = subprocess.Popen(
             [sys.executable, "-c", program, *words],
@@ -241,7 +241,7 @@ def test_the_example_runs_and_print_ends_with_ctrl_c(folder: Path) -> None:
     with run(folder, str(EXAMPLE)) as child:
         child.type(5)
         assert child.lines(1) == ["ConsoleOut0 5"]
-        program = "from tickrig.emulators.cli import main; main()"
+        program = "from tickrig.emulators.commands.cli import main; main()"
         words = ["rtc", "print", "ConsoleIn0.out", "--at", str(child.path)]
         printing = subprocess.Popen(
             [sys.executable, "-c", program, *words], stdout=subprocess.PIPE, text=True

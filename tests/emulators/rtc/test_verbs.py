@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from tests.emulators.rtc.served import Served
 from tests.host.rtc.spy import ERROR
-from tickrig.emulators.cli import main
+from tickrig.emulators.commands.cli import main
 from tickrig.host.rtc import Provider, ServicePort
 from tickrig.host.rtc.system.compare import differences
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tickrig.emulators.cli import main as tickrig
+from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.rtc_lite.cli import main as rtc_lite_emu
 
 ROOT = Path(__file__).parents[3]

@@ -8,7 +8,7 @@ import time
 import pytest
 from click.testing import CliRunner
 
-from tickrig.emulators.cli import main
+from tickrig.emulators.commands.cli import main
 
 LINE = re.compile(r" +(\d+\.\d{3}) (.*)")
 

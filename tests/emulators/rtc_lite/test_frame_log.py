@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.trace import Mark
 from tickrig.wire.rtc_lite.framing import Framing
 
 

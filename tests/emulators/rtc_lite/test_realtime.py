@@ -8,8 +8,8 @@ import pytest
 import serial
 
 from tests.wire.rtc_lite.vectors import VECTORS, raw
-from tickrig.emulators.child import running
-from tickrig.emulators.control_client import ControlClient
+from tickrig.emulators.bench.child import running
+from tickrig.emulators.control.client import ControlClient
 
 TIMEOUT_S = 5.0
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from tests.emulators.can_bench import frames
+from tests.emulators.can.can_bench import frames
 from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from tickrig.device.core import NEVER
 from tickrig.device.modbus.registers import Register, Registers
 from tickrig.device.modbus.slave import ModbusSlave
-from tickrig.emulators.byte_faults import BYTE_FAULTS
-from tickrig.emulators.faults import FaultyPort
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.rs485_line import Rs485Line
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.modbus.master import Answer, ModbusMaster
 from tickrig.wire.modbus.requests import (

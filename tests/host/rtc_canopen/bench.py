@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.emulators.can_bench import Log
+from tests.emulators.can.can_bench import Log
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_host import CanHost
-from tickrig.emulators.can_wire import CanWire
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.emulators.can_bench import frames
+from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.emulators.canopen.models import MODELS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.emulators.can_bench import frames
+from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind

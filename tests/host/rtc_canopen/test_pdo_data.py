@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-from tests.emulators.can_bench import frames
+from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import ReturnCode

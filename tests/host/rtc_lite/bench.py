@@ -8,11 +8,11 @@ from tests.host.spy_link import SpyLink
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.faults import FaultyPort
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
 

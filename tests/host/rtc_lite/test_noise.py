@@ -17,7 +17,7 @@ from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.emulators.faults import Fault, FaultKind
+from tickrig.emulators.rig.faults import Fault, FaultKind
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings
 from tickrig.wire.rtc_lite.codes import ContextType

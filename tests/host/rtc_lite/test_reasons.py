@@ -7,7 +7,7 @@ from tests.host.rtc_lite.test_experiments import recorder_bench
 from tests.host.rtc_lite.test_timer import active
 from tests.host.spy_link import SpyLink
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.emulators.rig import Rig
+from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite import Settings
 from tickrig.host.rtc_lite.events import EventKind, ProxyEvent

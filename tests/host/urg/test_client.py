@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from tests.host.urg.sensor_bench import SensorBench
 from tickrig.device.urg.parameters import URG_04LX
-from tickrig.emulators.rig import Rig
-from tickrig.emulators.serial_line import SerialLine
-from tickrig.emulators.sim_link import SimLink
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import DeviceRefused, LinkClosed
 from tickrig.host.urg.client import UrgClient
 from tickrig.wire.scip.reply import Reply

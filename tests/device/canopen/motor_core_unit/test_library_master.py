@@ -11,9 +11,9 @@ import pytest
 from tests.device.canopen.fig120 import make_motor
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import motor_core_unit
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
-from tickrig.emulators.sim_network import SimNetwork
+from tickrig.emulators.can.outside.sim_network import SimNetwork
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 NODE_ID = motor_core_unit.NODE_ID

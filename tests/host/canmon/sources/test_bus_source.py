@@ -9,9 +9,9 @@ import can
 import pytest
 
 from tests.interop.buses import MULTICAST, PORT
-from tickrig.emulators.can_channels import CHANNELS
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig
+from tickrig.emulators.can.outside.channels import CHANNELS
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.output.failure import SourceFailed
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.source import Source, open_source

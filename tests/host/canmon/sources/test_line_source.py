@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.emulators.test_realtime import Child
+from tests.emulators.serial.test_realtime import Child
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources.source import AnySource, open_any
 from tickrig.host.canmon.sources.source_word import LineWord, parse_source

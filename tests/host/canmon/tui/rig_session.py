@@ -7,9 +7,9 @@ from pathlib import Path
 
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_host import CanHost
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.decode.objects.eds_objects import read_eds

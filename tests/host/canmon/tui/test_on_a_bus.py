@@ -5,9 +5,9 @@ from collections.abc import Callable
 from tests.host.canmon.tui.rig_session import EPOS, NODE
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can_channels import CHANNELS
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.outside.channels import CHANNELS
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session

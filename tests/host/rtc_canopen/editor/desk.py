@@ -10,10 +10,10 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from tests.host.rtc_canopen.bench import SYSTEMS, node
-from tickrig.emulators.can_host import CanHost
-from tickrig.emulators.can_wire import CanWire
-from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.rig import Rig, Station
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.session import Furnish, Session

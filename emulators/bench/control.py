@@ -1,0 +1,122 @@
+"""What can be asked of a running emulator (docs/control.md)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.bench.emulated import look_at
+from tickrig.emulators.bench.names import known
+from tickrig.emulators.bench.operator import PRESS_US
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.control.requests import Object, Requests, short, text_of, whole
+from tickrig.emulators.record.byte_text import escape
+from tickrig.emulators.scenario.fault_spec import parse_fault_spec
+from tickrig.host.cli.setting import Setting
+
+MAX_LINES: Final = 100
+MAX_PRESS_US: Final = 10**15
+"""As long as a command line can say."""
+
+
+class Control(Requests):
+    """Answers requests about one emulator.
+
+    Args:
+        emulator: what is controlled. It must not be stepping meanwhile.
+    """
+
+    def __init__(self, emulator: Workbench) -> None:
+        self._emulator = emulator
+        super().__init__(
+            {
+                "describe": (self._describe, ()),
+                "get": (self._get, ("names",)),
+                "set": (self._set, ("name", "value")),
+                "press": (self._press, ("name", "duration_us")),
+                "fault": (self._fault, ("spec",)),
+                "clear": (self._clear, ("name",)),
+                "lines": (self._lines, ("since",)),
+                "status": (self._status, ()),
+                "stop": (self._stop, ()),
+            }
+        )
+
+    def _describe(self, request: Object) -> Object:
+        emulator, device = self._emulator, self._emulator.device
+        return {
+            "device": emulator.name,
+            "tick_us": device.tick_us,
+            "inputs": [
+                {
+                    **{"name": item.name, "text": item.text, "kind": item.kind.value},
+                    **{"low": item.low, "high": item.high, "unit": item.unit},
+                }
+                for item in device.inputs.table.values()
+            ],
+            "groups": {name: list(members) for name, members in device.inputs.groups.items()},
+            "outputs": [
+                {"name": item.name, "text": item.text, "unit": item.unit}
+                for item in device.outputs.values()
+            ],
+            "wire_faults": [
+                {"name": name, "text": kind.text, "rated": kind.rated}
+                for name, kind in emulator.wire.kinds.items()
+            ],
+        }
+
+    def _get(self, request: Object) -> Object:
+        device = self._emulator.device
+        names = request.get("names", [*device.inputs.table, *device.outputs])
+        if not isinstance(names, list):
+            raise ValueError(f"names is a list of names, not {short(names)}")
+        for name in names:
+            if not isinstance(name, str) or not (
+                name in device.inputs.table or name in device.outputs
+            ):
+                everything = known([*device.inputs.table, *device.outputs])
+                raise ValueError(f"no input or output {short(name)}; known: {everything}")
+        return {"values": {name: look_at(device, name) for name in names}}
+
+    def _set(self, request: Object) -> Object:
+        name, value = text_of(request, "name"), request.get("value")
+        values = value if isinstance(value, list) else [value]
+        self._emulator.operator.set(name, *[_setting(item) for item in values])
+        return {}
+
+    def _press(self, request: Object) -> Object:
+        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, MAX_PRESS_US)
+        emulator = self._emulator
+        emulator.operator.press(emulator.touch_us, text_of(request, "name"), duration_us)
+        return {}
+
+    def _fault(self, request: Object) -> Object:
+        emulator = self._emulator
+        emulator.operator.fault(emulator.touch_us, parse_fault_spec(text_of(request, "spec")))
+        return {}
+
+    def _clear(self, request: Object) -> Object:
+        self._emulator.operator.clear(text_of(request, "name"))
+        return {}
+
+    def _lines(self, request: Object) -> Object:
+        since = whole(request.get("since", 0), "since", 0, NEVER)
+        return {
+            "lines": [
+                {"number": x.number, "at_us": x.at_us, "mark": x.mark, "text": escape(x.data)}
+                for x in self._emulator.log.since(since)[-MAX_LINES:]
+            ]
+        }
+
+    def _status(self, request: Object) -> Object:
+        return dict(self._emulator.status())
+
+    def _stop(self, request: Object) -> Object:
+        self._emulator.stop()
+        return {}
+
+
+def _setting(value: object) -> Setting:
+    if not isinstance(value, int | float | str) or isinstance(value, bool):
+        raise ValueError(f"value is a number or a string, not {short(value)}")
+    return value

@@ -1,0 +1,194 @@
+"""The hands at a device: everything that can be done to it, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from typing import Final, Protocol
+
+from tickrig.device.core import NEVER
+from tickrig.device.physical import Kind
+from tickrig.emulators.bench.emulated import Inputs
+from tickrig.emulators.bench.names import known
+from tickrig.emulators.rig.agenda import Agenda
+from tickrig.emulators.scenario.fault_spec import FaultSpec
+from tickrig.host.cli.setting import Setting
+
+PRESS_US: Final = 100_000
+"""How long a button is pressed unless told otherwise."""
+
+
+class WireFault(Protocol):
+    """A fault of a wire, as people see it."""
+
+    @property
+    def text(self) -> str:
+        """What it does."""
+        ...
+
+    @property
+    def rated(self) -> bool:
+        """Whether it wants a rate."""
+        ...
+
+
+class WireFaults(Protocol):
+    """Where faults of a wire are armed by name: `FaultyPort`, or a whole bus."""
+
+    @property
+    def kinds(self) -> Mapping[str, WireFault]:
+        """The faults that can be armed."""
+        ...
+
+    @property
+    def armed(self) -> Collection[str]:
+        """Names of those that are."""
+        ...
+
+    def check(self, name: str, rate: float | None) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+
+    def arm(self, name: str, rate: float | None = None) -> None:
+        """Let a fault begin; one of the same name is replaced."""
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; one that is not armed is no error."""
+
+
+class Operator:
+    """Sets inputs, presses buttons, makes faults come and go.
+
+    What is done between two ticks is seen by the next one; a press is seen by
+    at least one tick, however short. `now_us` is the earliest time that a tick
+    which sees it could have.
+
+    Args:
+        inputs: the physical inputs of the device.
+        tick_us: the device's control period.
+        agenda: where releases and faults of a later time are entered.
+        wire: the port at which wire faults are armed.
+        note: told of each change, as `power_button=1`.
+    """
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        tick_us: int,
+        agenda: Agenda,
+        wire: WireFaults,
+        note: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        self._inputs, self._tick_us, self._agenda, self._wire = inputs, tick_us, agenda, wire
+        self.note = note
+
+    def set(self, name: str, *values: Setting) -> None:
+        """Set an input, or all inputs of a group.
+
+        Raises:
+            ValueError: no such input or group, a value too many, too few or out of range.
+        """
+        for member, value in self.check_set(name, *values):
+            self._agenda.drop(("release", member))
+            self._drop_fault(member)
+            self._put(member, value)
+
+    def check_set(self, name: str, *values: Setting) -> list[tuple[str, Setting]]:
+        """Return which inputs `set` would set to what, or raise as it does."""
+        groups = self._inputs.groups
+        if name not in groups and name not in self._inputs.table:
+            raise ValueError(f"no input {name!r}; known: {known([*groups, *self._inputs.table])}")
+        members = groups.get(name, (name,))
+        if len(values) != len(members):
+            what = "one value" if len(members) == 1 else f"{len(members)} values"
+            raise ValueError(f"{name} takes {what} ({', '.join(members)}), got {len(values)}")
+        pairs = list(zip(members, values, strict=True))
+        for member, value in pairs:
+            self._inputs.check(member, value)
+        return pairs
+
+    def press(self, now_us: int, name: str, duration_us: int = PRESS_US) -> None:
+        """Press a button and let it go after `duration_us`; ValueError if it is none."""
+        self.check_press(name, duration_us)
+        self._put(name, 1)
+        seen_us = -(-now_us // self._tick_us) * self._tick_us
+        self._agenda.put(
+            ("release", name), seen_us + duration_us, lambda now_us: self._put(name, 0)
+        )
+
+    def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
+        """Raise ValueError unless `press` can be done."""
+        self._inputs.find(name, Kind.BUTTON)
+        if duration_us < 1:
+            raise ValueError(f"a press lasts at least 1 us, not {duration_us} us")
+
+    def release(self, name: str) -> None:
+        """Let a button go; ValueError if it is none."""
+        self.check_press(name)
+        self.set(name, 0)
+
+    def fault(self, now_us: int, spec: FaultSpec) -> None:
+        """Let a fault come, now or when its time comes; ValueError if it cannot."""
+        self.check_fault(spec)
+        if spec.to_us <= now_us:
+            raise ValueError(f"fault {spec.name} would have ended before now")
+        self._drop_fault(spec.name)
+        if spec.from_us > now_us:
+            self._agenda.put(("begin", spec.name), spec.from_us, lambda now_us: self._begin(spec))
+        else:
+            self._begin(spec)
+        if spec.to_us != NEVER:
+            self._agenda.put(("end", spec.name), spec.to_us, lambda now_us: self._end(spec.name))
+
+    def check_fault(self, spec: FaultSpec) -> None:
+        """Raise ValueError unless there is such a fault and its rate makes sense."""
+        self.check_clear(spec.name)
+        if spec.name in self._wire.kinds:
+            self._wire.check(spec.name, spec.rate)
+        elif spec.rate is not None:
+            raise ValueError(f"{spec.name} takes no rate, got {spec.rate:g}")
+
+    def clear(self, name: str) -> None:
+        """Let a fault go, and its future too; ValueError if there is none of this name."""
+        self.check_clear(name)
+        self._drop_fault(name)
+        self._end(name)
+
+    def check_clear(self, name: str) -> None:
+        """Raise ValueError unless there is a fault of this name."""
+        if name not in self.faults:
+            raise ValueError(f"no fault {name!r}; known: {known(self.faults)}")
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Names of all faults there are, of the wire and of the device."""
+        return (*self._wire.kinds, *self._inputs.names(Kind.FAULT))
+
+    @property
+    def active_faults(self) -> tuple[str, ...]:
+        """Names of the faults that are present now."""
+        armed = self._wire.armed
+        return tuple(f for f in self.faults if f in armed or self._inputs_fault(f))
+
+    def _inputs_fault(self, name: str) -> bool:
+        return name in self._inputs.table and bool(self._inputs[name])
+
+    def _drop_fault(self, name: str) -> None:
+        self._agenda.drop(("begin", name))
+        self._agenda.drop(("end", name))
+
+    def _begin(self, spec: FaultSpec) -> None:
+        if spec.name in self._wire.kinds:
+            self._wire.arm(spec.name, spec.rate)
+            self.note(spec.name if spec.rate is None else f"{spec.name}={spec.rate:g}")
+        else:
+            self._put(spec.name, 1)
+
+    def _end(self, name: str) -> None:
+        if name in self._wire.kinds:
+            self._wire.clear(name)
+            self.note(f"{name}=0")
+        else:
+            self._put(name, 0)
+
+    def _put(self, name: str, value: Setting) -> None:
+        self._inputs.set(name, value)
+        self.note(f"{name}={value}")

@@ -1,0 +1,69 @@
+"""The latest lines, or frames, on a serial line, both ways."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tickrig.emulators.record.trace import Mark
+from tickrig.wire.lines import LineSplitter
+
+
+@dataclass(frozen=True, slots=True)
+class WireLine:
+    """One line that passed.
+
+    Attributes:
+        number: counts the lines of a run from 1.
+        at_us: when its last byte was heard.
+        mark: which way it went.
+        data: the line without its line end.
+    """
+
+    number: int
+    at_us: int
+    mark: Mark
+    data: bytes
+
+
+Splitter = Callable[[int, bytes], list[bytes]]
+"""Told when bytes were heard; gives what has become whole."""
+
+
+def _line_splitter(mark: Mark) -> Splitter:
+    splitter = LineSplitter()
+    return lambda at_us, data: splitter.push(data)
+
+
+class WireLog:
+    """Cuts what it hears into lines, keeps the latest, and tells its listeners.
+
+    Args:
+        keep: how many lines are kept.
+        splitter: makes what cuts the bytes of one direction, into lines unless given.
+
+    Attributes:
+        listeners: told each line when it is whole.
+    """
+
+    def __init__(
+        self, keep: int = 500, splitter: Callable[[Mark], Splitter] = _line_splitter
+    ) -> None:
+        self.listeners: list[Callable[[WireLine], None]] = []
+        self._lines: deque[WireLine] = deque(maxlen=keep)
+        self._splitters = {mark: splitter(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
+        self._count = 0
+
+    def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
+        """Take what passed, cut anywhere."""
+        for line in self._splitters[mark](at_us, data):
+            self._count += 1
+            whole = WireLine(self._count, at_us, mark, line)
+            self._lines.append(whole)
+            for listener in self.listeners:
+                listener(whole)
+
+    def since(self, number: int) -> tuple[WireLine, ...]:
+        """Return the kept lines that came after the one of this number."""
+        return tuple(line for line in self._lines if line.number > number)

@@ -1,0 +1,109 @@
+"""Emulated devices with all that can be done to them while they run."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.bench.emulated import Touchable
+from tickrig.emulators.bench.operator import Operator, WireFaults
+from tickrig.emulators.bench.wire_log import WireLog
+from tickrig.emulators.rig.agenda import Agenda
+from tickrig.emulators.rig.rig import Rig
+
+
+class Workbench(ABC):
+    """A rig, the hands at its devices, and what is to be done and seen.
+
+    Args:
+        name: what the device is called.
+        device: the physical side.
+        wire: where faults of the wire are armed.
+        link: where the host finds it, for people.
+
+    Attributes:
+        operator: sets inputs, presses buttons, makes faults.
+        agenda: what is to be done between ticks, by whoever makes the rig's time pass.
+        log: the latest lines or frames on the wire.
+        rig: the rig.
+        after_step: told the time after each step.
+        running: False once `stop` was called.
+    """
+
+    rig: Rig
+
+    def __init__(self, name: str, device: Touchable, wire: WireFaults, link: str) -> None:
+        self.name, self.wire, self.link, self.running = name, wire, link, True
+        self._touched = device
+        self.agenda, self.log = Agenda(), WireLog()
+        self.after_step: list[Callable[[int], None]] = []
+        self.operator = Operator(device.inputs, device.tick_us, self.agenda, wire)
+
+    @property
+    def device(self) -> Touchable:
+        """The physical side of the device."""
+        return self._touched
+
+    @property
+    def touch_us(self) -> int:
+        """When what is done now takes effect: at once in an action, else at the next tick."""
+        if self.rig.acting_us is not None:
+            return self.rig.acting_us
+        now_us, tick_us = self.rig.now_us, self.device.tick_us
+        return now_us - now_us % tick_us + tick_us if now_us else 0
+
+    def step(self) -> None:
+        """Go to the next time at which something happens, and let it happen."""
+        next_us = min(self.rig.next_us, self._host_due_us)
+        if self.agenda.due_us <= min(next_us, NEVER - 1):
+            self.rig.step()  # the actions alone; the tick of their time is the next step
+        elif next_us < NEVER:
+            self.rig.run_to(next_us)
+        self._listen(self.rig.now_us)
+        for look in self.after_step:
+            look(next_us)
+
+    @property
+    @abstractmethod
+    def _host_due_us(self) -> int:
+        """When something arrives at a host that is the caller; `NEVER` if it is outside."""
+
+    @abstractmethod
+    def _listen(self, now_us: int) -> None:
+        """Take what has arrived there."""
+
+    @abstractmethod
+    def send(self, now_us: int, data: bytes) -> None:
+        """Put something on the wire, as the host would."""
+
+    @property
+    @abstractmethod
+    def lost(self) -> dict[str, int]:
+        """What found a buffer full."""
+
+    @property
+    @abstractmethod
+    def trace_error(self) -> str:
+        """Why the recording ended early, empty while all is well."""
+
+    def stop(self) -> None:
+        """Let whoever runs it end after this step."""
+        self.running = False
+
+    @abstractmethod
+    def close(self) -> None:
+        """End the recording."""
+
+    def status(self) -> dict[str, str | int]:
+        """Return how the run is going."""
+        return {
+            "device": self.name,
+            "link": self.link,
+            "now_us": self.rig.now_us,
+            "late_steps": self.rig.late_steps,
+            "late_us": self.rig.late_us,
+            **self.lost,
+            "faults": " ".join(self.operator.active_faults),
+            "trace_error": self.trace_error,
+        }

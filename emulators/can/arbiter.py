@@ -1,0 +1,64 @@
+"""Arbitration: whose frame is next on the bus, and when it starts."""
+
+from __future__ import annotations
+
+from heapq import heapify, heappop, heappush
+from typing import TYPE_CHECKING
+
+from tickrig.emulators.can.priority import priority
+
+if TYPE_CHECKING:
+    from tickrig.emulators.can.end import CanEnd
+
+
+class CanArbiter:
+    """The first frames of all queues, sorted as the bits on the bus would sort them.
+
+    All times are in the units of the segment.
+
+    Attributes:
+        heads: a heap of priority, number of the node, node.
+        free: no frame starts before this.
+        slow: some node has to wait longer than the bus is busy.
+    """
+
+    __slots__ = ("free", "heads", "slow")
+
+    def __init__(self, free: int) -> None:
+        self.free, self.slow = free, False
+        self.heads: list[tuple[int, int, CanEnd]] = []
+
+    def enter(self, end: CanEnd, now: int) -> None:
+        """Let a node whose queue was empty take part from now on."""
+        end.held = max(end.held, now)
+        heappush(self.heads, (priority(end.queue[0]), end.number, end))
+
+    def put_back(self, ends: list[CanEnd]) -> None:
+        """Let nodes take part again, those that still have a frame to send."""
+        for end in ends:
+            if end.queue:
+                heappush(self.heads, (priority(end.queue[0]), end.number, end))
+
+    def remove(self, end: CanEnd) -> None:
+        """Let a node take part no longer."""
+        self.heads = [head for head in self.heads if head[2] is not end]
+        heapify(self.heads)
+
+    def take(self) -> list[CanEnd]:
+        """Take the winner out; several nodes with the same identifier all win."""
+        heads = self.heads
+        rank, _, end = heappop(heads)
+        winners = [end]
+        while heads and heads[0][0] == rank:
+            winners.append(heappop(heads)[2])
+        return winners
+
+    def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
+        """Take the winner of those that wait least, or all of them; the start comes first."""
+        start = max(self.free, min(head[2].held for head in self.heads))
+        able = sorted(head for head in self.heads if head[2].held <= start)
+        winners = [end for rank, _, end in able if everybody or rank == able[0][0]]
+        self.slow = any(head[2].held > self.free for head in self.heads)
+        for end in winners:
+            self.remove(end)
+        return start, winners

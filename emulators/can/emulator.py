@@ -1,0 +1,108 @@
+"""Emulated devices on a CAN bus, with all that can be done to them while they run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.bench.emulated import Touchable
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.can.end import Accepted, CanEnd
+from tickrig.emulators.can.outside.bridge import CanBridge
+from tickrig.emulators.can.outside.without_echo import CountingPort
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.coupling import Coupling
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
+
+
+class CanEmulator(Workbench):
+    """Devices, their bus, their operator, and a rig that runs them.
+
+    One more end of the bus belongs to the caller: what it sends is heard by all
+    devices and by the bus outside, and it hears all. The bus outside, or in its
+    stead an end that only acknowledges, sees to it that the caller is never alone.
+
+    Args:
+        name: what the devices are called.
+        physical: the physical side of all devices.
+        stations: the devices, each on its end of the bus.
+        wire: the bus.
+        couplings: what joins the devices beside the bus.
+        outside: the bus where the host is, if it is outside.
+        clock: a `VirtualClock` unless given.
+        trace: the record, to be closed in the end.
+        link: how people call the bus outside.
+    """
+
+    def __init__(  # noqa: PLR0913 - options, by keyword
+        self,
+        name: str,
+        physical: Touchable,
+        stations: Sequence[Station[Frames]],
+        wire: CanWire,
+        *,
+        couplings: Sequence[Coupling] = (),
+        outside: CountingPort | None = None,
+        clock: Clock | None = None,
+        trace: CandumpFile | None = None,
+        link: str = "",
+    ) -> None:
+        super().__init__(name, physical, wire.faults, link)
+        self._wire, self._outside, self._trace = wire, outside, trace
+        self._ends = [station.port for station in stations]
+        self._host = self._open_end()
+        beyond = self._open_end(None if outside else frozenset())
+        bridges = [CanBridge(beyond, outside)] if outside else []
+        self.rig = Rig(
+            *stations, bridges=bridges, couplings=couplings, clock=clock, agenda=self.agenda
+        )
+
+    def _open_end(self, accepts: Accepted = None) -> CanEnd:
+        """Connect an end that comes back from bus-off at once."""
+        end = self._wire.end(accepts)
+
+        def recover(at_us: int, state: ErrorState) -> None:
+            if state is ErrorState.BUS_OFF:
+                end.recover(at_us)
+
+        end.on_error_state = recover
+        self._ends.append(end)
+        return end
+
+    @property
+    def _host_due_us(self) -> int:
+        return NEVER
+
+    def _listen(self, now_us: int) -> None:
+        for at_us, frame in self._host.poll_stamped(now_us):
+            self._hear(at_us, Mark.FROM_DEVICE, frame)
+
+    def send(self, now_us: int, data: bytes) -> None:
+        """Put a frame, given in candump's notation, on the bus, as a host would."""
+        frame = CanFrame.parse(data.decode("ascii"))
+        self._hear(now_us, Mark.TO_DEVICE, frame)
+        self._host.send(now_us, (frame,))
+
+    def _hear(self, at_us: int, mark: Mark, frame: CanFrame) -> None:
+        self.log.hear(at_us, mark, f"{frame}\n".encode())
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Frames that found a queue full, at an end of the bus or outside."""
+        ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
+        return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}
+
+    @property
+    def trace_error(self) -> str:
+        """Why the record ended early, empty while all is well."""
+        return self._trace.error if self._trace else ""
+
+    def close(self) -> None:
+        """End the record."""
+        if self._trace is not None:
+            self._trace.close()

@@ -1,0 +1,203 @@
+"""A node's end of an emulated CAN bus: queue, acceptance filter, inbox, error counters."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+
+from tickrig.device.core import NEVER, Device
+from tickrig.emulators.can.controller import CanController
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorState
+
+if TYPE_CHECKING:
+    from tickrig.emulators.can.wire import CanWire
+
+QUEUE_FRAMES: Final = 4_096
+"""Frames that an end keeps, going out and as many coming in; more are lost and counted."""
+
+Accepted = frozenset[int] | None
+"""CAN-IDs that an end listens to, 29-bit ones with bit 29 set; None for all."""
+
+
+@runtime_checkable
+class Filtering(Protocol):
+    """A device that says which CAN-IDs it listens to.
+
+    A filter may pass more than the device wants, never less: the device itself
+    decides, frame by frame. So a frame that could change what it listens to lets
+    all that follow it pass, until the device has handled it.
+    """
+
+    @property
+    def accepts(self) -> Accepted:
+        """The CAN-IDs; None, for all, from power-on or a reset to the first tick."""
+        ...
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts` when they are handled."""
+        ...
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when `accepts` or `reconfigured_by` has changed, in a tick or between."""
+        ...
+
+
+@runtime_checkable
+class ErrorAware(Protocol):
+    """A device that is told the error state of its CAN controller."""
+
+    def bus_state(self, state: ErrorState, /) -> None:
+        """Hear of a change; it is seen to in the next tick."""
+
+
+class CanEnd:
+    """One node on a `CanWire`; a `WirePort[Frames]`.
+
+    Frames leave in the order in which they were given. A frame is received by
+    every other end of the bus whose filter lets it through.
+
+    Attributes:
+        wire: the bus.
+        number: place among the ends of the bus.
+        controller: error counters and error state.
+        queue: frames that have not left.
+        room: how many may be there; none while the node is bus-off.
+        held: no frame of it starts before this, in units of the segment.
+        lost: frames that found a queue or inbox full, or the node bus-off.
+        unfiltered: its filter is out of use until it is polled.
+        on_error_state: told the time and the new state when the error state changes.
+    """
+
+    __slots__ = (
+        *("_accepts", "_device", "_error_aware", "_reconfigured_by", "controller", "held", "inbox"),
+        *("unfiltered", "lost", "number", "on_error_state", "queue", "room", "segment", "stamps"),
+        *("wake", "wire"),
+    )
+
+    def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
+        self.wire, self.number, self._accepts = wire, number, accepts
+        self.segment = wire.bus
+        self.controller = CanController()
+        self.queue: deque[CanFrame] = deque()
+        self.inbox: list[CanFrame] = []
+        self.stamps: list[int] = []  # when the frames of `inbox` had arrived
+        self.room, self.held, self.lost, self.unfiltered = QUEUE_FRAMES, 0, 0, False
+        self._reconfigured_by: frozenset[int] = frozenset()
+        self.wake: Callable[[int], None] = _ignore
+        self.on_error_state: Callable[[int, ErrorState], None] | None = None
+        self._device: Filtering | None = None
+        self._error_aware: ErrorAware | None = None
+
+    @property
+    def accepts(self) -> Accepted:
+        """CAN-IDs that are received; a change holds for frames that end after it."""
+        return self._accepts
+
+    @accepts.setter
+    def accepts(self, accepts: Accepted) -> None:
+        self._accepts = accepts
+        self.segment.routes.forget()
+
+    @property
+    def arrived_us(self) -> int:
+        """When the first frame that waits here had ended, `NEVER` if none does."""
+        return self.stamps[0] if self.stamps else NEVER
+
+    @property
+    def due_us(self) -> int:
+        """When the next frame will have arrived, or earlier: its receivers are not known yet."""
+        return self.stamps[0] if self.stamps else self.wire.due_us
+
+    def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
+        """Take the filter from a device, tell it the error state, say when a frame has arrived."""
+        self.wake = wake
+        if isinstance(device, Filtering):
+            self._device = device
+            device.on_accepts.append(self._refilter)
+            self._refilter()
+        if isinstance(device, ErrorAware):
+            self._error_aware = device
+
+    def poll(self, now_us: int, /) -> Frames:
+        """Take the frames that had ended by `now_us`."""
+        if self.segment.now_us < now_us:
+            self.wire.advance(now_us)
+        if self.unfiltered:
+            self.unfiltered = False
+            self.segment.routes.unfiltered.remove(self)
+        if not self.inbox:
+            return ()
+        frames = tuple(self.inbox)
+        self.inbox.clear()
+        self.stamps.clear()
+        return frames
+
+    def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
+        """Take the same frames, each with the time at which it had ended."""
+        self.wire.advance(now_us)
+        stamps = tuple(self.stamps)
+        return tuple(zip(stamps, self.poll(now_us), strict=True))
+
+    def send(self, now_us: int, traffic: Frames, /) -> None:
+        """Queue frames behind those that have not left."""
+        if traffic:
+            self.segment.send(self, now_us, traffic)
+
+    def recover(self, now_us: int) -> None:
+        """Leave bus-off: after 128 times 11 recessive bits the node is error-active again."""
+        self.segment.recover(self, now_us)
+
+    def receive(self, at_us: int, frame: CanFrame) -> None:
+        """Take a frame from the bus."""
+        if not self.inbox:
+            self.wake(at_us)
+            self.segment.heard = True
+        elif len(self.inbox) >= QUEUE_FRAMES:
+            self.lost += 1
+            return
+        self.inbox.append(frame)
+        self.stamps.append(at_us)
+        if frame[0] in self._reconfigured_by:
+            self.pass_all()
+
+    def pass_all(self) -> None:
+        """Open the filter until the next poll: the device will listen to nobody knows what."""
+        if not self.unfiltered:
+            self.unfiltered = True
+            self.segment.routes.unfiltered.append(self)
+
+    def _refilter(self) -> None:
+        """Follow what the device listens to."""
+        if self._device is not None:
+            self.accepts = self._device.accepts
+            self._reconfigured_by = self._device.reconfigured_by
+
+    def forget(self) -> None:
+        """Lose what waits to be sent and to be polled, as a node without power does."""
+        self.queue.clear()
+        self.inbox.clear()
+        self.stamps.clear()
+
+    def open(self, *, on_bus: bool) -> None:
+        """Let it send, or not; then what waits is lost."""
+        self.room = QUEUE_FRAMES if on_bus else 0
+        if not on_bus:
+            self.lost += len(self.queue)
+            self.queue.clear()
+
+    def error_state_changed(self, at_us: int) -> None:
+        """Tell whoever wants to know."""
+        if self._error_aware is not None:
+            self._error_aware.bus_state(self.controller.state)
+        if self.on_error_state is not None:
+            self.on_error_state(at_us, self.controller.state)
+        self.wake(at_us)
+        self.segment.heard = True
+
+
+def _ignore(at_us: int) -> None:
+    """Wake nobody: nobody ticks at this end."""

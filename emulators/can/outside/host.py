@@ -1,0 +1,125 @@
+"""A host on the bus of a rig in virtual time."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.rig.rig import Rig
+from tickrig.host.links.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.stamped_link import Stamped
+from tickrig.wire.can import CanFrame, Frames
+
+CHUNK_US: Final = 1_000_000
+"""How far the rig runs at once where there is no timeout."""
+
+
+class Repeat:
+    """Frames that are sent in turn, one each period, as a driver's periodic task does.
+
+    Attributes:
+        frames: what is sent, from the next time on.
+        due_us: when the next one is sent, `NEVER` once it was stopped.
+    """
+
+    def __init__(self, frames: Frames, period_us: int, due_us: int) -> None:
+        self.frames, self.due_us = frames, due_us
+        self._period_us, self._sent = period_us, 0
+
+    def stop(self) -> None:
+        """Send no more."""
+        self.due_us = NEVER
+
+    def take(self) -> Frames:
+        """Take the frame that is due."""
+        frame = self.frames[self._sent % len(self.frames)]
+        self._sent += 1
+        self.due_us += self._period_us
+        return (frame,)
+
+
+class CanHost:
+    """A `StampedLink` into a rig: waiting makes virtual time pass.
+
+    Args:
+        rig: the rig that is stepped meanwhile.
+        end: an end of one of its buses that no station has.
+    """
+
+    def __init__(self, rig: Rig, end: CanEnd) -> None:
+        self._rig, self._end, self._closed = rig, end, False
+        rig.move_on(end.wire)
+        self._inbox: deque[tuple[int, CanFrame]] = deque()
+        self._repeats: list[Repeat] = []
+
+    @property
+    def now_us(self) -> int:
+        """The rig's time."""
+        return self._rig.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        """Queue frames; no time passes."""
+        self._check_open()
+        self._end.send(self.now_us, traffic)
+
+    def repeat(self, frames: Frames, period_us: int) -> Repeat:
+        """Send a frame now and one in each period, in turn, until it is stopped."""
+        if period_us < 1 or not frames:
+            raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
+        repeat = Repeat(frames, period_us, self.now_us)
+        self.send(repeat.take())
+        self._repeats.append(repeat)
+        return repeat
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        """Let time pass until a frame has arrived; return all that are there then."""
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        """Let time pass until a frame has arrived; return the time, and all that are there."""
+        first = self.take(timeout_us)
+        heard = () if first is None else (first, *self._inbox)
+        self._inbox.clear()
+        return self.now_us, heard
+
+    def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
+        """Let time pass until a frame has arrived; return it with its time, None if none came.
+
+        Raises:
+            LinkClosed: the link was closed.
+            LinkTimeout: there is no timeout, and nothing will ever happen.
+        """
+        self._check_open()
+        deadline_us = NEVER if timeout_us is None else self.now_us + max(0, timeout_us)
+        while not self._inbox:
+            self._inbox += self._end.poll_stamped(self.now_us)
+            if not self._inbox:
+                if self.now_us >= deadline_us:
+                    return None
+                self._step(deadline_us)
+        return self._inbox.popleft()
+
+    def close(self) -> None:
+        """Close the link; the rig stays as it is."""
+        self._closed = True
+        self._repeats.clear()
+
+    def _step(self, deadline_us: int) -> None:
+        """Let the rig run until a frame has come, or one is to be repeated."""
+        self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
+        repeat_us = min((repeat.due_us for repeat in self._repeats), default=NEVER)
+        until_us = min(repeat_us, deadline_us)
+        if until_us == NEVER:
+            if self._rig.next_us == NEVER:
+                raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
+            until_us = self._rig.next_us + CHUNK_US
+        self._rig.run_to(until_us, self._end)
+        for repeat in self._repeats:
+            if repeat.due_us <= self.now_us:
+                self._end.send(self.now_us, repeat.take())
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise LinkClosed("the link was closed")

@@ -1,0 +1,126 @@
+"""The python-can interface `tickrig`: rigs in virtual time under the names of channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import can
+from can.broadcastmanager import CyclicSendTaskABC, ModifiableCyclicTaskABC
+from can.typechecking import CanFilters, Channel
+
+from tickrig.emulators.can.outside.channels import CHANNELS
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.errors import LinkError
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.errors import FieldError
+
+
+class TickrigBus(can.BusABC):
+    """A host on a rig: `can.Bus(interface="tickrig", channel="name")`.
+
+    `recv` makes virtual time pass, exactly its timeout if nothing comes; `send`
+    takes none. Timestamps are the rig's time in seconds. Periodic messages are
+    sent while time passes. One thread uses it: a `can.Notifier` would make time
+    pass on its own, so hosts that need one take `SimNetwork` or poll.
+
+    Args:
+        channel: a name that `CHANNELS` offers.
+        can_filters: as for any bus.
+        options: what other interfaces take (bitrate, ...) is ignored.
+
+    Raises:
+        can.CanInitializationError: no rig has this name.
+    """
+
+    def __init__(
+        self, channel: Channel, can_filters: CanFilters | None = None, **options: object
+    ) -> None:
+        try:
+            self._host: CanHost = CHANNELS.open(str(channel))
+        except KeyError:
+            known = ", ".join(CHANNELS.names) or "none"
+            raise can.CanInitializationError(
+                f"no rig offers channel {channel!r}; known: {known}"
+            ) from None
+        self.channel_info = f"tickrig {channel}"
+        super().__init__(channel, can_filters)
+
+    @property
+    def now_us(self) -> int:
+        """The rig's time."""
+        return self._host.now_us
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """Let time pass until a message has come, None after `timeout` seconds."""
+        deadline_us = None if timeout is None else self.now_us + round(timeout * 1e6)
+        while True:
+            left_us = None if deadline_us is None else deadline_us - self.now_us
+            try:
+                taken = self._host.take(left_us)
+            except LinkError as error:
+                raise can.CanOperationError(str(error)) from error
+            if taken is None:
+                return None
+            message = to_message(taken[1], taken[0])
+            message.channel = self.channel_info
+            if self._matches_filters(message):
+                return message
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Queue a message; no time passes."""
+        try:
+            self._host.send((_frame_of(msg),))
+        except LinkError as error:
+            raise can.CanOperationError(str(error)) from error
+
+    def shutdown(self) -> None:
+        """Leave the bus; the rig stays as it is."""
+        super().shutdown()
+        self._host.close()
+
+    def _send_periodic_internal(
+        self,
+        msgs: Sequence[can.Message] | can.Message,
+        period: float,
+        duration: float | None = None,
+        autostart: bool = True,
+        modifier_callback: Callable[[can.Message], None] | None = None,
+    ) -> CyclicSendTaskABC:
+        """Send in virtual time."""
+        if duration is not None or modifier_callback is not None or not autostart:
+            raise NotImplementedError("periodic messages: no duration, modifier or late start")
+        return _Periodic(self._host, msgs, period)
+
+
+class _Periodic(ModifiableCyclicTaskABC):
+    """Messages that are sent in turn, one each period of the rig's time."""
+
+    def __init__(
+        self, host: CanHost, messages: Sequence[can.Message] | can.Message, period_s: float
+    ) -> None:
+        super().__init__(messages, period_s)
+        self._repeat = host.repeat(self._frames(), round(period_s * 1e6))
+
+    def stop(self) -> None:
+        """Send no more."""
+        self._repeat.stop()
+
+    def modify_data(self, messages: Sequence[can.Message] | can.Message) -> None:
+        """Send other data from the next time on."""
+        super().modify_data(messages)
+        self._repeat.frames = self._frames()
+
+    def _frames(self) -> Frames:
+        return tuple(_frame_of(message) for message in self.messages)
+
+
+def _frame_of(message: can.Message) -> CanFrame:
+    """Return a frame; CanOperationError if it cannot be on the bus."""
+    frame = to_frame(message)
+    if frame is None:
+        raise can.CanOperationError("error frames and CAN FD are not emulated")
+    try:
+        return frame.checked()
+    except FieldError as error:
+        raise can.CanOperationError(str(error)) from error

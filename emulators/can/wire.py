@@ -1,0 +1,159 @@
+"""An emulated CAN bus in virtual time."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+from tickrig.emulators.can.end import Accepted, CanEnd
+from tickrig.emulators.can.faults import CanFaults
+from tickrig.emulators.can.segment import CanSegment, Observer
+from tickrig.wire.can import CanFrame
+
+BIT_RATES: Final = range(10_000, 1_000_001)
+WINDOW_US: Final = 1_000_000
+BABBLER: Final = -1  # number of the node that the fault `babble` adds
+
+
+class CanWire:
+    r"""A classic CAN bus (ISO 11898-1) whose nodes are `CanEnd`s.
+
+    A frame takes exactly the bits that it has, stuff bits included; it is
+    received, and stamped, when its end of frame has passed. Among several that
+    wait the arbitration field decides. Nodes that send the very same frame at
+    the same time send it together; with different contents they collide. A
+    frame that nobody acknowledges, and one that a fault breaks, is sent again,
+    after the error frame. TEC and REC count as in ISO 11898-1.
+
+    Not emulated: propagation and bit timing (all see a bit at once), overload
+    frames, errors that only one receiver sees, reception while a node's own
+    frame is sent (a controller does not hear itself), CAN FD. A node alone and
+    error-passive repeats its frame for ever: nobody is told each time, and the
+    bus load leaves it out.
+
+    Args:
+        bit_rate: 10 000 to 1 000 000 bit/s.
+        seed: seed of the chance in faults.
+
+    Attributes:
+        bit_rate: bits a second.
+        bus: what all connected ends hear.
+        faults: what is armed; `arm` and `clear` act at the time the bus has reached.
+        observers: told each frame and each error frame on the bus with its time.
+
+    >>> wire = CanWire(bit_rate=500_000)
+    >>> node, host = wire.end(), wire.end()
+    >>> node.send(0, (CanFrame.parse("705#7F"),))
+    >>> host.poll(109), host.poll(110)
+    ((), (CanFrame(can_id=1797, data=b'\x7f', remote=False, extended=False, remote_length=0),))
+    """
+
+    def __init__(self, bit_rate: int = 1_000_000, seed: int = 0) -> None:
+        if bit_rate not in BIT_RATES:
+            raise ValueError(f"bit rate {bit_rate} is not in {BIT_RATES[0]}..{BIT_RATES[-1]} bit/s")
+        self.bit_rate = bit_rate
+        self.faults = CanFaults(seed, self._fault_changed)
+        self.observers: list[Observer] = []
+        self.bus = CanSegment(bit_rate, 0, self.faults, self.observers)
+        self._apart: dict[int, CanSegment] = {}  # ends that are disconnected, each by itself
+        self._count = 0
+        self._babbler: CanEnd | None = None
+
+    def end(self, accepts: Accepted = None) -> CanEnd:
+        """Connect one more node.
+
+        Args:
+            accepts: CAN-IDs that it receives, 29-bit ones with bit 29 set; None for all.
+        """
+        end = CanEnd(self, self._count, accepts)
+        self._count += 1
+        self.bus.join(end, self.bus.now_us)
+        return end
+
+    @property
+    def due_us(self) -> int:
+        """When the next frame will have ended."""
+        if not self._apart:
+            return self.bus.due_us
+        return min(self.bus.due_us, *(apart.due_us for apart in self._apart.values()))
+
+    def advance(self, now_us: int) -> None:
+        """Let everything end that ends by `now_us`."""
+        self.bus.advance(now_us)
+        if self._apart:
+            for apart in self._apart.values():
+                apart.advance(now_us)
+
+    def advance_until_heard(self, until_us: int) -> bool:
+        """Let everything end up to the first frame that somebody heard; False if none was."""
+        if not self._apart:
+            return self.bus.advance_until_heard(until_us)
+        due_us = self.due_us
+        self.advance(min(due_us, until_us))
+        return due_us <= until_us
+
+    def load_permille(self, window_us: int = WINDOW_US) -> int:
+        """Return how busy the bus was in the latest time, in 0.1 %; at most a second is known."""
+        bus = self.bus
+        now = bus.now_us * bus.unit
+        first = max(0, now - window_us * bus.unit)
+        spans = (*bus.busy, bus.present)
+        busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
+        return 1_000 * busy // (now - first) if now > first else 0
+
+    def disconnect(self, end: CanEnd) -> None:
+        """Pull a node's plug: it is alone, and nobody acknowledges what it sends."""
+        if end.number not in self._apart:
+            now_us = self.bus.now_us
+            self.bus.leave(end, now_us)
+            apart = CanSegment(self.bit_rate, now_us, CanFaults(0, _ignore), [])
+            self._apart[end.number] = apart
+            apart.join(end, now_us)
+
+    def reconnect(self, end: CanEnd) -> None:
+        """Put the plug back in."""
+        apart = self._apart.pop(end.number, None)
+        if apart is not None:
+            apart.leave(end, self.bus.now_us)
+            self.bus.join(end, self.bus.now_us)
+
+    def cut_power(self, end: CanEnd) -> None:
+        """Take a node off the bus: what it had to send or had received is lost, all begins anew."""
+        self.disconnect(end)
+        apart, now_us = self._apart[end.number], self.bus.now_us
+        apart.leave(end, now_us)
+        end.forget()
+        end.controller.restart()
+        end.open(on_bus=True)
+        apart.join(end, now_us)
+
+    def _fault_changed(self, name: str, armed: bool) -> None:
+        now_us = self.bus.now_us
+        if name == "short":
+            self.bus.shorted = armed
+        elif name == "babble":
+            self._babble(now_us, armed=armed)
+        self.bus.disturb(now_us)
+
+    def _babble(self, now_us: int, *, armed: bool) -> None:
+        if armed:
+            self._babbler = CanEnd(self, BABBLER, frozenset())
+            self._babbler.queue = _Endless([CanFrame(0)])
+            self.bus.join(self._babbler, now_us)
+        elif self._babbler is not None:
+            self.bus.leave(self._babbler, now_us)
+            self._babbler = None
+
+
+class _Endless(deque[CanFrame]):
+    """A queue that is never empty: its node does not care for its error state either."""
+
+    def popleft(self) -> CanFrame:
+        return self[0]
+
+    def clear(self) -> None:
+        return
+
+
+def _ignore(name: str, armed: bool) -> None:
+    """Nothing is armed on the stump of a line."""

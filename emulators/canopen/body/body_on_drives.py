@@ -1,0 +1,144 @@
+"""A body on the shafts of drives, as a coupling of their rig."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from math import degrees, radians
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+from tickrig.device.body.wheeled_body import WheeledBody
+from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.core import NEVER
+from tickrig.device.physical import Output, QuantityBank
+from tickrig.emulators.canopen.body.body_inputs import FrictionTouch, PoseTouch
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.touch import Touch
+from tickrig.host.cli.setting import Setting
+
+NAME: Final = "body"
+
+BODY_OUTPUTS: Final = (
+    Output("x_m", "place", "m"),
+    Output("y_m", "place, to the left of x", "m"),
+    Output("heading_deg", "from x towards y, -180..180", "deg"),
+    Output("speed_m_s", "speed forward", "m/s"),
+    Output("turn_deg_s", "turning speed, positive to the left", "deg/s"),
+    Output("slipping", "1 while a wheel slips"),
+)
+
+SHAFTS: Final = (
+    ("shaft_deg", "load_nm", "load_kg_m2"),
+    ("angle_deg", "shaft_load_nm", "load_kg_m2"),
+)
+"""What drives call the angle of their shaft, the torque on it, and the inertia on it."""
+
+
+class Wheel(NamedTuple):
+    """A wheel on the shaft of a drive.
+
+    Attributes:
+        name: of the wheel.
+        node: the drive.
+        forward: -1 if it is mounted the other way round.
+    """
+
+    name: str
+    node: Node
+    forward: int = 1
+
+
+class BodyOnDrives:
+    """Lets a body go as the shafts of its drives turn, and lets them feel it.
+
+    Args:
+        body: the body.
+        wheels: for each of its wheels the drive.
+
+    Raises:
+        ValueError: a node that has no shaft.
+    """
+
+    name = NAME
+    tick_us = TICK_US
+
+    def __init__(self, body: WheeledBody, wheels: Collection[Wheel]) -> None:
+        self.body = body
+        self._shafts = {wheel.name: _Shaft(wheel) for wheel in wheels}
+        self.physical: Mapping[str, Touch] = {
+            touch.item.name: touch
+            for touch in (
+                PoseTouch(body, "x_m", "place", "m"),
+                PoseTouch(body, "y_m", "place, to the left of x", "m"),
+                PoseTouch(body, "heading_deg", "from x towards y", "deg"),
+            )
+        }
+        if body.parameters.friction is not None:
+            self.physical = {**self.physical, "friction": FrictionTouch(body)}
+        self.outputs: Mapping[str, Output] = {item.name: item for item in BODY_OUTPUTS}
+        self.groups: Mapping[str, tuple[str, ...]] = MappingProxyType(
+            {"pose": ("x_m", "y_m", "heading_deg")}
+        )
+        self._load()
+
+    @property
+    def due_us(self) -> int:
+        """Whether it moves although nothing drives it: it slides."""
+        return NEVER if self.body.resting else 0
+
+    def act(self, now_us: int, /) -> None:
+        """Go on, and load the shafts."""
+        self.body.step({name: shaft.angle_rad for name, shaft in self._shafts.items()})
+        self._load()
+
+    def touch(self, name: str) -> Touch | None:
+        """Return the thing of this name, None if there is none."""
+        return self.physical.get(name)
+
+    def touchable(self) -> list[str]:
+        """Return all names."""
+        return list(self.physical)
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        match name:
+            case "speed_m_s":
+                return self.body.speed_m_s
+            case "turn_deg_s":
+                return degrees(self.body.turn_rad_s)
+            case "slipping":
+                return int(self.body.slipping)
+        return self.physical[name].read()
+
+    def _load(self) -> None:
+        for name, contact in self.body.contacts.items():
+            self._shafts[name].load(contact.load_nm, contact.load_kg_m2)
+
+
+class _Shaft:
+    """The shaft of a drive, seen from its wheel."""
+
+    def __init__(self, wheel: Wheel) -> None:
+        node, self._forward = wheel.node, wheel.forward
+        self._application, self._bank = node.application, node.application.inputs
+        names = [row for row in SHAFTS if row[0] in node.outputs]
+        if not names:
+            raise ValueError(f"{wheel.name}: node {node.name} has no shaft")
+        self._angle, self._torque, self._inertia = names[0]
+
+    @property
+    def angle_rad(self) -> float:
+        """The angle, positive forward."""
+        return self._forward * radians(float(self._application.read(self._angle)))
+
+    def load(self, torque_nm: float, inertia_kg_m2: float) -> None:
+        """Let it feel a torque, positive forward, and an inertia."""
+        _set(self._bank, self._torque, self._forward * torque_nm)
+        _set(self._bank, self._inertia, inertia_kg_m2)
+
+
+def _set(bank: QuantityBank, name: str, value: float) -> None:
+    """Set an input as far as it goes; an ideal motor has none and feels nothing."""
+    item = bank.table.get(name)
+    if item is not None and bank[name] != (value := min(max(value, item.low), item.high)):
+        bank.set(name, value)

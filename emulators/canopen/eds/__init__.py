@@ -1,0 +1,1 @@
+"""Dictionaries out of EDS and DCF files."""

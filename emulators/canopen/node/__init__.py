@@ -1,0 +1,1 @@
+"""One emulated CANopen node, and several under one roof."""

@@ -1,0 +1,188 @@
+"""One emulated CANopen node: a slave with power, a plug and a hand inside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.physical import Output
+from tickrig.emulators.can.end import Accepted
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
+from tickrig.emulators.canopen.node.touch import ObjectTouch, Touch, find_object, object_name
+from tickrig.host.cli.setting import Setting
+from tickrig.wire.can import Frames
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.canopen.nmt import NmtState
+
+STATE_NAMES: Final = {
+    NmtState.INITIALISING: "Initialising",
+    NmtState.STOPPED: "Stopped",
+    NmtState.OPERATIONAL: "Operational",
+    NmtState.PRE_OPERATIONAL: "Pre-operational",
+}
+ERROR_STATE_NAMES: Final = {
+    ErrorState.ACTIVE: "error-active",
+    ErrorState.PASSIVE: "error-passive",
+    ErrorState.BUS_OFF: "bus-off",
+}
+OFF: Final = "Off"
+
+NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
+"""Every node has these beside those of its device."""
+
+NODE_OUTPUTS: Final = (
+    Output("state", "NMT state, or Off"),
+    Output("node_id", "active node-ID, 255 while it has none"),
+    Output("can_state", "fault confinement of its CAN controller"),
+)
+
+
+class Node(NonCopyable):
+    """A `Device[Frames]` around a slave, with the physical side of its application.
+
+    Without power it neither sends nor hears, and begins anew when power is back.
+    What is done to it from the inside, and what its CAN controller reports,
+    takes effect at the beginning of its next tick. A controller that is bus-off is
+    told to recover at once, as most drivers do.
+
+    Not emulated: LSS switches the bit rate of the node alone; the bus keeps its own.
+
+    Args:
+        name: prefix of the names of its things among those of other nodes.
+        slave: the slave.
+        wire: its bus.
+
+    Attributes:
+        application: what the device does with its objects.
+        port: its end of the bus.
+        physical: what the world does to it, by name.
+        groups: names of several of these that are set together.
+        outputs: what the world sees of it, by name.
+    """
+
+    def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
+        self.name, self.slave, self.application = name, slave, Application.of(slave)
+        self.port = wire.end()
+        self.port.on_error_state = self._error_state_changed
+        self._wire, self._on, self._ticked = wire, True, False
+        self._coasts_us = NEVER
+        self._pending: list[Callable[[], None]] = []
+        bank = self.application.inputs
+        self.physical: Mapping[str, Touch] = {
+            "power_off": Switch("power_off", "its supply is cut", self._switch),
+            "unplugged": Switch("unplugged", "its CAN plug is pulled", self._plug),
+            "emergency": Emergency(slave, self._defer),
+            **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
+        }
+        self.groups = bank.groups
+        self.outputs: Mapping[str, Output] = {
+            **{item.name: item for item in NODE_OUTPUTS},
+            **self.application.outputs,
+        }
+
+    @property
+    def tick_us(self) -> int:
+        """The control period."""
+        return self.slave.tick_us
+
+    @property
+    def due_us(self) -> int:
+        """When the slave is due."""
+        if self._pending:
+            return 0
+        return self.slave.due_us if self._on else self._coasts_us
+
+    @property
+    def accepts(self) -> Accepted:
+        """CAN-IDs that it listens to."""
+        return self.slave.accepts
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts` when handled."""
+        return self.slave.reconfigured_by
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when these two have changed."""
+        return self.slave.on_accepts
+
+    def reset(self) -> None:
+        """Power-on reset."""
+        self.slave.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Tick the slave, if it has power."""
+        if not self._on:
+            self._pending.clear()
+            if now_us >= self._coasts_us:
+                self._coasts_us = self.application.without_power(now_us)
+            return ()
+        if self._ticked:
+            self._catch_up(now_us)
+        self._ticked = True
+        return self.slave.tick(now_us, rx)
+
+    def touch(self, name: str) -> Touch | None:
+        """Return the thing of this name, None if there is none."""
+        if (physical := self.physical.get(name)) is not None:
+            return physical
+        entry = find_object(self.slave.dictionary, name)
+        if entry is None:
+            return None
+        return ObjectTouch(object_name(self.slave.dictionary, entry), entry, self._defer)
+
+    def touchable(self) -> list[str]:
+        """Return all names."""
+        dictionary = self.slave.dictionary
+        return [*self.physical, *(object_name(dictionary, entry) for entry in dictionary)]
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        match name:
+            case "state":
+                return STATE_NAMES[self.slave.state] if self._on and self._ticked else OFF
+            case "node_id":
+                return self.slave.node_id
+            case "can_state":
+                return ERROR_STATE_NAMES[self.port.controller.state]
+        return self.application.read(name)
+
+    def _defer(self, action: Callable[[], None]) -> None:
+        """Act at the beginning of the next tick: what is heard in it may then be another."""
+        self._pending.append(action)
+        self.port.pass_all()
+
+    def _catch_up(self, now_us: int) -> None:
+        """Let what was done since the last tick take effect."""
+        self.slave.now_us = now_us
+        while self._pending:
+            self._pending.pop(0)()
+
+    def _switch(self, off: int) -> None:
+        if off:
+            self._wire.cut_power(self.port)
+        elif not self._on:
+            self.slave.reset()
+        self._on, self._ticked = not off, self._ticked and not off
+        self._coast()
+        self._plug(self.physical["unplugged"].read())
+
+    def _coast(self) -> None:
+        """Let the application go on, if it is without power."""
+        self._coasts_us = 0
+
+    def _plug(self, pulled: Setting) -> None:
+        if pulled:
+            self._wire.disconnect(self.port)
+        elif self._on:
+            self._wire.reconnect(self.port)
+
+    def _error_state_changed(self, now_us: int, state: ErrorState) -> None:
+        self._defer(lambda: self.slave.bus_state(state))
+        if state is ErrorState.BUS_OFF:
+            self.port.recover(now_us)

@@ -1,0 +1,1 @@
+"""The command `tickrig` and what the command lines of all emulators share."""

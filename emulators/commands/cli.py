@@ -1,0 +1,40 @@
+"""The command `tickrig`."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import click
+
+from tickrig.host.cli.lazy_group import LazyGroup
+from tickrig.host.cli.version import version_option
+
+HERE: Final = "tickrig.emulators.commands"
+COMMANDS: Final = {
+    "ctl": (f"{HERE}.ctl_cli:ctl", "Touch and watch the emulator whose control socket is SOCKET."),
+    "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
+    "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
+    "rtc": (
+        "tickrig.emulators.rtc.cli:rtc",
+        "Run RT components, and work with them while they run.",
+    ),
+}
+
+
+@click.group(cls=LazyGroup, commands=COMMANDS)
+@version_option()
+def main() -> None:
+    """Work with emulated devices.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
+    tickrig replay run.trace                      replay a recorded run
+    tickrig demo rrc                              see a device and a host at work
+    tickrig rtc run system.toml                   run RT components
+
+    \b
+    Completion of commands and options in the shell:
+    eval "$(_TICKRIG_COMPLETE=bash_source tickrig)"      in ~/.bashrc
+    eval "$(_TICKRIG_COMPLETE=zsh_source tickrig)"       in ~/.zshrc
+    _TICKRIG_COMPLETE=fish_source tickrig | source       in fish's configuration
+    """  # noqa: D301 - click wants the backspace

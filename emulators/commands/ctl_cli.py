@@ -1,0 +1,158 @@
+"""The command `tickrig ctl`: touch and watch a running emulator."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from tickrig.emulators.commands.ctl_completion import buttons, complete, faults, seen, settable
+from tickrig.emulators.control.ask import ask
+from tickrig.emulators.control.requests import Object
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.duration_option import time_us
+from tickrig.host.cli.setting import parse_setting
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+
+
+@click.group()
+@click.argument("socket", type=click.Path())
+@click.pass_context
+def ctl(context: click.Context, /, socket: str) -> None:
+    """Touch and watch the emulator whose control socket is SOCKET.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl describe
+    tickrig ctl /tmp/rrc.ctl press power_button
+    tickrig ctl /tmp/rrc.ctl set stick 100 -20
+    tickrig ctl /tmp/rrc.ctl fault flip=0.001
+    tickrig ctl /tmp/rrc.ctl get state out_v_pct
+    """  # noqa: D301 - click wants the backspace
+    context.obj = socket
+
+
+@ctl.command()
+@as_json
+@click.pass_obj
+def describe(socket: str, as_json: bool) -> None:
+    """List inputs, groups, outputs and faults."""
+    _show(ask(socket, "describe"), _describe, as_json)
+
+
+@ctl.command()
+@click.argument("names", nargs=-1, shell_complete=complete(seen))
+@as_json
+@click.pass_obj
+def get(socket: str, names: tuple[str, ...], as_json: bool) -> None:
+    """Show inputs and outputs by NAME, all if none is named."""
+    fields = {"names": list(names)} if names else {}
+    _show(ask(socket, "get", **fields), _values, as_json)
+
+
+@ctl.command("set", context_settings={"ignore_unknown_options": True})
+@click.argument("name", shell_complete=complete(settable))
+@click.argument("values", nargs=-1, required=True)
+@as_json
+@click.pass_obj
+def set_(socket: str, name: str, values: tuple[str, ...], as_json: bool) -> None:
+    """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
+    _show(
+        ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
+        _nothing,
+        as_json,
+    )
+
+
+@ctl.command()
+@click.argument("name", shell_complete=complete(buttons))
+@click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
+@as_json
+@click.pass_obj
+def press(socket: str, name: str, duration: str, as_json: bool) -> None:
+    """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
+    duration_us = time_us("--for", duration)
+    _show(ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
+
+
+@ctl.command()
+@click.argument("spec", shell_complete=complete(faults))
+@as_json
+@click.pass_obj
+def fault(socket: str, spec: str, as_json: bool) -> None:
+    """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
+    _show(ask(socket, "fault", spec=spec), _nothing, as_json)
+
+
+@ctl.command()
+@click.argument("name", shell_complete=complete(faults))
+@as_json
+@click.pass_obj
+def clear(socket: str, name: str, as_json: bool) -> None:
+    """Let the fault NAME go."""
+    _show(ask(socket, "clear", name=name), _nothing, as_json)
+
+
+@ctl.command()
+@click.option("--since", type=int, default=0, help="Only those after the line of this number.")
+@as_json
+@click.pass_obj
+def lines(socket: str, since: int, as_json: bool) -> None:
+    """Show the latest lines on the wire, at most 100."""
+    _show(ask(socket, "lines", since=since), _lines, as_json)
+
+
+@ctl.command()
+@as_json
+@click.pass_obj
+def status(socket: str, as_json: bool) -> None:
+    """Show how the run is going: time, late ticks, lost bytes, faults."""
+    _show(ask(socket, "status"), _status, as_json)
+
+
+@ctl.command()
+@as_json
+@click.pass_obj
+def stop(socket: str, as_json: bool) -> None:
+    """End the emulator."""
+    _show(ask(socket, "stop"), _nothing, as_json)
+
+
+def _show(answer: Object, words: Callable[[Any], list[str]], as_json: bool) -> None:
+    for line in [json.dumps(answer)] if as_json else words(answer):
+        click.echo(line)
+
+
+def _nothing(answer: Object) -> list[str]:
+    return []
+
+
+def _values(answer: Any) -> list[str]:
+    return [f"{name} {value}" for name, value in answer["values"].items()]
+
+
+def _lines(answer: Any) -> list[str]:
+    return [f"{format_time(x['at_us'])} {x['mark']} {x['text']}" for x in answer["lines"]]
+
+
+def _status(answer: Any) -> list[str]:
+    fields = {name: value for name, value in answer.items() if name not in ("v", "ok")}
+    return [f"{name} {value}".rstrip() for name, value in fields.items()]
+
+
+def _describe(answer: Any) -> list[str]:
+    out = [f"{answer['device']}, a tick each {answer['tick_us'] / 1_000:g} ms", "", "inputs"]
+    for x in answer["inputs"]:
+        limits = "" if x["kind"] == "text" else f"{x['low']}..{x['high']}"
+        limits = f"{limits} {x['unit']}".strip()
+        out.append(f"  {x['name']:<20} {x['kind']:<7} {limits:<12} {x['text']}")
+    out += ["", "groups"]
+    out += [f"  {name:<20} {' '.join(members)}" for name, members in answer["groups"].items()]
+    out += ["", "outputs"]
+    out += [f"  {x['name']:<20} {x['unit']:<7} {x['text']}" for x in answer["outputs"]]
+    out += ["", "faults of the wire"]
+    for x in answer["wire_faults"]:
+        out.append(f"  {x['name'] + ('=RATE' if x['rated'] else ''):<20} {x['text']}")
+    return out

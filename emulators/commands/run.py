@@ -1,0 +1,163 @@
+"""Run emulated devices as a command line asks: in real time, or a scenario."""
+
+from __future__ import annotations
+
+import sys
+from abc import ABC, abstractmethod
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.control.server import ControlServer
+from tickrig.emulators.control.serving_clock import ServingClock
+from tickrig.emulators.control.signals import stopped_by_signals
+from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.scenario.player import Player
+from tickrig.emulators.scenario.scenario import Line, ScenarioParser
+from tickrig.host.cli.refused import Refused, refuse_path, refused_at
+from tickrig.host.cli.telling import warnings_told
+
+RECORDING_ENDED: Final = 3
+"""Exit status where the recording is not whole."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """What the command lines of all emulators share (`run_options`)."""
+
+    control: Path | None = None
+    scenario: Path | None = None
+    faults: tuple[str, ...] = ()
+    seed: int = 0
+    trace: Path | None = None
+    verbose: int = 0
+
+
+class EmulatorRun(ABC):
+    """One run.
+
+    Args:
+        options: the command line.
+        in_real_time: not a scenario alone, which runs in virtual time.
+    """
+
+    def __init__(self, options: RunOptions, *, in_real_time: bool) -> None:
+        self._shared, self._in_real_time = options, in_real_time
+        self._clock = ServingClock()
+        self._running: Workbench | None = None
+        self._stopped = False
+
+    def run(self) -> int:
+        """Run, and return the exit status.
+
+        Raises:
+            Refused: the command line asks for something that cannot be done.
+        """
+        faults, scenario = self._checked()
+        with ExitStack() as stack:
+            if self._tells_warnings:
+                stack.enter_context(warnings_told())
+            if self._in_real_time:
+                stack.enter_context(stopped_by_signals(self._stop))
+            bench = self._running = self._open(stack)
+            stack.callback(bench.close)
+            self._serve_control(stack, bench)
+            if self._in_real_time:
+                self._greet(bench)
+                sys.stdout.flush()
+            player = self._attend(bench, scenario)
+            for spec in faults:
+                bench.operator.fault(0, spec)
+            self._go_on(bench)
+            if player:
+                player.finish(bench.rig.now_us)
+        return self._sum_up(bench, player)
+
+    @property
+    def _tells_warnings(self) -> bool:
+        """Whether warnings go to standard error."""
+        return True
+
+    @abstractmethod
+    def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
+        """Build what options and scenario are checked against; nothing is opened."""
+
+    @abstractmethod
+    def _open(self, stack: ExitStack) -> Workbench:
+        """Open the outside world; each thing is given back at the end."""
+
+    @abstractmethod
+    def _greet(self, bench: Workbench) -> None:
+        """Say where it is and how to talk to it."""
+
+    @abstractmethod
+    def _attend(self, bench: Workbench, scenario: tuple[Line, ...]) -> Player | None:
+        """Have the run written down as far as that is wanted."""
+
+    def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
+        """Read all that can be wrong before anything is opened."""
+        bench, parser = self._rehearsal()
+        with refused_at("--fault"):
+            faults = [parse_fault_spec(text) for text in self._shared.faults]
+            for spec in faults:
+                bench.operator.check_fault(spec)
+        try:
+            return faults, parser.parse(*_read(self._shared.scenario))
+        except ValueError as error:
+            raise Refused(str(error)) from None
+
+    def _serve_control(self, stack: ExitStack, bench: Workbench) -> None:
+        if path := self._shared.control:
+            try:
+                server = ControlServer(path, Control(bench))
+            except OSError as error:
+                refuse_path("control", error)
+            stack.callback(server.close)
+            self._clock.serve = server.serve
+
+    def _go_on(self, bench: Workbench) -> None:
+        """Step until somebody stops it."""
+        while bench.running and not self._stopped:
+            bench.step()
+
+    def _stop(self) -> None:
+        self._stopped = True
+        if self._running:
+            self._running.stop()
+
+    def _sum_up(self, bench: Workbench, player: Player | None) -> int:
+        """Say how it went; 3 if it was not recorded to the end, 1 if an expectation was missed."""
+        rig = bench.rig
+        worst = f" (up to {rig.late_us / 1_000:.1f} ms)" if rig.late_steps else ""
+        late = f"; late ticks: {rig.late_steps}{worst}" if self._in_real_time else ""
+        lost = "".join(f"; {what.replace('lost_', '')} lost: {n}" for what, n in bench.lost.items())
+        say(f"ran {rig.now_us / 1e6:.3f} s{late}{lost}")
+        if player and player.met + player.missed:
+            say(f"expectations met: {player.met}; missed: {player.missed}")
+        if bench.trace_error:
+            say(f"the recording ended early: {bench.trace_error}")
+            return RECORDING_ENDED
+        return 1 if player and player.missed else 0
+
+
+def say(text: str) -> None:
+    """Tell people; standard output is for programs."""
+    click.echo(text, err=True)
+
+
+def _read(scenario: Path | None) -> tuple[str, str]:
+    """Return the text of a scenario and what it is called."""
+    if scenario is None:
+        return "", ""
+    try:
+        text = sys.stdin.read() if str(scenario) == "-" else scenario.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise Refused(f"scenario {scenario}: byte {error.start} is not UTF-8") from None
+    except OSError as error:
+        refuse_path("scenario", error)
+    return text, str(scenario)

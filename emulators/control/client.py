@@ -1,0 +1,84 @@
+"""The other side of a control socket: ask a running emulator, wait for its answer."""
+
+from __future__ import annotations
+
+import json
+import socket
+from typing import TYPE_CHECKING, Final, Self
+
+from tickrig.emulators.control.requests import VERSION, Object
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import TracebackType
+
+TIMEOUT_S: Final = 5.0
+
+
+class ControlRefused(ValueError):  # noqa: N818 - what the emulator did
+    """The emulator said no; the text says why."""
+
+
+class ControlClient:
+    """A connection to a control socket.
+
+    Args:
+        path: where the socket is.
+        timeout_s: how long to wait for an answer.
+
+    Raises:
+        OSError: nobody listens there, or nobody answers.
+    """
+
+    def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        self._socket.settimeout(timeout_s)
+        self._received = b""
+        try:
+            self._socket.connect(str(path))
+        except OSError:
+            self._socket.close()
+            raise
+
+    def ask(self, do: str, **fields: object) -> Object:
+        """Make a request and return its answer.
+
+        Raises:
+            ControlRefused: the emulator refused it.
+            OSError: the emulator does not answer, or hung up.
+            ValueError: the answer is none.
+        """
+        request = json.dumps({"v": VERSION, "do": do, **fields})
+        self._socket.sendall(request.encode() + b"\n")
+        answer = json.loads(self._receive_line())
+        if not isinstance(answer, dict):
+            raise ValueError("the answer is not a JSON object")
+        if not answer.get("ok"):
+            raise ControlRefused(str(answer.get("error")))
+        return answer
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        """Return the client."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Hang up."""
+        self.close()
+
+    def _receive_line(self) -> bytes:
+        while b"\n" not in self._received:
+            data = self._socket.recv(65_536)
+            if not data:
+                raise ConnectionResetError("the emulator hung up")
+            self._received += data
+        line, _, self._received = self._received.partition(b"\n")
+        return line

@@ -1,0 +1,136 @@
+r"""The text form of a recorded run.
+
+    # tickrig-trace v1 rrc {"power_on_event": "PowerOn", "seed": 0}
+    0.010000 < EV:Initialized\n
+    0.400000 ! power_button=1
+    0.710000 > output1e00\n
+    0.710000 < OK:output\n
+    2.000000 .
+
+Time is the device's tick in seconds; `>` went to the device, `<` came from it,
+`!` is a physical input that changed before the tick; `.` is how long the run
+lasted, and the last line. Bytes are written by `byte_text.escape`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+from tickrig.emulators.record.byte_text import escape, unescape
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.setting import Setting, parse_setting
+
+VERSION: Final = 1
+RESET: Final = "reset"
+
+Config = Mapping[str, str | int | float | None]
+"""Configuration of a device, as the header of its trace carries it."""
+
+_HEADER: Final = re.compile(r"# tickrig-trace v([0-9]+) ([\w-]+) (\{.*\})")
+_LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
+_INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2})?)", re.ASCII)
+
+
+class TraceError(ValueError):
+    """A file that is no trace of this version."""
+
+
+class Mark(StrEnum):
+    """What a line tells."""
+
+    TO_DEVICE = ">"
+    FROM_DEVICE = "<"
+    PHYSICAL = "!"
+    END = "."
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What a replay needs to build the device again."""
+
+    device: str
+    config: Config = field(default_factory=dict)
+
+    def encode(self) -> str:
+        """Write the first line, without LF."""
+        return f"# tickrig-trace v{VERSION} {self.device} {json.dumps(dict(self.config))}"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One line of a trace.
+
+    Attributes:
+        at_us: the tick.
+        mark: what the line tells.
+        data: traffic, for `>` and `<`.
+        text: for `!`: `NAME=VALUE`, or `reset`.
+        line: number of the line in its file, from 1.
+    """
+
+    at_us: int
+    mark: Mark
+    data: bytes = b""
+    text: str = ""
+    line: int = 0
+
+    def encode(self) -> str:
+        """Write the line, without LF."""
+        rest = self.text if self.mark is Mark.PHYSICAL else escape(self.data)
+        return f"{format_time(self.at_us)} {self.mark} {rest}".rstrip()
+
+    @property
+    def change(self) -> tuple[str, Setting]:
+        """Which input changed to what, for `!`."""
+        name, _, value = self.text.partition("=")
+        return name, parse_setting(value)
+
+
+def parse_header(line: str) -> Header:
+    """Read the first line; TraceError if it is none of ours."""
+    match = _HEADER.fullmatch(line)
+    if match is None:
+        raise TraceError(
+            f"line 1 is not '# tickrig-trace v{VERSION} DEVICE {{CONFIG}}': {line!r:.60}"
+        )
+    if int(match[1]) != VERSION:
+        raise TraceError(f"this is trace version {match[1]}; this program reads version {VERSION}")
+    try:
+        return Header(match[2], json.loads(match[3]))
+    except ValueError as error:
+        raise TraceError(f"line 1: the configuration is not JSON: {error}") from None
+
+
+def parse_record(line: str, number: int) -> Record:
+    """Read a line of the body; TraceError if it is none of ours."""
+    match = _LINE.fullmatch(line)
+    if match is None:
+        raise TraceError(f"line {number} is not 'SECONDS MARK TEXT': {line!r:.60}")
+    at_us = int(match[1]) * 1_000_000 + int(match[2])
+    mark, rest = Mark(match[3]), match[4] or ""
+    if mark is Mark.END:
+        return Record(at_us, mark, line=number)
+    if mark is Mark.PHYSICAL:
+        if rest != RESET and not _INPUT.fullmatch(rest):
+            raise TraceError(f"line {number}: {rest!r:.60} is not NAME=VALUE")
+        return Record(at_us, mark, text=rest, line=number)
+    try:
+        return Record(at_us, mark, unescape(rest), line=number)
+    except ValueError as error:
+        raise TraceError(f"line {number}: {error}") from None
+
+
+def parse_records(lines: Iterable[str]) -> Iterator[Record]:
+    """Read the body line by line; time must not run backwards, and nothing follows the end."""
+    before = Record(0, Mark.PHYSICAL)
+    for number, line in enumerate(lines, 2):
+        record = parse_record(line, number)
+        if record.at_us < before.at_us or before.mark is Mark.END:
+            raise TraceError(f"line {number} is earlier than the line above it, or behind the end")
+        yield record
+        before = record

@@ -1,0 +1,69 @@
+"""What happens in a run, line by line, for people and golden files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.emulators.bench.emulated import look_at
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.record.byte_text import escape
+from tickrig.emulators.record.trace import Mark
+from tickrig.host.cli.duration import format_time
+from tickrig.host.cli.setting import Setting
+
+STATE: Final = "state"
+"""The output that is watched unasked, where a device has one."""
+
+
+class Transcript:
+    """Writes down lines of the wire as the host sees them, touches, and watched outputs.
+
+    Args:
+        emulator: what is watched.
+        write: takes the lines.
+        wanted: which lines of the wire are worth it.
+    """
+
+    def __init__(
+        self,
+        emulator: Workbench,
+        write: Callable[[str], None],
+        wanted: Callable[[WireLine], bool] = lambda line: True,
+    ) -> None:
+        self._emulator, self._write, self._wanted = emulator, write, wanted
+        self._shown: dict[str, Setting] = {}
+        self._sending = False
+        emulator.operator.note = lambda text: self.tell(emulator.touch_us, "!", text)
+        emulator.log.listeners.append(self._hear)
+        emulator.after_step.append(self._look)
+        if STATE in emulator.device.outputs:
+            self.watch(emulator.touch_us, STATE)
+
+    def tell(self, now_us: int, mark: str, text: str) -> None:
+        """Write a line."""
+        self._write(f"{format_time(now_us)} {mark} {text}".rstrip())
+
+    def watch(self, now_us: int, *names: str) -> None:
+        """Show outputs now and whenever they change."""
+        for name in names:
+            self._shown.setdefault(name, "")
+        self._look(now_us)
+
+    def send(self, now_us: int, data: bytes, shown: bytes) -> None:
+        """Send as the host, and show it at once, line or not."""
+        self.tell(now_us, Mark.TO_DEVICE, escape(shown))
+        self._sending = True
+        self._emulator.send(now_us, data)
+        self._sending = False
+
+    def _look(self, now_us: int) -> None:
+        for name, shown in self._shown.items():
+            if (value := look_at(self._emulator.device, name)) != shown:
+                self._shown[name] = value
+                self.tell(now_us, "*", f"{name} {value}")
+
+    def _hear(self, line: WireLine) -> None:
+        if not self._sending and self._wanted(line):
+            self.tell(line.at_us, line.mark, escape(line.data))

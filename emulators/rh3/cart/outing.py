@@ -1,0 +1,151 @@
+"""What the verbs of `rh3` share: a cart as the options say, and how a run of it ends."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import get_terminal_size
+from typing import Final
+
+import click
+
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.emulators.commands.picture import check_plot
+from tickrig.emulators.control.signals import stopped_by_signals
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.cart.live_map import LiveMap
+from tickrig.emulators.rh3.cart.rides import PacedRide, SerialRide
+from tickrig.emulators.rh3.cart.track_map import WIDTH, TrackMap
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.motion.dead_reckoning import Wheels
+from tickrig.host.motion.drive import Ride, start, stop
+from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.journey import Journey, Sample
+from tickrig.host.rtc.errors import RtcRefused
+
+INTERRUPTED: Final = 130
+"""Exit status after Ctrl-C."""
+
+
+class Ended(Exception):  # noqa: N818 - no error
+    """Somebody ended the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outing:
+    """The options that all verbs have.
+
+    Attributes:
+        set_id: configuration set.
+        device: a serial port, None for an emulated base in virtual time.
+        baud: its bit rate.
+        pace: how many times as fast as the machine's virtual time passes, None as it goes.
+        conf: Odometry.conf.
+        show_map: draw the track while it runs.
+        base: what the emulated base is like.
+        plot: file for a picture.
+    """
+
+    set_id: str
+    device: str | None
+    baud: int
+    pace: float | None
+    conf: Path | None
+    show_map: bool
+    base: BaseParameters
+    plot: Path | None = None
+
+    def check(self) -> None:
+        """Refuse what could not be done later."""
+        if self.plot is not None:
+            check_plot(self.plot)
+
+    def begin(self, wheels: Wheels | None = None) -> Ride:
+        """Return a cart at the origin with its components active."""
+        ride = self._ride()
+        try:
+            if self.conf is not None:
+                ride.chain.odometry.load(self.conf)
+            if wheels is not None:
+                ride.chain.odometry.calibrate(wheels)
+        except RtcRefused as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            refuse_path("odometry-conf", error)
+        start(ride, self.set_id)
+        if ride.chain.in_error:
+            raise Refused(ride.chain.ref_hard.trouble)
+        return ride
+
+    def _ride(self) -> Ride:
+        if self.device is not None:
+            return SerialRide(self.device, self.baud)
+        loop = ClosedLoop(self.base)
+        return loop if self.pace is None else PacedRide(loop, self.pace)
+
+
+class Watcher:
+    """Draws samples if they are to be drawn, and raises `Ended` when a signal has come."""
+
+    def __init__(self, outing: Outing, points: Sequence[Pose]) -> None:
+        self._ended = self._asking = False
+        width = min(WIDTH, get_terminal_size().columns - 1)
+        self._map = LiveMap(TrackMap(points, width), sys.stdout) if outing.show_map else None
+
+    def end(self) -> None:
+        """Let the next sample be the last; a question is left at once."""
+        self._ended = True
+        if self._asking:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Ask somebody something: no samples come; `Ended` if that was the answer."""
+        self._asking = True
+        try:
+            yield
+        except (click.Abort, KeyboardInterrupt):
+            raise Ended from None
+        finally:
+            self._asking = False
+        if self._ended:  # click.pause passes Ctrl-C over
+            raise Ended
+
+    def watch(self, sample: Sample) -> None:
+        """Take a sample."""
+        if self._map is not None:
+            self._map.watch(sample)
+        if self._ended:
+            raise Ended
+
+
+@contextmanager
+def watched(outing: Outing, points: Sequence[Pose]) -> Iterator[Watcher]:
+    """Watch a run; Ctrl-C ends it with exit status 130."""
+    watcher = Watcher(outing, points)
+    with stopped_by_signals(watcher.end):
+        try:
+            yield watcher
+        except Ended:
+            click.echo("stopped", err=True)
+            raise SystemExit(INTERRUPTED) from None
+
+
+@contextmanager
+def stopped_at_the_end(ride: Ride) -> Iterator[Ride]:
+    """Stop the base whatever happens."""
+    try:
+        yield ride
+    finally:
+        stop(ride)
+
+
+def demand_arrival(ride: Ride, journey: Journey) -> None:
+    """End with a line and exit status 1 if the goal was not reached."""
+    if ride.chain.in_error:
+        raise click.ClickException(ride.chain.ref_hard.trouble)
+    if journey.reached_s is None:
+        raise click.ClickException(f"not there after {journey.duration_s:.1f} s")

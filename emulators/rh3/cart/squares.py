@@ -1,0 +1,119 @@
+"""`rh3 square`: UMBmark before and after a calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import click
+
+from tickrig.emulators.rh3.cart.outing import Outing, Watcher, watched
+from tickrig.host.cli.options import NumberRange
+from tickrig.host.cli.refused import refuse_path
+from tickrig.host.motion.dead_reckoning import Wheels
+from tickrig.host.motion.drive import Ride, stop
+from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
+
+
+class Size(NamedTuple):
+    """How many squares each way, and how large."""
+
+    runs: int
+    side_m: float
+
+    @property
+    def corners(self) -> list[Pose]:
+        """All corners of both ways."""
+        there, back = (square(clockwise=way, side_m=self.side_m) for way in (True, False))
+        return [*there, *back]
+
+
+class Squares:
+    """Squares of one outing, each with a cart at the origin.
+
+    Args:
+        outing: the options.
+        size: how many, and how large.
+        watcher: told each sample.
+
+    Attributes:
+        latest: the ride of the latest square.
+    """
+
+    def __init__(self, outing: Outing, size: Size, watcher: Watcher) -> None:
+        self._outing, self._size, self._watcher = outing, size, watcher
+        self.latest: Ride | None = None
+
+    def run(self, wheels: Wheels | None = None) -> Umbmark:
+        """Drive squares; with other radii and axle if they are given."""
+        try:
+            return run_umbmark(
+                lambda number: self._begin(wheels),
+                self._true_pose,
+                self._size.runs,
+                self._size.side_m,
+                self._watcher.watch,
+            )
+        except TimeoutError as error:
+            trouble = self.latest.chain.ref_hard.trouble if self.latest else ""
+            raise click.ClickException(trouble or str(error)) from None
+
+    def stop(self) -> None:
+        """Stop the cart."""
+        if self.latest is not None:
+            stop(self.latest)
+
+    def _begin(self, wheels: Wheels | None) -> Ride:
+        self.stop()
+        if self._outing.device is not None:
+            with self._watcher.asking():
+                click.pause("Put the cart at its start, and press a key.")
+        self.latest = self._outing.begin(wheels)
+        return self.latest
+
+    def _true_pose(self, ride: Ride) -> Pose:
+        if self._outing.device is None:
+            return ride.pose
+        with self._watcher.asking():
+            x_mm, y_mm = (
+                click.prompt(f"Measured {axis} of the cart from its start, mm", type=NumberRange())
+                for axis in ("x", "y")
+            )
+        return Pose(x_mm / 1e3, y_mm / 1e3)
+
+
+def play_squares(outing: Outing, size: Size, save: Path | None) -> None:
+    """Drive, calibrate, drive again, and tell."""
+    with watched(outing, size.corners) as watcher:
+        squares = Squares(outing, size, watcher)
+        try:
+            before = squares.run()
+            assert squares.latest is not None
+            corrected = before.corrected(squares.latest.chain.odometry.wheels, size.side_m)
+            after = squares.run(corrected)
+        finally:
+            squares.stop()
+    click.echo("              before   after")
+    _tell("E_max,syst", before.most_m, after.most_m)
+    _tell("return, most", max(before.returns_m), max(after.returns_m))
+    text = _conf(corrected)
+    click.echo(text, nl=False)
+    if save is not None:
+        try:
+            save.write_text(text, "utf-8")
+        except OSError as error:
+            refuse_path("save", error)
+
+
+def _tell(what: str, before_m: float, after_m: float) -> None:
+    click.echo(f"{what:<12} {before_m * 1e3:7.1f} {after_m * 1e3:7.1f} mm")
+
+
+def _conf(wheels: Wheels) -> str:
+    """Return an Odometry.conf."""
+    return (
+        f"conf.default.radiusOfLeftWheel: {wheels.left:.7f}\n"
+        f"conf.default.radiusOfRightWheel: {wheels.right:.7f}\n"
+        f"conf.default.lengthOfAxle: {wheels.axle:.7f}\n"
+    )

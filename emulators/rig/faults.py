@@ -1,0 +1,94 @@
+"""Faults of a wire: what happens to traffic on its way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Generic
+
+from tickrig.device.chance import Chance, check_rate, threshold_of
+from tickrig.device.core import W
+from tickrig.emulators.rig.port import Port
+
+Fault = Callable[[int, W], W]
+"""What a fault makes of the traffic that passes at a time in microseconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultKind(Generic[W]):
+    """A fault that can be armed by name.
+
+    Attributes:
+        text: what it does, for people.
+        make: builds the fault from its chance and the threshold of its rate.
+        rated: whether it wants a rate.
+    """
+
+    text: str
+    make: Callable[[Chance, int], Fault[W]]
+    rated: bool = True
+
+
+class FaultyPort(Generic[W]):
+    """A port whose traffic suffers the faults that are armed, in the order of arming.
+
+    Each direction has a chance of its own, drawn only for traffic that is
+    there: what happens one way, and ticks without traffic, change nothing.
+
+    Args:
+        port: the port behind it.
+        kinds: the faults that can be armed, by name.
+        seed: seed of all chance in it.
+    """
+
+    def __init__(self, port: Port[W], kinds: Mapping[str, FaultKind[W]], seed: int = 0) -> None:
+        self._port, self._seed = port, seed
+        self.kinds = kinds
+        self._to_device: dict[str, Fault[W]] = {}
+        self._from_device: dict[str, Fault[W]] = {}
+
+    @property
+    def armed(self) -> tuple[str, ...]:
+        """Names of the faults that are armed."""
+        return tuple(self._to_device)
+
+    def check(self, name: str, rate: float | None) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+        check_rate(name, rate, rated=self.kinds[name].rated)
+
+    def arm(self, name: str, rate: float | None = None) -> None:
+        """Let a fault begin; one of the same name is replaced.
+
+        Raises:
+            KeyError: no fault has this name.
+            ValueError: a rate is missing, out of range or too much.
+        """
+        self.check(name, rate)
+        threshold, make = threshold_of(rate or 0), self.kinds[name].make
+        self._to_device[name] = make(Chance(self._seed, f"{name} >"), threshold)
+        self._from_device[name] = make(Chance(self._seed, f"{name} <"), threshold)
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; clearing one that is not armed is no error."""
+        self._to_device.pop(name, None)
+        self._from_device.pop(name, None)
+
+    @property
+    def due_us(self) -> int:
+        """When the next traffic reaches the port behind."""
+        return self._port.due_us
+
+    def poll(self, now_us: int, /) -> W:
+        """Take what has arrived and survived."""
+        return _suffer(self._to_device, now_us, self._port.poll(now_us))
+
+    def send(self, now_us: int, traffic: W, /) -> None:
+        """Send what the faults leave of one tick's traffic."""
+        self._port.send(now_us, _suffer(self._from_device, now_us, traffic))
+
+
+def _suffer(faults: Mapping[str, Fault[W]], now_us: int, traffic: W) -> W:
+    for fault in faults.values():
+        if traffic:
+            traffic = fault(now_us, traffic)
+    return traffic

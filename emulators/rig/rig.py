@@ -1,0 +1,303 @@
+"""A rig: devices on wires, stepped together by one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Generic, Protocol
+
+from tickrig.device.core import NEVER, Device, NonCopyable, W
+from tickrig.emulators.rig.agenda import Agenda
+from tickrig.emulators.rig.clock import Clock, VirtualClock
+from tickrig.emulators.rig.coupling import Coupling
+from tickrig.emulators.rig.port import Port, Wire, WirePort
+from tickrig.emulators.rig.timetable import Timetable
+
+LATE_US: Final = 1_000
+"""A step that begins later than this counts as late."""
+
+
+class Joint(Protocol):
+    """A joint of a wire with the outside world: `Bridge`, `CanBridge`."""
+
+    @property
+    def due_us(self) -> int:
+        """When there is something to be handed out."""
+        ...
+
+    def take_in(self, now_us: int, /) -> None:
+        """Put on the wire what the outside sent."""
+
+    def give_out(self, now_us: int, /) -> None:
+        """Hand out what has arrived."""
+
+
+class Host(Protocol):
+    """An end of a wire at which no station is, but somebody who waits."""
+
+    @property
+    def wire(self) -> Wire:
+        """The wire it is an end of."""
+        ...
+
+    @property
+    def arrived_us(self) -> int:
+        """When what waits there had arrived, `NEVER` if nothing does."""
+        ...
+
+
+class Station(Generic[W]):
+    """A device on a port.
+
+    Attributes:
+        at_us: the tick for which it stands in the timetable of its rig.
+    """
+
+    __slots__ = ("at_us", "device", "port", "tick_us")
+
+    def __init__(self, device: Device[W], port: Port[W]) -> None:
+        self.device, self.port, self.tick_us = device, port, device.tick_us
+        self.at_us = NEVER
+
+    def wake_us(self, now_us: int) -> int:
+        """Return the first tick after `now_us` at which this station has work."""
+        return _next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
+
+
+class Rig(NonCopyable):
+    """Stations that share a clock.
+
+    A step has two phases, as registers on one clock line have: first every
+    port is polled and every device computes, then everything is sent. So the
+    order in which stations are listed cannot change what they do.
+
+    In virtual time the rig jumps over ticks at which no device is due and
+    nothing arrives; `dense=True` visits them all, which must make no
+    difference. In real time it wakes at every tick and runs those with work.
+    Stations on a shared wire stand in a timetable and cost nothing until they
+    have work; the others are looked at in every step.
+
+    What the agenda holds is done by whoever makes time pass, in whatever way:
+    after all that happens before its time, and before the tick of its time.
+
+    Args:
+        stations: the devices, each on its port.
+        bridges: joints with the outside world (real time).
+        couplings: what joins the devices beside their wires, in the order in which they act.
+        clock: a `VirtualClock` unless given.
+        dense: run every tick of every device.
+        agenda: what is to be done between ticks; a new one unless given.
+
+    Attributes:
+        agenda: what is to be done between ticks.
+        acting_us: the time for which an action of the agenda is being done, else None.
+        now_us: time since the start of the rig.
+        late_us: by how much the latest step was late.
+        late_steps: how many steps began more than `LATE_US` late.
+    """
+
+    def __init__(
+        self,
+        *stations: Station[Any],
+        bridges: Sequence[Joint] = (),
+        couplings: Sequence[Coupling] = (),
+        clock: Clock | None = None,
+        dense: bool = False,
+        agenda: Agenda | None = None,
+    ) -> None:
+        self.now_us = self.late_us = self.late_steps = 0
+        self.agenda = agenda or Agenda()
+        self.acting_us: int | None = None
+        self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
+        self._clock = clock or VirtualClock()
+        self._jumps = not dense and isinstance(self._clock, VirtualClock)
+        periods = {station.tick_us for station in stations}
+        self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
+        self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
+        self._wires: tuple[Wire, ...] = ()
+        attached = [station for station in stations if self._attach(station)]
+        self._woken = () if dense else tuple(attached)
+        self._looked_at = tuple(s for s in stations if s not in self._woken)
+
+    def _attach(self, station: Station[Any]) -> bool:
+        """Let a port that can say so say when a station has work."""
+
+        def wake(at_us: int) -> None:
+            if not self._dense:
+                self._enter(station, at_us)
+
+        port = station.port
+        if not isinstance(port, WirePort):
+            return False
+        port.attach(station.device, wake)
+        self.move_on(port.wire)
+        return True
+
+    def move_on(self, wire: Wire) -> None:
+        """Let a wire go on with the rig; one with stations does so anyway."""
+        if wire not in self._wires:
+            self._wires += (wire,)
+
+    @property
+    def next_us(self) -> int:
+        """When there is something to do next: an action, a tick with work, an end on a wire."""
+        self._look()
+        return min(self._planned_us, self._wires_due_us)
+
+    def step(self) -> None:
+        """Go to the next time with something to do, and do it; nothing if that never comes."""
+        if (next_us := self.next_us) != NEVER:
+            self._happen(next_us)
+
+    def run_to(self, t_us: int, host: Host | None = None) -> None:
+        """Step through all that happens up to and at `t_us`, or until something is at a host."""
+        self._look()
+        while (next_us := self._go_on(t_us, host)) <= t_us:
+            self._happen(next_us)
+            if host is not None and host.arrived_us <= next_us:
+                return
+        self._pass_to(t_us)
+
+    def run_for(self, duration_us: int) -> None:
+        """Step through `duration_us`."""
+        self.run_to(self.now_us + duration_us)
+
+    def run_until(self, done: Callable[[], bool], timeout_us: int) -> bool:
+        """Step until `done()`, which only looks; False if `timeout_us` passed first."""
+        deadline_us = self.now_us + timeout_us
+        self._look()
+        while not done():
+            next_us = min(self._planned_us, self._wires_due_us)
+            if next_us > deadline_us:
+                self._idle_to(deadline_us)
+                return done()
+            self._happen(next_us)
+        return True
+
+    def _look(self) -> None:
+        """Enter what has come due between steps: inputs set, a dictionary written."""
+        for station in self._woken:
+            if (due_us := station.device.due_us) < station.at_us:
+                self._enter(station, due_us)
+
+    def _enter(self, station: Station[Any], at_us: int) -> None:
+        """Let a station have work at the first tick from `at_us` on."""
+        if at_us < station.at_us:
+            tick_us = station.tick_us
+            self._timetable.enter(station, -(-max(at_us, self._open_us) // tick_us) * tick_us)
+
+    @property
+    def _planned_us(self) -> int:
+        """The next action, or the next tick that is known to have work."""
+        now_us, next_us = self.now_us, min(self._timetable.first_us, self.agenda.due_us)
+        for bridge in self._bridges:
+            next_us = min(next_us, bridge.due_us)
+        if self._jumps:
+            for station in self._looked_at:
+                next_us = min(next_us, station.wake_us(now_us))
+            for coupling in self._couplings:
+                next_us = min(next_us, _next_tick_us(now_us, coupling.due_us, coupling.tick_us))
+        else:
+            for tick_us in self._periods:
+                next_us = min(next_us, now_us - now_us % tick_us + tick_us)
+        return max(now_us, next_us)
+
+    @property
+    def _wires_due_us(self) -> int:
+        return min((wire.due_us for wire in self._wires), default=NEVER)
+
+    def _go_on(self, until_us: int, host: Host | None) -> int:
+        """Let frames end up to the next tick with work, or one at a host; return its time."""
+        while True:
+            next_us = self._planned_us
+            if not self._wires:
+                return next_us
+            if host is not None and host.arrived_us < next_us:
+                return max(self.now_us, host.arrived_us)
+            limit_us = end_us = min(next_us - 1, until_us)
+            if len(self._wires) > 1:  # what ends on one may let a station send on another
+                end_us = min(limit_us, self._wires_due_us)
+            heard = [wire.advance_until_heard(end_us) for wire in self._wires]
+            if not any(heard) and self._wires_due_us > limit_us:
+                return next_us
+
+    def _happen(self, next_us: int) -> None:
+        """Do what is due next: all actions of that time, or else its tick."""
+        if self.agenda.due_us <= next_us:
+            self._act(next_us)
+        else:
+            self._run(next_us)
+
+    def _act(self, now_us: int) -> None:
+        """Do what is due at `now_us`, before the tick of that time."""
+        self._pass_to(max(self.now_us, now_us - 1))
+        self.acting_us = now_us
+        try:
+            self.agenda.run(now_us)
+        finally:
+            self.acting_us = None
+        self._look()
+
+    def _pass_to(self, t_us: int) -> None:
+        """Let time pass in which no tick has work."""
+        for wire in self._wires:
+            wire.advance(t_us)
+        self._idle_to(t_us)
+
+    def _idle_to(self, t_us: int) -> None:
+        if t_us > self.now_us:
+            self._clock.wait_until(t_us)
+            self.now_us = t_us
+        self._open_us = self.now_us + 1
+
+    def _run(self, now_us: int) -> None:
+        late_us = self._clock.wait_until(now_us)
+        self.now_us = self._open_us = now_us
+        self.late_us = max(self.late_us, late_us)
+        self.late_steps += late_us > LATE_US
+        for bridge in self._bridges:
+            bridge.take_in(now_us)
+        for wire in self._wires:
+            wire.advance(now_us)
+        self._tick(now_us)
+        self._couple(now_us)
+        for bridge in self._bridges:
+            bridge.give_out(now_us)
+
+    def _tick(self, now_us: int) -> None:
+        """Let all devices with work compute, then send."""
+        sent = []
+        for station in self._looked_at:
+            if now_us % station.tick_us:
+                continue
+            received = station.port.poll(now_us)
+            if received or self._dense or station.device.due_us <= now_us:
+                sent.append((station.port, station.device.tick(now_us, received)))
+        woken, enter = self._timetable.take(now_us), self._timetable.enter
+        self._open_us = now_us + 1
+        for station in woken:
+            device, port = station.device, station.port
+            received = port.poll(now_us)
+            if received or device.due_us <= now_us:
+                sent.append((port, device.tick(now_us, received)))
+            if (due_us := device.due_us) < NEVER:
+                tick_us = station.tick_us
+                first_us = now_us + tick_us
+                enter(station, -(-due_us // tick_us) * tick_us if due_us > first_us else first_us)
+        for port, traffic in sent:
+            port.send(now_us, traffic)
+
+    def _couple(self, now_us: int) -> None:
+        """Let couplings act, and devices whose inputs they set have work."""
+        acting = [coupling for coupling in self._couplings if now_us % coupling.tick_us == 0]
+        for coupling in acting:
+            coupling.act(now_us)
+        if acting:
+            self._look()
+
+
+def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
+    """Return the first tick after `now_us` that is not before `due_us`."""
+    first_us = now_us - now_us % tick_us + tick_us
+    if due_us <= first_us:
+        return first_us
+    return NEVER if due_us >= NEVER else -(-due_us // tick_us) * tick_us

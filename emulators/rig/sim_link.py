@@ -1,0 +1,54 @@
+"""A byte link into a rig in virtual time."""
+
+from __future__ import annotations
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.rig.port import ByteEnd
+from tickrig.emulators.rig.rig import Rig
+from tickrig.host.links.errors import LinkClosed
+
+
+class SimLink:
+    """A `Link[bytes]` that makes virtual time pass while its caller waits.
+
+    Args:
+        rig: the rig that is stepped meanwhile.
+        end: the host's end of a serial line of that rig.
+    """
+
+    def __init__(self, rig: Rig, end: ByteEnd) -> None:
+        self._rig, self._end = rig, end
+        self._closed = False
+
+    @property
+    def now_us(self) -> int:
+        """The rig's time."""
+        return self._rig.now_us
+
+    def send(self, traffic: bytes, /) -> None:
+        """Queue bytes on the line; where its buffer is full, time passes until they fit."""
+        self._check_open()
+        while traffic:
+            room = self._end.room(self.now_us)
+            self._end.send(self.now_us, traffic[:room])
+            traffic = traffic[room:]
+            if traffic:
+                self._rig.run_for(1_000)
+
+    def receive(self, timeout_us: int, /) -> bytes:
+        """Step the rig until bytes have arrived."""
+        self._check_open()
+        deadline_us = self.now_us + timeout_us
+        while not (data := self._end.poll(self.now_us)) and self.now_us < deadline_us:
+            arrival_us = self._end.idle_us
+            until_us = arrival_us if arrival_us != NEVER else self._rig.next_us
+            self._rig.run_to(max(self.now_us, min(until_us, deadline_us)))
+        return data
+
+    def close(self) -> None:
+        """Close the link; the rig stays as it is."""
+        self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise LinkClosed("the link was closed")

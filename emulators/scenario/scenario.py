@@ -1,0 +1,246 @@
+"""Scenarios: what is done to a device at which time (docs/scenario.md)."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.emulators.bench.emulated import Touchable
+from tickrig.emulators.bench.names import known
+from tickrig.emulators.bench.operator import PRESS_US, Operator
+from tickrig.emulators.record.byte_text import unescape
+from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.cli.setting import Setting, parse_setting
+
+Encoder = Callable[[bytes], bytes]
+"""Makes a line for the wire of the text that a scenario gives."""
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be run; its text says where and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Send bytes as the host; `shown` is what the transcript shows."""
+
+    data: bytes
+    shown: bytes
+
+
+Sender = Callable[[str], Send]
+"""Reads what stands behind a verb that sends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Set an input or a group."""
+
+    name: str
+    values: tuple[Setting, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """Press a button for a time."""
+
+    name: str
+    duration_us: int = PRESS_US
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Let a button go."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Clear:
+    """Let a fault go."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """Show outputs when they change."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Expect:
+    """Fail unless the device sends a line in time; `*` stands for any characters."""
+
+    text: str
+    within_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """End the run."""
+
+
+Action = Send | Set | Press | Release | FaultSpec | Clear | Watch | Expect | End
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One action of a scenario: when, what, and `FILE:LINE` where it stands."""
+
+    at_us: int
+    action: Action
+    place: str
+
+
+_LINE: Final = re.compile(r"(\+?)(\S+)\s+(\w+)(?:\s+(.*))?")
+_COMMENT: Final = re.compile(r"(^|\s)#.*")
+_PRESS: Final = re.compile(r"(\S+)(?:\s+for\s+(\S+))?")
+_EXPECT: Final = re.compile(r"(.*\S)\s+within\s+(\S+)")
+
+
+class ScenarioParser:
+    """Reads scenarios for one device; what it lets through can be carried out.
+
+    Args:
+        device: for the names of inputs and outputs.
+        operator: for what can be done to it.
+        encoders: further verbs that send a line, beside `send`.
+        senders: the verbs that send, on a wire that carries no lines.
+    """
+
+    def __init__(
+        self,
+        device: Touchable,
+        operator: Operator,
+        encoders: Mapping[str, Encoder] | None = None,
+        *,
+        senders: Mapping[str, Sender] | None = None,
+    ) -> None:
+        self._device, self._operator = device, operator
+        self._verbs: dict[str, Callable[[str], Action]] = {
+            **(senders or _line_senders(encoders or {})),
+            "set": self._parse_set,
+            "press": self._parse_press,
+            "release": self._parse_release,
+            "fault": self._parse_fault,
+            "clear": self._parse_clear,
+            "watch": self._parse_watch,
+            "expect": _parse_expect,
+            "end": _parse_end,
+        }
+
+    def parse(self, text: str, file: str) -> tuple[Line, ...]:
+        """Read a whole scenario.
+
+        Raises:
+            ScenarioError: `FILE:LINE: what came, what is allowed`.
+        """
+        lines: list[Line] = []
+        for number, raw in enumerate(text.splitlines(), 1):
+            if content := _COMMENT.sub("", raw).strip():
+                place = f"{file}:{number}"
+                try:
+                    lines.append(self._parse_line(content, lines[-1:], place))
+                except ValueError as error:
+                    raise ScenarioError(f"{place}: {error}") from None
+        return tuple(lines)
+
+    def _parse_line(self, content: str, above: list[Line], place: str) -> Line:
+        match = _LINE.fullmatch(content)
+        if match is None:
+            raise ValueError(f"{content!r} is not 'TIME ACTION ...', as '1.5s press NAME'")
+        plus, time, verb, rest = match.groups()
+        before_us = above[0].at_us if above else 0
+        at_us = parse_time_us(time) + (before_us if plus else 0)
+        if at_us < before_us:
+            raise ValueError(f"{time} is earlier than the action above")
+        if above and isinstance(above[0].action, End):
+            raise ValueError(f"{verb} comes after end")
+        if verb not in self._verbs:
+            raise ValueError(f"no action {verb!r}; known: {', '.join(self._verbs)}")
+        action = self._verbs[verb](rest or "")
+        if isinstance(action, FaultSpec) and action.to_us <= at_us:
+            raise ValueError(f"{rest} would have ended before {time}")
+        return Line(at_us, action, place)
+
+    def _parse_set(self, rest: str) -> Set:
+        name, *words = shlex.split(rest) or [""]
+        values = tuple(parse_setting(word) for word in words)
+        self._operator.check_set(name, *values)
+        return Set(name, values)
+
+    def _parse_press(self, rest: str) -> Press:
+        match = _PRESS.fullmatch(rest)
+        if match is None:
+            raise ValueError(f"press takes NAME or NAME for DURATION, got {rest!r}")
+        press = Press(match[1], parse_time_us(match[2]) if match[2] else PRESS_US)
+        self._operator.check_press(press.name, press.duration_us)
+        return press
+
+    def _parse_release(self, rest: str) -> Release:
+        self._operator.check_press(rest)
+        return Release(rest)
+
+    def _parse_fault(self, rest: str) -> FaultSpec:
+        spec = parse_fault_spec(rest)
+        self._operator.check_fault(spec)
+        return spec
+
+    def _parse_clear(self, rest: str) -> Clear:
+        self._operator.check_clear(rest)
+        return Clear(rest)
+
+    def _parse_watch(self, rest: str) -> Watch:
+        names, device = tuple(rest.split()), self._device
+        for name in names or ("",):
+            if name not in device.outputs and name not in device.inputs.table:
+                raise ValueError(f"no output {name!r}; known: {known(device.outputs)}")
+        return Watch(names)
+
+
+def _line_senders(encoders: Mapping[str, Encoder]) -> dict[str, Sender]:
+    """Return the verbs of a serial line."""
+    lines: dict[str, Encoder] = {"send": lambda text: text + b"\n", **encoders}
+    return {**{verb: _line_sender(encode) for verb, encode in lines.items()}, "raw": parse_raw}
+
+
+def _line_sender(encode: Encoder) -> Sender:
+    def parse(rest: str) -> Send:
+        data = encode(unescape(rest))
+        return Send(data, data.removesuffix(b"\n"))
+
+    return parse
+
+
+def parse_raw(rest: str) -> Send:
+    """Read what stands behind `raw`: bytes in hex.
+
+    Raises:
+        ValueError: something else.
+    """
+    try:
+        data = bytes.fromhex(rest)
+    except ValueError:
+        data = b""
+    if not data:
+        raise ValueError(f"raw takes bytes in hex, as '6f 6b 0a', got {rest!r}")
+    return Send(data, data)
+
+
+def _parse_expect(rest: str) -> Expect:
+    match = _EXPECT.fullmatch(rest)
+    if match is None:
+        raise ValueError(f"expect takes TEXT within DURATION, got {rest!r}")
+    return Expect(match[1], parse_time_us(match[2]))
+
+
+def _parse_end(rest: str) -> End:
+    if rest:
+        raise ValueError(f"end takes nothing, got {rest!r}")
+    return End()

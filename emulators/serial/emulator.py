@@ -1,0 +1,134 @@
+"""One emulated device on a serial line, with all that can be done to it while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.bench.emulated import Emulated
+from tickrig.emulators.bench.wire_log import Splitter, WireLog
+from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.record.recorder import TracedDevice, TraceFile
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.faults import FaultKind, FaultyPort
+from tickrig.emulators.rig.port import ByteLine, Port
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.tap import Tap
+from tickrig.emulators.serial.bridge import Bridge
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.host_end import HostEnd
+from tickrig.emulators.serial.serial_line import SerialLine
+
+
+class Outside(Port[bytes], Protocol):
+    """Where the host is: a pty."""
+
+    lost: int
+
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, if that is not what the device has."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LineKind:
+    """What the serial line of a kind of device is like.
+
+    Attributes:
+        baud: bit rate in bit/s.
+        faults: the wire faults that can be armed.
+        splitter: makes what cuts one direction for the log, into lines unless given.
+        wire: makes the line of a baud rate.
+    """
+
+    baud: int = 115_200
+    faults: Mapping[str, FaultKind[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
+    splitter: Callable[[Mark], Splitter] | None = None
+    wire: Callable[[int], ByteLine] = SerialLine
+
+
+class Emulator(Workbench):
+    """A device, its line, its operator, and a rig that runs them.
+
+    Args:
+        name: what the device is called.
+        device: the device.
+        outside: where the host is; without it the host is the caller (`send`, `log`).
+        clock: a `VirtualClock` unless given.
+        seed: seed of the wire faults' chance.
+        trace: where to record the run.
+        link: path under which the host finds it, for people.
+        line: what the line is like.
+
+    Attributes:
+        line: the line itself.
+        host_end: the caller's end of it, for a `SimLink` too; what passes here is logged.
+    """
+
+    def __init__(  # noqa: PLR0913 - options, by keyword
+        self,
+        name: str,
+        device: Emulated[bytes],
+        *,
+        outside: Outside | None = None,
+        clock: Clock | None = None,
+        seed: int = 0,
+        trace: TraceFile | None = None,
+        link: str = "",
+        line: LineKind | None = None,
+    ) -> None:
+        self._trace, self._outside = trace, outside
+        line = line or LineKind()
+        self.line = line.wire(line.baud)
+        port = FaultyPort(self.line.a, line.faults, seed)
+        super().__init__(name, device, port, link)
+        if line.splitter is not None:
+            self.log = WireLog(splitter=line.splitter)
+        station = Station(TracedDevice(device, trace) if trace else device, port)
+        self.host_end = HostEnd(self.line.b, self.log.hear)
+        bridges = [Bridge(self.line.b, Tap(outside, self.log.hear))] if outside else []
+        self.rig = Rig(station, bridges=bridges, clock=clock, agenda=self.agenda)
+
+    @property
+    def _host_due_us(self) -> int:
+        return NEVER if self._outside else self.host_end.due_us
+
+    def _listen(self, now_us: int) -> None:
+        if self._outside is None:
+            self.host_end.poll(now_us)
+
+    def send(self, now_us: int, data: bytes) -> None:
+        """Put bytes on the line, as the host would."""
+        self.host_end.send(now_us, data)
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Bytes that found a buffer full, on the line or outside."""
+        outside = self._outside.lost if self._outside else 0
+        return {"lost_bytes": self.line.a.lost + self.line.b.lost + outside}
+
+    def status(self) -> dict[str, str | int]:
+        """Return how the run is going, and what the host has set its port to."""
+        return {
+            **super().status(),
+            "host_setting": self._outside.host_setting if self._outside else "",
+        }
+
+    @property
+    def lost_bytes(self) -> int:
+        """Their number."""
+        return self.lost["lost_bytes"]
+
+    @property
+    def trace_error(self) -> str:
+        """Why the recording ended early, empty while all is well."""
+        return self._trace.error if self._trace else ""
+
+    def close(self) -> None:
+        """End the recording."""
+        if self._trace is not None:
+            self._trace.close(self.rig.now_us)

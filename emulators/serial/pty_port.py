@@ -1,0 +1,102 @@
+"""The master side of a pseudo-terminal, under a name that stays."""
+
+from __future__ import annotations
+
+import os
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.serial.pty_link import PtyLink
+from tickrig.emulators.serial.pty_setting import HostSetting
+
+READ_BYTES: Final = 4_096
+
+
+class PtyPort:
+    """A `Port[bytes]` whose other side any serial program can open.
+
+    The emulator keeps the other side open too, so hosts may come and go. What
+    nobody reads is kept up to `buffer_bytes` here and some 4 KiB in the kernel;
+    after that whole sends are dropped and counted.
+
+    Args:
+        link: path of a symbolic link to the terminal, see `PtyLink`; none if not given.
+            One that is left over from a killed emulator is replaced.
+        buffer_bytes: bytes kept for a host that does not read.
+
+    Attributes:
+        path: the terminal, as `/dev/pts/7`.
+        lost: bytes dropped because nobody read.
+
+    Raises:
+        FileExistsError: `link` exists, and no emulator left it over.
+        OSError: no pseudo-terminal is to be had, or no link can be made there.
+    """
+
+    def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self.lost = 0
+        self._buffer_bytes, self._unsent = buffer_bytes, b""
+        self._link: PtyLink | None = None
+        self._setting: HostSetting | None = None
+        if link is not None:
+            try:
+                self._link = PtyLink(link, self.path)
+            except OSError:
+                self.close()
+                raise
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the host."""
+        return NEVER
+
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        return self._setting.differing if self._setting else ""
+
+    def watch_setting(self, baud: int, tell: Callable[[str], None]) -> None:
+        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`."""
+        self._setting = HostSetting(self._slave, baud, tell)
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Read without waiting."""
+        if self._setting is not None:
+            self._setting.look(now_us)
+        self._flush()
+        try:
+            return os.read(self._master, READ_BYTES)
+        except BlockingIOError:
+            return b""
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Write as much as fits; keep the rest for later."""
+        if len(self._unsent) + len(traffic) > self._buffer_bytes:
+            self.lost += len(traffic)
+        else:
+            self._unsent += traffic
+        self._flush()
+
+    def close(self) -> None:
+        """Give the pseudo-terminal back and remove the link."""
+        if self._link is not None:
+            self._link.close()
+        self._link = self._setting = None
+        for fd in (self._master, self._slave):
+            if fd >= 0:
+                os.close(fd)
+        self._master = self._slave = -1
+
+    def _flush(self) -> None:
+        if self._unsent:
+            try:
+                self._unsent = self._unsent[os.write(self._master, self._unsent) :]
+            except BlockingIOError:
+                return

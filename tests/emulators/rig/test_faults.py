@@ -1,0 +1,153 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.emulators.lamp import Lamp
+from tickrig.device.chance import Chance, threshold_of
+from tickrig.device.core import NEVER
+from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.scenario.fault_spec import parse_fault_spec
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
+
+
+class Loop:
+    """A port that gives back what it is sent."""
+
+    due_us = 42
+
+    def __init__(self) -> None:
+        self.traffic = b""
+
+    def poll(self, now_us: int, /) -> bytes:
+        traffic, self.traffic = self.traffic, b""
+        return traffic
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        self.traffic += traffic
+
+
+def faulty(seed: int = 0) -> tuple[FaultyPort[bytes], Loop]:
+    loop = Loop()
+    return FaultyPort(loop, BYTE_FAULTS, seed), loop
+
+
+def received(port: FaultyPort[bytes], loop: Loop, *chunks: bytes) -> bytes:
+    out = b""
+    for chunk in chunks:
+        loop.traffic = chunk
+        out += port.poll(0)
+    return out
+
+
+def test_without_a_fault_all_passes() -> None:
+    port, loop = faulty()
+    port.send(0, b"abc")
+    assert port.poll(0) == b"abc"
+    assert port.due_us == loop.due_us
+
+
+def test_a_cut_line_passes_nothing_either_way() -> None:
+    port, loop = faulty()
+    port.arm("cut")
+    port.send(0, b"abc")
+    assert loop.traffic == b""
+    assert received(port, loop, b"abc") == b""
+    port.clear("cut")
+    assert received(port, loop, b"abc") == b"abc"
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("flip", b"\x9e\x9d"), ("drop", b""), ("dup", b"aabb")]
+)
+def test_a_rate_of_1_hits_always(name: str, expected: bytes) -> None:
+    port, loop = faulty()
+    port.arm(name, 1)
+    assert received(port, loop, b"ab") == expected
+
+
+@pytest.mark.parametrize("name", ["flip", "drop", "dup"])
+@given(data=st.binary(min_size=1, max_size=60), cut=st.integers(0, 60), seed=st.integers(0, 9))
+def test_chunks_and_the_other_direction_make_no_difference(
+    name: str, data: bytes, cut: int, seed: int
+) -> None:
+    port, loop = faulty(seed)
+    port.arm(name, 0.3)
+    whole = received(port, loop, data)
+    port.arm(name, 0.3)
+    port.send(0, b"something the other way")
+    assert received(port, loop, data[:cut], b"", data[cut:]) == whole
+
+
+def test_rates_are_probabilities() -> None:
+    port, loop = faulty()
+    port.arm("drop", 0.25)
+    assert len(received(port, loop, bytes(100_000))) == pytest.approx(75_000, rel=0.01)
+    port.clear("drop")
+    port.arm("flip", 0.01)
+    flipped = received(port, loop, bytes(100_000))
+    assert sum(byte.bit_count() for byte in flipped) == pytest.approx(8_000, rel=0.05)
+
+
+def test_seeds_and_faults_have_chances_of_their_own() -> None:
+    outcomes = set()
+    for seed in range(5):
+        port, loop = faulty(seed)
+        port.arm("drop", 0.5)
+        outcomes.add(received(port, loop, bytes(range(64))))
+    assert len(outcomes) == 5
+
+
+def test_the_same_seed_gives_the_same_numbers_on_every_machine() -> None:
+    chance = Chance(1, "flip >")
+    assert [chance.draw() >> 32 for _ in range(3)] == [2019950067, 3854906882, 1538176888]
+    assert threshold_of(1) == 2**64
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "error"),
+    [
+        ("flip", None, "flip wants a rate above 0 and up to 1, as flip=0.01; got no rate"),
+        ("flip", 0, "got 0"),
+        ("flip", 1.5, r"got 1\.5"),
+        ("flip", float("nan"), "got nan"),
+        ("cut", 0.5, "cut takes no rate, got 0.5"),
+    ],
+)
+def test_a_rate_that_makes_no_sense_is_refused(name: str, rate: float | None, error: str) -> None:
+    port, _ = faulty()
+    with pytest.raises(ValueError, match=error):
+        port.arm(name, rate)
+    assert port.armed == ()
+
+
+def test_faults_never_see_silence() -> None:
+    port, loop = faulty()
+    port.arm("drop", 0.5)
+    before = received(port, loop, b"", b"abcdefgh")
+    port.arm("drop", 0.5)
+    assert received(port, loop, b"", b"", b"", b"abcdefgh") == before
+    assert loop.due_us < NEVER
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 9_000), st.binary(min_size=1, max_size=9)), max_size=9),
+    st.sampled_from(["flip=0.2", "drop=0.3", "dup=0.3"]),
+)
+def test_dense_and_sparse_runs_suffer_the_same(sent: list[tuple[int, bytes]], fault: str) -> None:
+    def heard(*, dense: bool) -> list[tuple[int, bytes]]:
+        line, spec = SerialLine(), parse_fault_spec(fault)
+        port = FaultyPort(line.a, BYTE_FAULTS)
+        port.arm(spec.name, spec.rate)
+        rig, log = Rig(Station(Lamp(), port), dense=dense), []
+        for delay_us, data in sent:
+            line.b.send(rig.now_us, data)
+            rig.run_for(delay_us)
+            log.append((rig.now_us, line.b.poll(rig.now_us)))
+        rig.run_for(50_000)
+        return [*log, (rig.now_us, line.b.poll(rig.now_us))]
+
+    assert heard(dense=False) == heard(dense=True)

@@ -1,0 +1,101 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.device.core import NEVER
+from tickrig.emulators.serial.serial_line import SerialLine
+
+sends = st.lists(st.tuples(st.integers(0, 3_000), st.binary(max_size=30)), max_size=12)
+
+
+def test_a_byte_arrives_when_its_stop_bit_has_passed() -> None:
+    line = SerialLine(baud=100_000)  # 100 us a byte
+    line.a.send(50, b"ab")
+    assert (line.b.due_us, line.b.idle_us) == (150, 250)
+    assert [line.b.poll(t) for t in (149, 150, 249, 250)] == [b"", b"a", b"", b"b"]
+    assert line.b.due_us == NEVER
+
+
+def test_115200_baud_carry_115_bytes_in_a_tick_of_10_ms() -> None:
+    line = SerialLine()
+    line.a.send(0, bytes(1_000))
+    assert [len(line.b.poll(t)) for t in range(10_000, 60_000, 10_000)] == [115] * 4 + [116]
+
+
+def test_the_two_directions_are_independent() -> None:
+    line = SerialLine()
+    line.a.send(0, b"there")
+    line.b.send(0, b"back")
+    assert (line.a.poll(10_000), line.b.poll(10_000)) == (b"back", b"there")
+
+
+@given(sends, st.lists(st.integers(1, 2_000), max_size=40))
+def test_when_it_is_polled_makes_no_difference(
+    sent: list[tuple[int, bytes]], waits: list[int]
+) -> None:
+    often, once = SerialLine(), SerialLine()
+    now_us, heard, wanted = 0, b"", b""
+    for delay_us, data in sent:
+        now_us += delay_us
+        often.a.send(now_us, data)
+        once.a.send(now_us, data)
+        heard += often.b.poll(now_us)
+        wanted += data
+    for wait_us in waits:
+        now_us += wait_us
+        heard += often.b.poll(now_us)
+    now_us = max(now_us, 0 if often.b.idle_us == NEVER else often.b.idle_us)
+    assert heard + often.b.poll(now_us) == once.b.poll(now_us) == wanted
+    assert often.b.lost == once.b.lost == 0
+
+
+@given(sends)
+def test_the_last_byte_arrives_at_idle_us_and_not_before(sent: list[tuple[int, bytes]]) -> None:
+    line, now_us, total = SerialLine(), 0, 0
+    for delay_us, data in sent:
+        now_us += delay_us
+        line.a.send(now_us, data)
+        total += len(data)
+    if total and line.b.idle_us > now_us:
+        idle_us = line.b.idle_us
+        assert len(line.b.poll(idle_us - 1)) == total - 1
+        assert len(line.b.poll(idle_us)) == 1
+
+
+def test_a_full_sender_loses_what_does_not_fit() -> None:
+    line = SerialLine(buffer_bytes=4)
+    assert line.a.room(0) == 4
+    line.a.send(0, b"abcdef")
+    assert (line.a.room(0), line.b.lost) == (0, 2)
+    assert line.b.poll(1_000) == b"abcd"
+
+
+def test_the_sender_has_room_again_as_bytes_leave() -> None:
+    line = SerialLine(baud=100_000, buffer_bytes=4)
+    line.a.send(0, b"abcd")
+    assert [line.a.room(t) for t in (99, 100, 200, 400)] == [0, 1, 2, 4]
+
+
+def test_a_receiver_that_does_not_read_loses_the_newest_bytes() -> None:
+    line = SerialLine(buffer_bytes=4)
+    line.a.send(0, b"abcd")
+    line.a.send(10_000, b"efgh")
+    assert line.b.poll(20_000) == b"abcd"
+    assert line.b.lost == 4
+
+
+def test_a_receiver_that_never_reads_costs_no_more_memory_than_its_buffers() -> None:
+    line = SerialLine(buffer_bytes=4)
+    for now_us in range(0, 1_000_000, 1_000):
+        line.a.send(now_us, b"x")
+    assert line.a.room(1_000_000) == 0
+    assert line.b.poll(1_000_000) == b"xxxx"
+    assert line.b.lost == 996
+
+
+@pytest.mark.parametrize("wrong", [{"baud": 0}, {"frame_bits": 0}, {"buffer_bytes": 0}])
+def test_an_impossible_line_cannot_be_built(wrong: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="at least 1"):
+        SerialLine(**wrong)
