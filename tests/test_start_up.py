@@ -24,14 +24,14 @@ SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 SLOW = {"asyncio", "email", "http", "logging", "sqlite3", "subprocess", "tempfile", "xml"}
 
 MOST = {
-    "tickrig ctl /nowhere status": 18,
-    "tickrig ctl /nowhere press power_button": 18,
+    "tickrig ctl /nowhere status": 20,
+    "tickrig ctl /nowhere press power_button": 20,
     "tickrig TAB": 12,
-    "tickrig ctl /nowhere TAB": 18,
-    "tickrig demo fig120 -- TAB": 18,
+    "tickrig ctl /nowhere TAB": 20,
+    "tickrig demo fig120 -- TAB": 19,
     "tickrig replay TAB": 18,
-    "tickrig rtc ls": 26,
-    "tickrig rtc con TAB": 26,
+    "tickrig rtc ls": 28,
+    "tickrig rtc con TAB": 28,
     "rrc-emu TAB": 14,
     "rtc-lite-emu --framing TAB": 20,
     "rh3 goto TAB": 14,

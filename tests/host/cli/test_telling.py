@@ -9,7 +9,7 @@ import pytest
 from tickrig.host.cli.telling import warnings_told
 
 
-@pytest.mark.parametrize("part", ["host.rtc.port", "emulators.recorder"])
+@pytest.mark.parametrize("part", ["host.rtc.ports.port", "emulators.record.recorder"])
 def test_the_library_is_silent_unless_somebody_listens(part: str) -> None:
     program = "import logging, tickrig.{0}; logging.getLogger('tickrig.{0}').warning('beware')"
     process = subprocess.run(
