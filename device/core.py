@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NoReturn, Protocol, SupportsIndex, TypeVar
-
-NEVER: Final = 2**63 - 1
-"""A time that does not come: `due_us` of a device that waits for input alone."""
+from typing import NoReturn, Protocol, SupportsIndex, TypeVar
 
 W = TypeVar("W")  # one tick's traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NonCopyable
 from tickrig.device.modbus.registers import Registers
 from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.requests import (
     Refusal,
     encode_exception,

@@ -6,13 +6,13 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rh3.register_map import TABLE
 from tickrig.device.rh3.side import Side
 from tickrig.device.rh3.terminals import SIDES
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rh3 import Command, Fault, Mode, Status
 
 TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from tickrig.device.core import NEVER
 from tickrig.device.physical import InputBank
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.states import POWERED_ON, Move, RrcState
 from tickrig.device.rrc.terminals import POWER_ON_FAULTS, RUNNING_FAULTS
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.replies import EventKind
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NonCopyable
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
@@ -15,6 +15,7 @@ from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
 from tickrig.device.rtc_lite.server import Server
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
 from tickrig.device.timer import Timer
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame, fault_frame

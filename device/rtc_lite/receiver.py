@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.frame import Frame
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.device.body.pose import Pose
-from tickrig.device.core import NEVER
 from tickrig.device.urg import first_protocol
 from tickrig.device.urg.first_protocol import Capture
 from tickrig.device.urg.parameters import URG_04LX, UrgParameters
@@ -17,6 +16,7 @@ from tickrig.device.urg.stream import Stream
 from tickrig.device.urg.texts import CONDITION, version
 from tickrig.device.urg.view import View
 from tickrig.device.urg.world import World
+from tickrig.wire.instant import NEVER
 from tickrig.wire.scip import status
 from tickrig.wire.scip.command import Command
 from tickrig.wire.scip.description import encode_lines

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.bench.emulated import look_at
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
@@ -13,6 +12,7 @@ from tickrig.emulators.control.requests import Object, Requests, short, text_of,
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.scenario.fault_spec import parse_fault_spec
 from tickrig.host.cli.setting import Setting
+from tickrig.wire.instant import NEVER
 
 MAX_LINES: Final = 100
 MAX_PRESS_US: Final = 10**15

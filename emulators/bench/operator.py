@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Final, Protocol
 
-from tickrig.device.core import NEVER
 from tickrig.device.physical import Kind
 from tickrig.emulators.bench.emulated import Inputs
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.agenda import Agenda
 from tickrig.emulators.scenario.fault_spec import FaultSpec
 from tickrig.host.cli.setting import Setting
+from tickrig.wire.instant import NEVER
 
 PRESS_US: Final = 100_000
 """How long a button is pressed unless told otherwise."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.bench.emulated import Touchable
 from tickrig.emulators.bench.operator import Operator, WireFaults
 from tickrig.emulators.bench.wire_log import WireLog
 from tickrig.emulators.rig.agenda import Agenda
 from tickrig.emulators.rig.rig import Rig
+from tickrig.wire.instant import NEVER
 
 
 class Workbench(ABC):

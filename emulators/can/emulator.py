@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.bench.emulated import Touchable
 from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.can.end import Accepted, CanEnd
@@ -18,6 +17,7 @@ from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
+from tickrig.wire.instant import NEVER
 
 
 class CanEmulator(Workbench):

@@ -6,10 +6,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
-from tickrig.device.core import NEVER, Device
+from tickrig.device.core import Device
 from tickrig.emulators.can.controller import CanController
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.wire import CanWire

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd

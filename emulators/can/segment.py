@@ -7,7 +7,6 @@ from collections.abc import Callable
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.arbiter import CanArbiter
 from tickrig.emulators.can.confinement import CanConfinement
 from tickrig.emulators.can.controller import CanController
@@ -18,6 +17,7 @@ from tickrig.emulators.can.routes import CanRoutes
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import INTERFRAME_BITS, frame_bits
 from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, ErrorState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd

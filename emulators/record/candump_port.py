@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.candump import LogLine
+from tickrig.wire.instant import NEVER
 
 
 class CandumpPort:

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.record.trace import (
     RESET,
@@ -19,6 +18,7 @@ from tickrig.emulators.record.trace import (
     parse_records,
 )
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.wire.instant import NEVER
 
 
 @dataclass(frozen=True, slots=True)

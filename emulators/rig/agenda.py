@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import Final
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 Action = Callable[[int], None]
 """Something to do; it is told the time in microseconds."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, Protocol
 
-from tickrig.device.core import NEVER, Device, NonCopyable, W
+from tickrig.device.core import Device, NonCopyable, W
 from tickrig.emulators.rig.agenda import Agenda
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.port import Port, Wire, WirePort
 from tickrig.emulators.rig.timetable import Timetable
+from tickrig.wire.instant import NEVER
 
 LATE_US: Final = 1_000
 """A step that begins later than this counts as late."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.errors import LinkClosed
+from tickrig.wire.instant import NEVER
 
 
 class SimLink:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.rig.rig import Station

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.control.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
 from tickrig.host.cli.user_file import told
@@ -17,6 +16,7 @@ from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.system.rts_profile import write_rts_profile
 from tickrig.host.rtc.system.system import describe
 from tickrig.host.rtc.system.system_toml import write_toml
+from tickrig.wire.instant import NEVER
 
 
 class SystemControl(Requests):

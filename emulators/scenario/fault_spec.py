@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.host.cli.duration import parse_time_us
+from tickrig.wire.instant import NEVER
 
 _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
 

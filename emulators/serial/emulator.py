@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.bench.wire_log import Splitter, WireLog
 from tickrig.emulators.bench.workbench import Workbench
@@ -21,6 +20,7 @@ from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.host_end import HostEnd
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 
 class Outside(Port[bytes], Protocol):

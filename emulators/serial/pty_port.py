@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.serial.pty_link import PtyLink
 from tickrig.emulators.serial.pty_setting import HostSetting
+from tickrig.wire.instant import NEVER
 
 READ_BYTES: Final = 4_096
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 
 class _Burst:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 
 class SerialLine:

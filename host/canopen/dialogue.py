@@ -18,7 +18,6 @@ from tickrig.host.canopen.script import (
     Step,
     Tell,
 )
-from tickrig.host.links.link import NEVER
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
@@ -30,6 +29,7 @@ from tickrig.wire.canopen.sdo.sdo import (
 )
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
 
 Failure = SdoFailed | StateTimeout | WrongIdentity
 Send = Callable[[int, bytes], None]

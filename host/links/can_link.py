@@ -15,8 +15,7 @@ from tickrig.host.links.multicast_group import keep_to_group
 from tickrig.host.links.stamp_clock import StampClock
 from tickrig.host.links.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorState
-from tickrig.wire.can_error_class import CONTROLLER_BYTE, ControllerFlag, ErrorClass
+from tickrig.wire.can_error import CONTROLLER_BYTE, ControllerFlag, ErrorClass, ErrorState
 
 SEND_TIMEOUT_S = 1
 PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE

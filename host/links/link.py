@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Protocol, TypeVar
-
-NEVER: Final = 2**63 - 1
-"""A time that does not come."""
+from typing import Protocol, TypeVar
 
 W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.host.links.errors import LinkTimeout
-from tickrig.host.links.link import NEVER, Link
+from tickrig.host.links.link import Link
 from tickrig.host.log import log_of
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.exchange import Exchange
@@ -14,6 +14,7 @@ from tickrig.host.rrc.keep_alive import KeepAlive
 from tickrig.host.rrc.ledger import Ledger
 from tickrig.host.rrc.mirror import WIPING
 from tickrig.host.rrc.refusals import OnRefusals, Refusals
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
 from tickrig.wire.rrc.replies import Event, Ok, Refusal
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.links.link import NEVER
+from tickrig.wire.instant import NEVER
 
 PERIOD_US: Final = 10_000
 """The RRC's internal period; renewing more often gains nothing."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_file import read_definition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile, read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.host.rtc_canopen.server import Server
+from tickrig.wire.instant import NEVER
 
 
 def serve(

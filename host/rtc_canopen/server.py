@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.links.stamped_link import Stamped
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
@@ -31,6 +30,7 @@ from tickrig.wire.canopen.nmt import (
     NmtCommand,
     NmtState,
 )
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.idl import Struct
 
 LATE_US: Final = 100_000

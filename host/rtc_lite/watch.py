@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.host.links.link import NEVER
+from tickrig.wire.instant import NEVER
 
 SEQUENCE: Final = range(1, 256)
 """Numbers of PINGs; 0 is skipped."""

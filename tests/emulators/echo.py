@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 
 @dataclass

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.device.core import NEVER
 from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.wire.instant import NEVER
 
 OUTPUTS = {"state": Output("state", "Lit or Dark"), "count": Output("count", "bytes heard", "B")}
 

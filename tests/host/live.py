@@ -12,7 +12,6 @@ from typing import TypeVar
 import serial
 from serial.rfc2217 import PortManager
 
-from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.bench.control import Control
@@ -20,6 +19,7 @@ from tickrig.emulators.control.requests import VERSION, Object
 from tickrig.emulators.rig.clock import RealClock
 from tickrig.emulators.serial.emulator import Emulator, Outside
 from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.wire.instant import NEVER
 
 JOIN_S = 5.0
 T = TypeVar("T")

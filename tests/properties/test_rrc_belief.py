@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from itertools import islice, product
 from typing import Final, NamedTuple
 
-from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rrc.states import POWERED_ON, RrcState
@@ -21,6 +20,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import commands as cmd
 
 MS: Final = 1_000

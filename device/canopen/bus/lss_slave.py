@@ -9,7 +9,6 @@ from typing import Final
 from tickrig.device.canopen.bus.lss_identification import IDENTIFY, SELECTIVE, FastScanner, Question
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import (
     BIT_RATES,
@@ -26,6 +25,7 @@ from tickrig.wire.canopen.lss import (
     number_of,
 )
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 IDENTITY: Final = 0x1018
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)

@@ -9,13 +9,13 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.pdo.pdo_mapping import whole_number
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, is_restricted
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.instant import NEVER
 
 COB_ID_SYNC: Final = 0x1005
 COMMUNICATION_CYCLE_PERIOD: Final = 0x1006

@@ -8,8 +8,8 @@ from types import MappingProxyType
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import NEVER
 from tickrig.device.physical import Input, Output, QuantityBank
+from tickrig.wire.instant import NEVER
 
 
 class Application(Service):

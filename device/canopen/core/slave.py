@@ -9,12 +9,13 @@ from typing import Final
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NonCopyable
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.canopen.time_of_day import TimeOfDay
+from tickrig.wire.instant import NEVER
 
 TICK_US: Final = 1_000
 UNCONFIGURED: Final = 0xFF

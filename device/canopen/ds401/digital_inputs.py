@@ -16,7 +16,7 @@ from tickrig.device.canopen.ds401.families import (
     POLARITY_INPUT,
     READ_INPUT,
 )
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 FILTER_US: Final = 10_000
 """How long a filtered line must be stable; the profile leaves it to the device."""

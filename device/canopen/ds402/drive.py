@@ -26,8 +26,8 @@ from tickrig.device.canopen.ds402.state.fault_memory import FaultMemory
 from tickrig.device.canopen.ds402.state.faults import ErrorCode
 from tickrig.device.canopen.ds402.state.state import Controlword, DriveState, command_of
 from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.servo.servo import Servo

@@ -15,10 +15,10 @@ from tickrig.device.canopen.motor_core_unit.shaft import Shaft
 from tickrig.device.canopen.motor_core_unit.supervision import Supervision
 from tickrig.device.canopen.motor_core_unit.terminals import INPUTS, OUTPUTS, READINGS, feel
 from tickrig.device.canopen.motor_core_unit.trajectory import CONTROL_US, DEGREE
-from tickrig.device.core import NEVER
 from tickrig.device.servo.presets import MOTOR_CORE_UNIT
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 MODE: Final = 0x2000
 

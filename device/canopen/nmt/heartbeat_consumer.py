@@ -10,12 +10,12 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.instant import NEVER
 
 CONSUMER_HEARTBEAT_TIME: Final = 0x1016
 MAX_NODES: Final = 127

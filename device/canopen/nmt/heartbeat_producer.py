@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.core.service import Service
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.slave import CanopenSlave

@@ -7,10 +7,10 @@ from typing import Final
 
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.instant import NEVER
 
 GUARD_TIME: Final = 0x100C
 LIFE_TIME_FACTOR: Final = 0x100D

@@ -9,8 +9,8 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.mpdo import scanned_entries
 from tickrig.device.canopen.pdo.pdo_packing import present
 from tickrig.device.canopen.pdo.tpdo_modes import TpdoMode
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.pdo import Mpdo
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.pdo.tpdo import Tpdo

@@ -10,9 +10,9 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.pdo.rpdo import RPDO_PARAMETERS, Rpdo
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 SYNCHRONOUS_WINDOW_LENGTH: Final = 0x1007
 

@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.pdo.mpdo_producer import DamProducer
 from tickrig.device.canopen.pdo.tpdo import TPDO_PARAMETERS, Tpdo
 from tickrig.device.canopen.pdo.tpdo_modes import TpdoMode
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 
 class PdoProducer(Service):

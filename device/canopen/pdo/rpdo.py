@@ -16,10 +16,10 @@ from tickrig.device.canopen.pdo.pdo_parameters import (
     SYNCHRONOUS,
     PdoParameters,
 )
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.pdo import DAM_MPDO, MAX_PDO_BYTES, SAM_MPDO
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer

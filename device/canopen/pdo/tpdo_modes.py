@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.pdo.tpdo import Tpdo

@@ -10,7 +10,6 @@ from tickrig.device.canopen.sdo.sdo_block_download import BlockDownload
 from tickrig.device.canopen.sdo.sdo_block_upload import BlockUpload
 from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
 from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload, SegmentedUpload
-from tickrig.device.core import NEVER
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import (
@@ -25,6 +24,7 @@ from tickrig.wire.canopen.sdo.sdo_command import (
     ClientCommand,
     ServerCommand,
 )
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.entry import Entry

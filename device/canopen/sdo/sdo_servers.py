@@ -11,12 +11,12 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.sdo.sdo_server import SdoServer
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, FLAG_30, INVALID
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.slave import CanopenSlave

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.port import Port
 from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
 
 HANDOVER_US: Final = 1_000
 """What has arrived is handed out at least this often."""

@@ -7,10 +7,10 @@ from typing import Final
 
 import can
 
-from tickrig.device.core import NEVER
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.log import log_of
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 FRAMES_A_POLL: Final = 1_024
 """So that a bus that never falls silent cannot stop the clock."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.errors import LinkClosed, LinkTimeout
 from tickrig.host.links.stamped_link import Stamped
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 CHUNK_US: Final = 1_000_000
 """How far the rig runs at once where there is no timeout."""

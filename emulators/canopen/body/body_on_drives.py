@@ -9,12 +9,12 @@ from typing import Final, NamedTuple
 
 from tickrig.device.body.wheeled_body import WheeledBody
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.core import NEVER
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.emulators.canopen.body.body_inputs import FrictionTouch, PoseTouch
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.touch import Touch
 from tickrig.host.cli.setting import Setting
+from tickrig.wire.instant import NEVER
 
 NAME: Final = "body"
 

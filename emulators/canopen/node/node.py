@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import NEVER, NonCopyable
+from tickrig.device.core import NonCopyable
 from tickrig.device.physical import Output
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
@@ -17,6 +17,7 @@ from tickrig.host.cli.setting import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 STATE_NAMES: Final = {
     NmtState.INITIALISING: "Initialising",

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Final
 
-from tickrig.device.core import NEVER
 from tickrig.device.rh3.base import LOOK_US, Rh3Base
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 USB_BAUD: Final = 12_000_000
 

@@ -15,7 +15,7 @@ from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import (
     FrameFields,
     parse_checksum,
@@ -25,6 +25,7 @@ from tickrig.host.monitor.transmit.pdo_words import PdoWords
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.output.transmitter import Transmitter

@@ -9,8 +9,7 @@ from tickrig.host.monitor.check.rule import Suspects
 from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.frames.ident import ERROR, ident_of, ident_text
 from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_error_class import describe as describe_error
+from tickrig.wire.can_error import ErrorFrame, describe_error_frame
 from tickrig.wire.canopen.emcy import Emcy, describe
 from tickrig.wire.canopen.sdo.abort import describe_abort
 from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand
@@ -105,7 +104,7 @@ class NoErrorFrames(FrameRule):
         """Say what failed."""
         frame = heard.frame
         assert isinstance(frame, ErrorFrame)
-        return describe_error(frame)
+        return describe_error_frame(frame)
 
 
 class Known(FrameRule):

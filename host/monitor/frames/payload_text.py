@@ -10,7 +10,7 @@ from tickrig.host.monitor.traffic.tally import IdRow
 REVERSE: Final = "\x1b[7m"
 PLAIN: Final = "\x1b[0m"
 
-NEVER: Final = "·"
+UNCHANGED: Final = "·"
 NOTCHED: Final = " "
 HEAT: Final = "▁▂▃▄▅▆▇█"
 """From a bit that changes seldom to one that changes with each frame."""
@@ -49,7 +49,7 @@ def _heats(changed: BitRow, frames: int) -> list[str]:
         if changed.notched >> bit & 1
         else _heat(count, frames)
         if shown >> bit & 1
-        else NEVER
+        else UNCHANGED
         for bit, count in enumerate(changed.counts())
     ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from enum import StrEnum
-from typing import Final, NamedTuple, assert_never
+from typing import NamedTuple, assert_never
 
 from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.steps import (
@@ -18,9 +18,7 @@ from tickrig.host.monitor.sequence.steps import (
     Wait,
 )
 from tickrig.wire.can import CanFrame, Frames
-
-NEVER: Final = 1 << 62
-"""When a sequence that has ended wants to be called."""
+from tickrig.wire.instant import NEVER
 
 
 class Mark(StrEnum):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tickrig.wire.can_error import ErrorFrame, ErrorState
-from tickrig.wire.can_error_class import (
+from tickrig.wire.can_error import (
     CONTROLLER_BYTE,
     REC_BYTE,
     TEC_BYTE,
     ControllerFlag,
     ErrorClass,
-    describe,
+    ErrorFrame,
+    ErrorState,
+    describe_error_frame,
 )
 
 OVERFLOW: Final = ControllerFlag.RECEIVE_OVERFLOW
@@ -53,7 +54,7 @@ class Controller:
     def take(self, frame: ErrorFrame) -> None:
         """Count an error frame."""
         self._frames += 1
-        kind = describe(frame)
+        kind = describe_error_frame(frame)
         self._kinds[kind] = self._kinds.get(kind, 0) + 1
         state = state_after(frame)
         self._state = self._state if state is None else state

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
 
 from tickrig.host.monitor.transmit.frame_fields import FrameFields
 from tickrig.wire.can import CanFrame, Frames
-
-NEVER: Final = 1 << 62
-"""When a frame that is done with is due."""
+from tickrig.wire.instant import NEVER
 
 
 @dataclass(slots=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import FrameFields
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 ONCE: Final = 0
 """As a period: a row that is sent when somebody says so."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc.execution.participant import Callback, Participant
 from tickrig.host.rtc.execution.states import ExecutionKind, LifeCycleState, ReturnCode
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.host.rtc.component import RtComponent

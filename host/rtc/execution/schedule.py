@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.ports.connector import Connector
+from tickrig.wire.instant import NEVER
 
 
 class Item(Protocol):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc.ports.connector_options import (
     ConnectorOptions,
     DataflowType,
@@ -16,6 +15,7 @@ from tickrig.host.rtc.ports.port_status import PortStatus
 from tickrig.host.rtc.ports.publisher import Publisher
 from tickrig.host.rtc.ports.ring_buffer import RingBuffer
 from tickrig.wire.errors import FieldError
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.cdr import decode, encode
 from tickrig.wire.rtc_types.idl import Struct
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final, Generic, TypeVar
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc.ports.connector_options import ConnectorOptions, PushPolicy, SubscriptionType
 from tickrig.host.rtc.ports.port_status import PortStatus
 from tickrig.host.rtc.ports.ring_buffer import RingBuffer
+from tickrig.wire.instant import NEVER
 
 T = TypeVar("T")
 

@@ -18,7 +18,6 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.telling import warnings_told
 from tickrig.host.cli.version import version_option
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import NEVER
 from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
     BusFailed,
@@ -28,6 +27,7 @@ from tickrig.host.rtc_canopen.commands.opening import (
     open_link,
     read_server,
 )
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.host.rtc_canopen.server import Server

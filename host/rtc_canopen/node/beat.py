@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.links.link import NEVER
+from tickrig.wire.instant import NEVER
 
 
 class Beat:

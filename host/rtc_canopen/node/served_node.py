@@ -7,7 +7,6 @@ from typing import Final, Protocol
 
 from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
 from tickrig.host.canopen.errors import SdoTimeout
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import EventKind
@@ -17,6 +16,7 @@ from tickrig.host.rtc_canopen.node.twin_watch import TwinWatch
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
+from tickrig.wire.instant import NEVER
 
 FOREIGN_RESET_US: Final = 1_000_000
 """A boot-up so soon after another master's reset is its doing."""

@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.links.link import NEVER
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.canopen.sdo.sdo import UploadInitiateResponse, parse_response
 from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
 
 NEARER: Final = 4
 """So many times nearer to one time than to the other is a heartbeat that belongs to it."""

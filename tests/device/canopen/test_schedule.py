@@ -7,7 +7,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 
 class First(Service):

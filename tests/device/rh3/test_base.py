@@ -5,9 +5,9 @@ from math import pi
 import pytest
 
 from tests.device.rh3.driven import M_S, Driven
-from tickrig.device.core import NEVER
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.rh3.terminals import OUTPUTS
+from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.rtu import encode_frame
 from tickrig.wire.rh3 import Command, Fault, Mode, Status
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
-from tickrig.device.core import NEVER
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.settings import Settings
+from tickrig.wire.instant import NEVER
 
 CAUSES = {
     "bus_noise": "CommunicationError",

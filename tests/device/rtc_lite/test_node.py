@@ -8,12 +8,12 @@ import pytest
 
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.core import NEVER
 from tickrig.device.physical import Input
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.ports import InPort, OutPort
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
 from tickrig.wire.rtc_lite.framing import Framing

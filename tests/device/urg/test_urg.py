@@ -6,10 +6,10 @@ from math import pi
 import pytest
 
 from tests.device.urg.measured import Measured
-from tickrig.device.core import NEVER
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.terminals import INPUTS, OUTPUTS
 from tickrig.device.urg.world import Post, Wall, World, room
+from tickrig.wire.instant import NEVER
 from tickrig.wire.scip.encoding import parse_number
 from tickrig.wire.scip.reply import Reply
 from tickrig.wire.scip.scan import parse_scan

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
+from tickrig.wire.instant import NEVER
 
 SWITCH = 0x101
 BURST = ("100#0102", "101#", "102#", "203#", "202#")

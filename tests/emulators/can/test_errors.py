@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.controller import CanController
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorState
+from tickrig.wire.instant import NEVER
 
 ACTIVE, PASSIVE, BUS_OFF = ErrorState.ACTIVE, ErrorState.PASSIVE, ErrorState.BUS_OFF
 

@@ -6,8 +6,8 @@ from math import log2
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.rig.agenda import Agenda
+from tickrig.wire.instant import NEVER
 
 
 def test_actions_run_by_time_and_then_by_entry() -> None:

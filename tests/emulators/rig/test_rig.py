@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from tests.emulators.can.can_bench import frames
 from tests.emulators.can.test_can_rig import Node
 from tests.emulators.echo import Echo
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 
 class SlowClock:

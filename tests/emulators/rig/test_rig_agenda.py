@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from tests.emulators.canopen.dimmer import Dimmer
 from tests.emulators.lamp import Lamp
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.core import NEVER
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.channels import CHANNELS
@@ -34,6 +33,7 @@ from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.replies import EventKind
 
 DESCRIPTION = read_eds(Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds")

@@ -4,10 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.emulators.echo import Echo
-from tickrig.device.core import NEVER
 from tickrig.emulators.rig.rig import Station
 from tickrig.emulators.rig.timetable import Timetable
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 
 def stations(count: int) -> list[Station[bytes]]:

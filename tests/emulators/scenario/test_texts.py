@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.record.byte_text import escape, unescape
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.host.cli.duration import format_time, parse_time_us
+from tickrig.wire.instant import NEVER
 
 
 @given(st.binary())

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 import serial
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.tap import Tap
 from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 pytestmark = pytest.mark.realtime
 

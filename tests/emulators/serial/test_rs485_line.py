@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.serial.rs485_line import Rs485Line
+from tickrig.wire.instant import NEVER
 
 
 def test_a_byte_arrives_at_all_others_when_its_stop_bit_has_passed() -> None:

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.core import NEVER
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.wire.instant import NEVER
 
 sends = st.lists(st.tuples(st.integers(0, 3_000), st.binary(max_size=30)), max_size=12)
 

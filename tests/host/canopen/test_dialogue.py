@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
 from tickrig.host.canopen.script import SDO_TIMEOUT_US, Await, Command, Pause, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
-from tickrig.host.links.link import NEVER
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.instant import NEVER
 
 Exchange = tuple[str, str]
 """What is sent, and the answer; an empty one where there is none."""

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.core import NEVER
 from tickrig.device.modbus.registers import Register, Registers
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.emulators.rig.faults import FaultyPort
@@ -14,6 +13,7 @@ from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.modbus.master import Answer, ModbusMaster
+from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.requests import (
     READ,
     READ_WRITE,

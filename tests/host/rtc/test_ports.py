@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc import InPort, OutPort, PortStatus, ReturnCode, RtcRefused, connect
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, Listener
 from tickrig.host.rtc.ports.ring_buffer import BufferOptions, FullPolicy, ReadPolicy, RingBuffer
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.basic import Time, TimedDouble, TimedLong
 
 OK = PortStatus.PORT_OK

@@ -7,9 +7,9 @@ import pytest
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc import Manager, RtcRefused
 from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
+from tickrig.wire.instant import NEVER
 
 AWAY_US = 3_500_000
 """Long enough for a device to be found lost and for its proxy to be removed."""

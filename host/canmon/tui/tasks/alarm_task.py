@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.canmon.tui.tasks.session import NEVER
 from tickrig.host.monitor.check.alarms import Alarms
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
 
 LOOK_US: Final = 100_000
 """How often it is seen whether something is missing."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import Meant
-from tickrig.host.canmon.tui.tasks.session import NEVER
 from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
@@ -16,6 +15,7 @@ from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
+from tickrig.wire.instant import NEVER
 
 Node = tuple[str, int]
 """Bus and node-ID."""

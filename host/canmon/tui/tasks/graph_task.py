@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tickrig.host.canmon.tui.tasks.model import Meant
-from tickrig.host.canmon.tui.tasks.session import NEVER
 from tickrig.host.monitor.graph.live_graph import LiveGraph
 from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
 
 
 class GraphTask:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import Meant
-from tickrig.host.canmon.tui.tasks.session import NEVER
 from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
 from tickrig.host.monitor.sequence.heard_condition import HeardCondition
 from tickrig.host.monitor.sequence.line_sequence import parse_lines
@@ -16,6 +15,7 @@ from tickrig.host.monitor.sequence.steps import Sequence as Steps
 from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.host.monitor.transmit.pdo_words import PdoWords
 from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
 
 KEPT: Final = 1_000
 """Notes that are kept."""

@@ -15,10 +15,9 @@ from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.monitor.decode.serial.heard_line import Listened
 from tickrig.host.monitor.frames.heard import Heard
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 POLL_US: Final = 20_000
-NEVER: Final = 1 << 62
-"""When a task that wants nothing is due."""
 
 Send = Callable[[CanFrame], None]
 """Sends a frame on one bus; SourceFailed if it cannot."""

@@ -5,8 +5,8 @@ import pytest
 from tests.device.canopen.pdo_bench import OFF, PdoBench, u8
 from tests.device.canopen.reference import R32, RW
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.instant import NEVER
 
 PRODUCER = 0x4000_0080
 

@@ -13,8 +13,8 @@ from tickrig.device.canopen.ds401.families import (
     READ_INPUT,
     DigitalObjects,
 )
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.instant import NEVER
 
 WIDTHS: list[tuple[str, DataType, int]] = [
     ("by_8", U8, 8),

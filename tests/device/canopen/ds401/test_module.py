@@ -8,7 +8,7 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 
 class Bench(Bus):

@@ -11,7 +11,7 @@ from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 REACHED = 0x0400
 BIT_12 = 0x1000

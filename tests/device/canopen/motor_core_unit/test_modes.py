@@ -21,7 +21,7 @@ from tests.device.canopen.motor_core_unit.bench import (
     UnitBench,
 )
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 ENCODER_DEG = 360 / 409_600
 """A count of the motor encoder, at the shaft."""

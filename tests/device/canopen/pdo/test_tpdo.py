@@ -8,8 +8,8 @@ from tests.device.canopen.reference import STR as NAME
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.core import NEVER
 from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.instant import NEVER
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import frames
-from tickrig.device.core import NEVER
 from tickrig.emulators.can.outside.without_echo import ECHO_US, WithoutEcho
 from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
 
 
 class Loop:

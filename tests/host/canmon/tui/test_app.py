@@ -27,7 +27,6 @@ from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.settings.bench import Bench
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
-from tickrig.host.canmon.tui.tasks.session import NEVER
 from tickrig.host.canmon.tui.widgets.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
@@ -35,6 +34,7 @@ from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter
 from tickrig.host.tui.line import line_text
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 
 @pytest.fixture

@@ -5,9 +5,10 @@ from hypothesis import strategies as st
 
 from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.sequence.line_sequence import parse_lines
-from tickrig.host.monitor.sequence.sequence_run import NEVER, Mark, SequenceRun
+from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
 from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 START = """
 [vars]

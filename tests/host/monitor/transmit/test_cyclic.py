@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.transmit.cyclic import NEVER, Cyclic
+from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_counter
 from tickrig.wire.can import CanFrame
+from tickrig.wire.instant import NEVER
 
 FRAME = CanFrame.parse("123#0000")
 

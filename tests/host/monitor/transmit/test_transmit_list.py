@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.monitor.transmit.cyclic import NEVER
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_counter
 from tickrig.host.monitor.transmit.transmit_list import TransmitList, TransmitRow
 from tickrig.wire.can import CanFrame
+from tickrig.wire.instant import NEVER
 
 SYNC = CanFrame.parse("080#")
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from tests.host.rtc.spy import OK, PERIOD_US, Bench, Spy
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc import ExecutionContext, ExecutionKind, LifeCycleState, ReturnCode
+from tickrig.wire.instant import NEVER
 
 REFUSED = ReturnCode.PRECONDITION_NOT_MET
 IMPOSSIBLE_HZ = [0.0, -1.0, 1_000_001.0, math.inf, math.nan]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tests.host.rtc.spy import Spy
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc import Manager
+from tickrig.wire.instant import NEVER
 
 
 class Item:

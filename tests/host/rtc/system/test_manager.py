@@ -4,7 +4,6 @@ import pytest
 
 from tests.host.rtc.chain import PERIOD_US, Chain, make_manager
 from tests.host.rtc.spy import ERROR, OK, Spy
-from tickrig.host.links.link import NEVER
 from tickrig.host.rtc import (
     ExecutionContext,
     InPort,
@@ -16,6 +15,7 @@ from tickrig.host.rtc import (
 )
 from tickrig.host.rtc.components import ConsoleIn, SeqIn, SeqOut
 from tickrig.host.rtc.system.name_service import NameService
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedLongSeq
 
 

@@ -19,7 +19,7 @@ from tests.device.canopen.ds402.wheel import (
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.ds402.modes.homing import index_pulse
 from tickrig.device.canopen.ds402.modes.homing_methods import METHODS
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 START, READY, HALT = 0x1F, 0x0F, 0x11F
 FAST_RPM, SLOW_RPM, OFFSET = 600, 60, 777

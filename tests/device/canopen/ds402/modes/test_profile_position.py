@@ -19,7 +19,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds402.motion.trapezoid import Limits
 from tickrig.device.canopen.models import epos
-from tickrig.device.core import NEVER
+from tickrig.wire.instant import NEVER
 
 VELOCITY, ACCELERATION, DECELERATION = 3_000, 20_000, 10_000
 LIMITS = Limits(VELOCITY * RPM, ACCELERATION * RPM, DECELERATION * RPM)

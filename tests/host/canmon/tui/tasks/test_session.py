@@ -10,10 +10,11 @@ from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.output.failure import SourceFailed
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
-from tickrig.host.canmon.tui.tasks.session import NEVER, Session
+from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.instant import NEVER
 
 
 class Echo:
