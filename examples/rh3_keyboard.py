@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from tickrig.emulators.rig.clock import RealClock
+from tickrig.host.control.clock import RealClock
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.options.game_pad import GamePad
 from tickrig.host.motion.options.switch_input import SwitchInput

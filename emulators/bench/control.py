@@ -8,10 +8,10 @@ from tickrig.emulators.bench.emulated import look_at
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.workbench import Workbench
-from tickrig.emulators.control.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.scenario.fault_spec import parse_fault_spec
 from tickrig.host.cli.setting import Setting
+from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.wire.instant import NEVER
 
 MAX_LINES: Final = 100
@@ -19,7 +19,7 @@ MAX_PRESS_US: Final = 10**15
 """As long as a command line can say."""
 
 
-class Control(Requests):
+class Control(RequestDispatcher):
     """Answers requests about one emulator.
 
     Args:

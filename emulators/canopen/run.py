@@ -20,13 +20,14 @@ from tickrig.emulators.canopen.build import Described, describe_nodes, make_node
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
-from tickrig.emulators.commands.run import EmulatorRun, RunOptions, say
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.record.frame_transcript import FrameTranscript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser, Send
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.telling import say
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import click
 
 from tickrig.emulators.commands.ctl_completion import buttons, complete, faults, seen, settable
-from tickrig.emulators.control.ask import ask
-from tickrig.emulators.control.requests import Object
+from tickrig.host.cli.control import ask
 from tickrig.host.cli.duration import format_time
 from tickrig.host.cli.duration_option import time_us
 from tickrig.host.cli.setting import parse_setting
+from tickrig.host.control.requests import Object
+
+EMULATOR: Final = "emulator"
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 
@@ -39,7 +41,7 @@ def ctl(context: click.Context, /, socket: str) -> None:
 @click.pass_obj
 def describe(socket: str, as_json: bool) -> None:
     """List inputs, groups, outputs and faults."""
-    _show(ask(socket, "describe"), _describe, as_json)
+    _show(ask(socket, EMULATOR, "describe"), _describe, as_json)
 
 
 @ctl.command()
@@ -49,7 +51,7 @@ def describe(socket: str, as_json: bool) -> None:
 def get(socket: str, names: tuple[str, ...], as_json: bool) -> None:
     """Show inputs and outputs by NAME, all if none is named."""
     fields = {"names": list(names)} if names else {}
-    _show(ask(socket, "get", **fields), _values, as_json)
+    _show(ask(socket, EMULATOR, "get", **fields), _values, as_json)
 
 
 @ctl.command("set", context_settings={"ignore_unknown_options": True})
@@ -60,7 +62,7 @@ def get(socket: str, names: tuple[str, ...], as_json: bool) -> None:
 def set_(socket: str, name: str, values: tuple[str, ...], as_json: bool) -> None:
     """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
     _show(
-        ask(socket, "set", name=name, value=[parse_setting(value) for value in values]),
+        ask(socket, EMULATOR, "set", name=name, value=[parse_setting(value) for value in values]),
         _nothing,
         as_json,
     )
@@ -74,7 +76,7 @@ def set_(socket: str, name: str, values: tuple[str, ...], as_json: bool) -> None
 def press(socket: str, name: str, duration: str, as_json: bool) -> None:
     """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
     duration_us = time_us("--for", duration)
-    _show(ask(socket, "press", name=name, duration_us=duration_us), _nothing, as_json)
+    _show(ask(socket, EMULATOR, "press", name=name, duration_us=duration_us), _nothing, as_json)
 
 
 @ctl.command()
@@ -83,7 +85,7 @@ def press(socket: str, name: str, duration: str, as_json: bool) -> None:
 @click.pass_obj
 def fault(socket: str, spec: str, as_json: bool) -> None:
     """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
-    _show(ask(socket, "fault", spec=spec), _nothing, as_json)
+    _show(ask(socket, EMULATOR, "fault", spec=spec), _nothing, as_json)
 
 
 @ctl.command()
@@ -92,7 +94,7 @@ def fault(socket: str, spec: str, as_json: bool) -> None:
 @click.pass_obj
 def clear(socket: str, name: str, as_json: bool) -> None:
     """Let the fault NAME go."""
-    _show(ask(socket, "clear", name=name), _nothing, as_json)
+    _show(ask(socket, EMULATOR, "clear", name=name), _nothing, as_json)
 
 
 @ctl.command()
@@ -101,7 +103,7 @@ def clear(socket: str, name: str, as_json: bool) -> None:
 @click.pass_obj
 def lines(socket: str, since: int, as_json: bool) -> None:
     """Show the latest lines on the wire, at most 100."""
-    _show(ask(socket, "lines", since=since), _lines, as_json)
+    _show(ask(socket, EMULATOR, "lines", since=since), _lines, as_json)
 
 
 @ctl.command()
@@ -109,7 +111,7 @@ def lines(socket: str, since: int, as_json: bool) -> None:
 @click.pass_obj
 def status(socket: str, as_json: bool) -> None:
     """Show how the run is going: time, late ticks, lost bytes, faults."""
-    _show(ask(socket, "status"), _status, as_json)
+    _show(ask(socket, EMULATOR, "status"), _status, as_json)
 
 
 @ctl.command()
@@ -117,7 +119,7 @@ def status(socket: str, as_json: bool) -> None:
 @click.pass_obj
 def stop(socket: str, as_json: bool) -> None:
     """End the emulator."""
-    _show(ask(socket, "stop"), _nothing, as_json)
+    _show(ask(socket, EMULATOR, "stop"), _nothing, as_json)
 
 
 def _show(answer: Object, words: Callable[[Any], list[str]], as_json: bool) -> None:

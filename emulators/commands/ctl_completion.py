@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 
 PATIENCE_S: Final = 1.0
 

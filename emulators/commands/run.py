@@ -9,18 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import click
-
 from tickrig.emulators.bench.control import Control
 from tickrig.emulators.bench.workbench import Workbench
-from tickrig.emulators.control.server import ControlServer
-from tickrig.emulators.control.serving_clock import ServingClock
-from tickrig.emulators.control.signals import stopped_by_signals
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
-from tickrig.host.cli.telling import warnings_told
+from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.host.cli.telling import say, warnings_told
+from tickrig.host.control.clock import ServingClock
 
 RECORDING_ENDED: Final = 3
 """Exit status where the recording is not whole."""
@@ -66,7 +63,8 @@ class EmulatorRun(ABC):
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
             stack.callback(bench.close)
-            self._serve_control(stack, bench)
+            if path := self._shared.control:
+                stack.enter_context(serving_control(path, Control(bench), self._clock))
             if self._in_real_time:
                 self._greet(bench)
                 sys.stdout.flush()
@@ -111,15 +109,6 @@ class EmulatorRun(ABC):
         except ValueError as error:
             raise Refused(str(error)) from None
 
-    def _serve_control(self, stack: ExitStack, bench: Workbench) -> None:
-        if path := self._shared.control:
-            try:
-                server = ControlServer(path, Control(bench))
-            except OSError as error:
-                refuse_path("control", error)
-            stack.callback(server.close)
-            self._clock.serve = server.serve
-
     def _go_on(self, bench: Workbench) -> None:
         """Step until somebody stops it."""
         while bench.running and not self._stopped:
@@ -143,11 +132,6 @@ class EmulatorRun(ABC):
             say(f"the recording ended early: {bench.trace_error}")
             return RECORDING_ENDED
         return 1 if player and player.missed else 0
-
-
-def say(text: str) -> None:
-    """Tell people; standard output is for programs."""
-    click.echo(text, err=True)
 
 
 def _read(scenario: Path | None) -> tuple[str, str]:

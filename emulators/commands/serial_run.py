@@ -13,7 +13,7 @@ import click
 from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.bench.workbench import Workbench
-from tickrig.emulators.commands.run import EmulatorRun, RunOptions, say
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.trace import Config, Header
 from tickrig.emulators.record.transcript import Transcript
@@ -22,6 +22,7 @@ from tickrig.emulators.scenario.scenario import Encoder, Line, ScenarioParser, S
 from tickrig.emulators.serial.emulator import Emulator, LineKind
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.telling import say
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

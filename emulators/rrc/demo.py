@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.requests import Object
 from tickrig.emulators.record.transcript import Transcript
 from tickrig.emulators.rrc.build import NAME
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.requests import Object
 
 SCENARIO = """
 0.5  press power_button

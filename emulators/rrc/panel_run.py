@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from typing import Final
 
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.inbox import Inbox
-from tickrig.emulators.control.requests import Object
+from tickrig.emulators.bench.inbox import Inbox
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.requests import Object
 
 SWITCH_S: Final = 0.000_2
 """How long the screen may keep the rig from running, a tick being 10 ms."""

@@ -8,10 +8,9 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.control.ask import refused_by
-from tickrig.emulators.control.client import ControlClient
-from tickrig.emulators.control.requests import Object
+from tickrig.host.cli.control import ask
 from tickrig.host.cli.options import PATH, Decorator
+from tickrig.host.control.requests import Object
 
 SYSTEM: Final = "system"
 VARIABLE: Final = "TICKRIG_RTC"
@@ -40,8 +39,7 @@ at: Final[Decorator] = click.option(
 
 def ask_system(socket: Path, do: str, /, **fields: object) -> Any:
     """Ask a running system and return its answer; Refused if it gives none, or an error."""
-    with refused_by(socket, SYSTEM), ControlClient(socket) as client:
-        return client.ask(do, **fields)
+    return ask(socket, SYSTEM, do, **fields)
 
 
 def components(socket: Path, *names: str) -> list[Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tickrig.emulators.control.requests import Object, Requests, short, text_of, whole
 from tickrig.emulators.rtc.descriptions import describe_component
 from tickrig.host.cli.user_file import told
+from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.rtc.configuration.configuration import Configuration
 from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.ports.literal import literal
@@ -19,7 +19,7 @@ from tickrig.host.rtc.system.system_toml import write_toml
 from tickrig.wire.instant import NEVER
 
 
-class SystemControl(Requests):
+class SystemControl(RequestDispatcher):
     """Answers requests about one system; it must not be ticking meanwhile.
 
     Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.emulators.control.requests import Object
+from tickrig.host.control.requests import Object
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.configuration.configuration import Configuration
 from tickrig.host.rtc.configuration.parameter import as_text

@@ -9,17 +9,15 @@ from pathlib import Path
 
 import click
 
-from tickrig.emulators.commands.run import say
-from tickrig.emulators.control.server import ControlServer
-from tickrig.emulators.control.serving_clock import ServingClock
-from tickrig.emulators.control.signals import stopped_by_signals
 from tickrig.emulators.rtc.console import Console
 from tickrig.emulators.rtc.control import SystemControl
 from tickrig.emulators.rtc.lite import attach_lite
 from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
-from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.cli.telling import warnings_told
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.host.cli.telling import say, warnings_told
 from tickrig.host.cli.user_file import find_class, told
+from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.execution.real_time import RealTime
@@ -92,12 +90,7 @@ def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
     runner = RealTime(manager, clock)
     control = SystemControl(manager, runner)
     stack.enter_context(stopped_by_signals(runner.stop))
-    try:
-        server = ControlServer(options.control, control)
-    except OSError as error:
-        refuse_path("control", error)
-    stack.callback(server.close)
-    clock.serve = server.serve
+    stack.enter_context(serving_control(options.control, control, clock))
     _run(manager, runner, options)
     if options.save is not None:
         write_system(control.saved(file_format(options.save)), options.save)

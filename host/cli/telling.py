@@ -1,9 +1,16 @@
-"""What the library warns of, told to the people at a command."""
+"""What is told to the people at a command, on standard error."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+import click
+
+
+def say(text: str) -> None:
+    """Tell people; standard output is for programs."""
+    click.echo(text, err=True)
 
 
 @contextmanager

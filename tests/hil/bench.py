@@ -18,10 +18,10 @@ from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.client import ControlClient
-from tickrig.emulators.control.requests import VERSION
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.client import ControlClient
+from tickrig.host.control.requests import VERSION
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.rrc.replies import EventKind, StatusA

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
-from tickrig.emulators.control.client import TIMEOUT_S
+from tickrig.host.control.client import TIMEOUT_S
 from tickrig.host.links.link import Link
 
 LATE_US: Final = 5_000

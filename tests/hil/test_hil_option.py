@@ -12,7 +12,7 @@ from pathlib import Path
 import pexpect
 import pytest
 
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 
 ROOT = Path(__file__).parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT / "src")}

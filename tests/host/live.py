@@ -15,10 +15,10 @@ from serial.rfc2217 import PortManager
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.requests import VERSION, Object
-from tickrig.emulators.rig.clock import RealClock
 from tickrig.emulators.serial.emulator import Emulator, Outside
 from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.host.control.clock import RealClock
+from tickrig.host.control.requests import VERSION, Object
 from tickrig.wire.instant import NEVER
 
 JOIN_S = 5.0

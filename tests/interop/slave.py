@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.interop.buses import Bus
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 
 EDS = Path(__file__).parents[1] / "golden" / "canopen" / "r1.eds"
 PROGRAM = "from tickrig.emulators.canopen.cli import main; main(prog_name='canopen-slave-emu')"

@@ -14,12 +14,12 @@ import click
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.picture import check_plot
-from tickrig.emulators.control.signals import stopped_by_signals
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.live_map import LiveMap
 from tickrig.emulators.rh3.cart.rides import PacedRide, SerialRide
 from tickrig.emulators.rh3.cart.track_map import WIDTH, TrackMap
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.motion.dead_reckoning import Wheels
 from tickrig.host.motion.drive import Ride, start, stop
 from tickrig.host.motion.geometry import Pose

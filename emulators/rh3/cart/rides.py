@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from tickrig.emulators.rig.clock import RealClock
+from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.drive import Ride

@@ -9,12 +9,12 @@ from typing import Final, Protocol
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.control.client import ControlClient
-from tickrig.emulators.rig.clock import RealClock
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rtc_lite.components import COMPONENTS
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.host.control.client import ControlClient
+from tickrig.host.control.clock import RealClock
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.execution.real_time import RealTime

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.requests import Requests
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.requests import RequestDispatcher
 
 
 @pytest.fixture
@@ -167,7 +167,7 @@ def test_a_line_is_json_in_utf_8(emulator: Emulator, line: bytes, error: str) ->
 
 def test_a_number_that_json_lacks_is_text() -> None:
     values: dict[str, object] = {"values": [float("nan"), float("inf"), -float("inf"), 1.5]}
-    requests = Requests({"get": (lambda request: values, ())})
+    requests = RequestDispatcher({"get": (lambda request: values, ())})
     answer = json.loads(requests.answer_line(b'{"v":1,"do":"get"}'))
     assert answer["values"] == ["nan", "inf", "-inf", 1.5]
 

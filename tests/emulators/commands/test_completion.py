@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import Control
 from tickrig.emulators.canopen.choices import MODELS
-from tickrig.emulators.control.server import ControlServer
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.cli.start import load
+from tickrig.host.control.server import ControlServer
 
 WIRE = "flip drop dup cut"
 MAINS = {

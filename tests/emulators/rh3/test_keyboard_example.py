@@ -12,7 +12,7 @@ import pexpect
 import pytest
 
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 
 pytestmark = pytest.mark.realtime
 

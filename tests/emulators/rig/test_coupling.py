@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.clock import RealClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.control.clock import RealClock
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 

@@ -8,8 +8,7 @@ import pytest
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.inbox import EmulatorEnded, Inbox
-from tickrig.emulators.control.requests import Object
+from tickrig.emulators.bench.inbox import EmulatorEnded, Inbox
 from tickrig.emulators.rrc import panel as rrc_panel
 from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel import HELP, RrcPanel
@@ -17,6 +16,7 @@ from tickrig.emulators.rrc.panel_picture import picture
 from tickrig.emulators.rrc.panel_run import run_panel
 from tickrig.emulators.rrc.panel_text import View
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.requests import Object
 
 Act = Callable[[RrcPanel, Emulator, Any], Awaitable[None]]
 

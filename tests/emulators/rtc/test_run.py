@@ -17,8 +17,8 @@ from click.testing import CliRunner
 
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.control.client import ControlClient
 from tickrig.emulators.rtc.at import default_path
+from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc.system.system_toml import parse_toml
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "rtc_chain.toml"

@@ -9,7 +9,7 @@ import serial
 
 from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.control.client import ControlClient
+from tickrig.host.control.client import ControlClient
 
 TIMEOUT_S = 5.0
 

@@ -10,8 +10,8 @@ import pytest
 
 from tests.host.rtc_lite.experiment import ALL, JOINTS
 from tickrig.emulators.bench.child import Child, running
-from tickrig.emulators.control.client import ControlClient
-from tickrig.emulators.rig.clock import RealClock
+from tickrig.host.control.client import ControlClient
+from tickrig.host.control.clock import RealClock
 from tickrig.host.links.reopening_link import ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, Manager

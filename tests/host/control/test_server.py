@@ -12,14 +12,14 @@ import pytest
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.server import (
+from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.control.server import (
     IDLE_S,
     MAX_CLIENTS,
     MAX_LINE,
     MAX_UNSENT,
     ControlServer,
 )
-from tickrig.emulators.serial.emulator import Emulator
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.control.requests import Requests, refusal_line
-from tickrig.emulators.control.unix_socket import listen_at
+from tickrig.host.control.requests import RequestDispatcher, refusal_line
+from tickrig.host.control.unix_socket import listen_at
 
 MAX_LINE: Final = 4_096
 MAX_CLIENTS: Final = 32
@@ -42,7 +42,7 @@ class ControlServer:
     """
 
     def __init__(
-        self, path: Path, control: Requests, clock: Callable[[], float] = time.monotonic
+        self, path: Path, control: RequestDispatcher, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._listener = listen_at(path)
         self._path, self._inode = path, path.stat().st_ino

@@ -1,4 +1,4 @@
-"""Requests to an emulator from another thread, served between its steps."""
+"""RequestDispatcher to an emulator from another thread, served between its steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.control.requests import Object
+from tickrig.host.control.requests import Object
 
 Answers = Future[list[Object]]
 

@@ -4,34 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.control.client import ControlClient
-from tickrig.emulators.control.requests import Object
 from tickrig.host.cli.refused import Refused
+from tickrig.host.control.client import ControlClient
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-EMULATOR: Final = "emulator"
-
 _NOBODY: Final = (FileNotFoundError, ConnectionRefusedError)
 
 
-def ask(socket: Path | str, do: str, /, **fields: object) -> Object:
-    """Ask an emulator and return its answer; Refused if it gives none, or an error."""
-    with refused_by(socket, EMULATOR), ControlClient(socket) as client:
+def ask(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
+    """Make one request and return its answer.
+
+    Args:
+        socket: the control socket.
+        whom: what is expected there, for people: `emulator`, `system`.
+        do: the verb of the request.
+        fields: of the request.
+
+    Raises:
+        Refused: nobody answers, or with an error.
+    """
+    with refused_by(socket, whom), ControlClient(socket) as client:
         return client.ask(do, **fields)
 
 
 @contextmanager
 def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
-    """Raise Refused in place of what a `ControlClient` raises.
-
-    Args:
-        socket: the control socket.
-        whom: what is expected there, for people.
-    """
+    """Raise Refused in place of what a `ControlClient` raises; arguments as those of `ask`."""
     try:
         yield
     except TimeoutError:

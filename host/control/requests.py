@@ -19,7 +19,7 @@ COMMON_FIELDS: Final = ("v", "do", "id")
 NOT_JSON: Final = "the line is not a JSON object"
 
 
-class Requests:
+class RequestDispatcher:
     """Answers requests by a table of verbs; a bad request changes nothing.
 
     Args:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.control.unix_socket import listen_at
+from tickrig.host.control.unix_socket import listen_at
 
 
 def test_of_many_that_begin_at_once_one_listens(tmp_path: Path) -> None:

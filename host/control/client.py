@@ -6,7 +6,7 @@ import json
 import socket
 from typing import TYPE_CHECKING, Final, Self
 
-from tickrig.emulators.control.requests import VERSION, Object
+from tickrig.host.control.requests import VERSION, Object
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,1 +1,0 @@
-"""The control socket, both ends (docs/control.md); not what can be asked."""

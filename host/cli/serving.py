@@ -1,0 +1,57 @@
+"""A command that runs until somebody stops it: by a signal, or over its control socket."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+from tickrig.host.cli.refused import refuse_path
+from tickrig.host.control.clock import ServingClock
+from tickrig.host.control.requests import RequestDispatcher
+from tickrig.host.control.server import ControlServer
+
+ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Let Ctrl-C, SIGTERM and a closed terminal call `stop` instead of ending the process."""
+
+    def received(number: int, frame: FrameType | None) -> None:
+        stop()
+
+    before = {number: signal.signal(number, received) for number in ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def serving_control(
+    path: Path, dispatcher: RequestDispatcher, clock: ServingClock
+) -> Iterator[None]:
+    """Serve a control socket whenever the clock waits.
+
+    Args:
+        path: of the socket.
+        dispatcher: answers the requests.
+        clock: what the run waits by.
+
+    Raises:
+        Refused: no socket can be made there.
+    """
+    try:
+        server = ControlServer(path, dispatcher)
+    except OSError as error:
+        refuse_path("control", error)
+    clock.serve = server.serve
+    try:
+        yield
+    finally:
+        server.close()

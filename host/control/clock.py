@@ -1,0 +1,49 @@
+"""The time of this machine, for what runs in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+
+class RealClock:
+    """The monotonic clock of this machine; it starts when it is first waited for."""
+
+    def __init__(self) -> None:
+        self._start_ns: int | None = None
+
+    @property
+    def now_us(self) -> int:
+        """Time since the first wait, 0 before it."""
+        if self._start_ns is None:
+            return 0
+        return (time.monotonic_ns() - self._start_ns) // 1_000
+
+    def wait_until(self, t_us: int, /) -> int:
+        """Sleep until `t_us`; a late rig catches up, it never skips a tick."""
+        if self._start_ns is None:
+            self._start_ns = time.monotonic_ns()
+        early_us = t_us - self.now_us
+        if early_us > 0:
+            time.sleep(early_us / 1e6)
+            return max(0, self.now_us - t_us)
+        return -early_us
+
+
+class ServingClock(RealClock):
+    """The monotonic clock of this machine; what it would sleep, it serves.
+
+    Attributes:
+        serve: called with the time in microseconds that it may take; at least
+            once for each wait, so that a run that is late can be stopped.
+    """
+
+    serve: Callable[[int], None] | None = None
+
+    def wait_until(self, t_us: int, /) -> int:
+        """Serve, then sleep until `t_us`."""
+        if self.serve is not None:
+            self.serve(0)
+            while (early_us := t_us - self.now_us) > 0 and self.now_us:
+                self.serve(early_us)
+        return super().wait_until(t_us)
