@@ -1,39 +1,32 @@
-# ruff: noqa: N815, RUF009 - names as in the IDL, defaults are frozen
+# ruff: noqa: N815 - names as in the IDL, defaults are frozen
 """InterfaceDataTypes.idl of OpenRTM-aist 1.x: actuator arrays, grippers, limbs, pan-tilt units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Stamped
 from tickrig.wire.rtc_types.extended_3d import OAP, Geometry3D, Orientation3D, Vector3D
 from tickrig.wire.rtc_types.idl import Boolean, Double, Struct, UShort
 
 
-@dataclass(frozen=True, slots=True)
-class ActArrayActuatorPos(Struct):
+class ActArrayActuatorPos(Stamped):
     """Position of an actuator, in m or rad."""
 
-    tm: Time = Time()
     index: UShort = 0
     position: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class ActArrayActuatorSpeed(Struct):
+class ActArrayActuatorSpeed(Stamped):
     """Speed of an actuator, in m/s or rad/s."""
 
-    tm: Time = Time()
     index: UShort = 0
     speed: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class ActArrayActuatorCurrent(Struct):
+class ActArrayActuatorCurrent(Stamped):
     """Current of an actuator, in A."""
 
-    tm: Time = Time()
     index: UShort = 0
     current: Double = 0.0
 
@@ -47,7 +40,6 @@ class ActArrayActuatorStatus(IntEnum):
     ACTUATOR_STATUS_STALLED = 3
 
 
-@dataclass(frozen=True, slots=True)
 class Actuator(Struct):
     """State of an actuator: m or rad, per s, per s^2, A."""
 
@@ -58,11 +50,9 @@ class Actuator(Struct):
     status: ActArrayActuatorStatus = ActArrayActuatorStatus.ACTUATOR_STATUS_IDLE
 
 
-@dataclass(frozen=True, slots=True)
-class ActArrayState(Struct):
+class ActArrayState(Stamped):
     """State of all actuators of an array."""
 
-    tm: Time = Time()
     actuators: tuple[Actuator, ...] = ()
 
 
@@ -73,7 +63,6 @@ class ActArrayActuatorType(IntEnum):
     ACTARRAY_ACTUATORTYPE_ROTARY = 1
 
 
-@dataclass(frozen=True, slots=True)
 class ActArrayActuatorGeometry(Struct):
     """Geometry of an actuator and the link to the next one."""
 
@@ -88,7 +77,6 @@ class ActArrayActuatorGeometry(Struct):
     hasBrakes: Boolean = False
 
 
-@dataclass(frozen=True, slots=True)
 class ActArrayGeometry(Struct):
     """Geometry of an array of actuators."""
 
@@ -105,15 +93,12 @@ class GripperStatus(IntEnum):
     GRIPPER_STATE_UNKNOWN = 3
 
 
-@dataclass(frozen=True, slots=True)
-class GripperState(Struct):
+class GripperState(Stamped):
     """State of a gripper."""
 
-    tm: Time = Time()
     status: GripperStatus = GripperStatus.GRIPPER_STATE_OPEN
 
 
-@dataclass(frozen=True, slots=True)
 class GripperGeometry(Struct):
     """Geometry of an open gripper."""
 
@@ -131,29 +116,23 @@ class LimbStatus(IntEnum):
     LIMB_STATUS_COLLISION = 4
 
 
-@dataclass(frozen=True, slots=True)
-class LimbState(Struct):
+class LimbState(Stamped):
     """State of a limb and its end effector."""
 
-    tm: Time = Time()
     oapMatrix: OAP = OAP()
     status: LimbStatus = LimbStatus.LIMB_STATUS_IDLE
 
 
-@dataclass(frozen=True, slots=True)
-class PanTiltAngles(Struct):
+class PanTiltAngles(Stamped):
     """Angles of a pan-tilt unit, in rad."""
 
-    tm: Time = Time()
     pan: Double = 0.0
     tilt: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class PanTiltState(Struct):
+class PanTiltState(Stamped):
     """Angles and speeds of a pan-tilt unit, in rad and rad/s."""
 
-    tm: Time = Time()
     angles: PanTiltAngles = PanTiltAngles()
     panSpeed: Double = 0.0
     tiltSpeed: Double = 0.0

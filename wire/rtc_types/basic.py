@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, Generic, TypeVar
 
 from tickrig.wire.rtc_types.idl import (
     Boolean,
@@ -22,10 +21,12 @@ from tickrig.wire.rtc_types.idl import (
     WString,
 )
 
+D = TypeVar("D")
+
 _US: Final = 1_000_000
+_ZERO: Final[Any] = None  # the metaclass puts that of the type in its place
 
 
-@dataclass(frozen=True, slots=True)
 class Time(Struct):
     """A time stamp in seconds and nanoseconds."""
 
@@ -43,201 +44,113 @@ class Time(Struct):
         return self.sec * _US + self.nsec // 1_000
 
 
-@dataclass(frozen=True, slots=True)
-class TimedState(Struct):
+class Stamped(Struct):
+    """A struct that begins with its time."""
+
+    tm: Time = Time()
+
+
+class Timed(Stamped, Generic[D]):
+    """A time and one value, of the type in brackets."""
+
+    data: D = _ZERO
+
+
+class TimedState(Timed[Short]):
     """A state (IDL: short), with its time."""
 
-    tm: Time = Time()
-    data: Short = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedShort(Struct):
+class TimedShort(Timed[Short]):
     """A short, with its time."""
 
-    tm: Time = Time()
-    data: Short = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedLong(Struct):
+class TimedLong(Timed[Long]):
     """A long, with its time."""
 
-    tm: Time = Time()
-    data: Long = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedUShort(Struct):
+class TimedUShort(Timed[UShort]):
     """An unsigned short, with its time."""
 
-    tm: Time = Time()
-    data: UShort = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedULong(Struct):
+class TimedULong(Timed[ULong]):
     """An unsigned long, with its time."""
 
-    tm: Time = Time()
-    data: ULong = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedFloat(Struct):
+class TimedFloat(Timed[Float]):
     """A float, with its time."""
 
-    tm: Time = Time()
-    data: Float = 0.0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedDouble(Struct):
+class TimedDouble(Timed[Double]):
     """A double, with its time."""
 
-    tm: Time = Time()
-    data: Double = 0.0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedChar(Struct):
+class TimedChar(Timed[Char]):
     """A char, with its time."""
 
-    tm: Time = Time()
-    data: Char = "\0"
 
-
-@dataclass(frozen=True, slots=True)
-class TimedWChar(Struct):
+class TimedWChar(Timed[WChar]):
     """A wchar, with its time."""
 
-    tm: Time = Time()
-    data: WChar = "\0"
 
-
-@dataclass(frozen=True, slots=True)
-class TimedBoolean(Struct):
+class TimedBoolean(Timed[Boolean]):
     """A boolean, with its time."""
 
-    tm: Time = Time()
-    data: Boolean = False
 
-
-@dataclass(frozen=True, slots=True)
-class TimedOctet(Struct):
+class TimedOctet(Timed[Octet]):
     """An octet, with its time."""
 
-    tm: Time = Time()
-    data: Octet = 0
 
-
-@dataclass(frozen=True, slots=True)
-class TimedString(Struct):
+class TimedString(Timed[String]):
     """A string, with its time."""
 
-    tm: Time = Time()
-    data: String = ""
 
-
-@dataclass(frozen=True, slots=True)
-class TimedWString(Struct):
+class TimedWString(Timed[WString]):
     """A wstring, with its time."""
 
-    tm: Time = Time()
-    data: WString = ""
 
-
-@dataclass(frozen=True, slots=True)
-class TimedShortSeq(Struct):
+class TimedShortSeq(Timed[tuple[Short, ...]]):
     """A sequence of short, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Short, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedLongSeq(Struct):
+class TimedLongSeq(Timed[tuple[Long, ...]]):
     """A sequence of long, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Long, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedUShortSeq(Struct):
+class TimedUShortSeq(Timed[tuple[UShort, ...]]):
     """A sequence of unsigned short, with its time."""
 
-    tm: Time = Time()
-    data: tuple[UShort, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedULongSeq(Struct):
+class TimedULongSeq(Timed[tuple[ULong, ...]]):
     """A sequence of unsigned long, with its time."""
 
-    tm: Time = Time()
-    data: tuple[ULong, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedFloatSeq(Struct):
+class TimedFloatSeq(Timed[tuple[Float, ...]]):
     """A sequence of float, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Float, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedDoubleSeq(Struct):
+class TimedDoubleSeq(Timed[tuple[Double, ...]]):
     """A sequence of double, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Double, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedCharSeq(Struct):
+class TimedCharSeq(Timed[tuple[Char, ...]]):
     """A sequence of char, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Char, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedWCharSeq(Struct):
+class TimedWCharSeq(Timed[tuple[WChar, ...]]):
     """A sequence of wchar, with its time."""
 
-    tm: Time = Time()
-    data: tuple[WChar, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedBooleanSeq(Struct):
+class TimedBooleanSeq(Timed[tuple[Boolean, ...]]):
     """A sequence of boolean, with its time."""
 
-    tm: Time = Time()
-    data: tuple[Boolean, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedOctetSeq(Struct):
+class TimedOctetSeq(Timed[OctetSeq]):
     """A sequence of octet, with its time."""
 
-    tm: Time = Time()
-    data: OctetSeq = b""
 
-
-@dataclass(frozen=True, slots=True)
-class TimedStringSeq(Struct):
+class TimedStringSeq(Timed[tuple[String, ...]]):
     """A sequence of string, with its time."""
 
-    tm: Time = Time()
-    data: tuple[String, ...] = ()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedWStringSeq(Struct):
+class TimedWStringSeq(Timed[tuple[WString, ...]]):
     """A sequence of wstring, with its time."""
-
-    tm: Time = Time()
-    data: tuple[WString, ...] = ()

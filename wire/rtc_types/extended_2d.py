@@ -1,15 +1,12 @@
-# ruff: noqa: E741, N815, RUF009 - names as in the IDL, defaults are frozen
+# ruff: noqa: E741, N815 - names as in the IDL, defaults are frozen
 """ExtendedDataTypes.idl of OpenRTM-aist 1.x, in the plane, and the colour: m, rad."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Timed
 from tickrig.wire.rtc_types.idl import Double, Struct
 
 
-@dataclass(frozen=True, slots=True)
 class RGBColour(Struct):
     """A colour, each part 0.0..1.0."""
 
@@ -18,7 +15,6 @@ class RGBColour(Struct):
     b: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Point2D(Struct):
     """A point in the plane, in m."""
 
@@ -26,7 +22,6 @@ class Point2D(Struct):
     y: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Vector2D(Struct):
     """A vector in the plane, in m."""
 
@@ -34,7 +29,6 @@ class Vector2D(Struct):
     y: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Pose2D(Struct):
     """A pose in the plane: m, rad."""
 
@@ -42,7 +36,6 @@ class Pose2D(Struct):
     heading: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Velocity2D(Struct):
     """A velocity in the plane: m/s, m/s, rad/s."""
 
@@ -51,7 +44,6 @@ class Velocity2D(Struct):
     va: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Acceleration2D(Struct):
     """An acceleration in the plane, in m/s^2."""
 
@@ -59,7 +51,6 @@ class Acceleration2D(Struct):
     ay: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class PoseVel2D(Struct):
     """A pose and a velocity in the plane."""
 
@@ -67,7 +58,6 @@ class PoseVel2D(Struct):
     velocities: Velocity2D = Velocity2D()
 
 
-@dataclass(frozen=True, slots=True)
 class Size2D(Struct):
     """A size in the plane, in m."""
 
@@ -75,7 +65,6 @@ class Size2D(Struct):
     w: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Geometry2D(Struct):
     """Where a device stands on its parent, and its size."""
 
@@ -83,7 +72,6 @@ class Geometry2D(Struct):
     size: Size2D = Size2D()
 
 
-@dataclass(frozen=True, slots=True)
 class Covariance2D(Struct):
     """The upper half of the covariance matrix of a pose."""
 
@@ -95,7 +83,6 @@ class Covariance2D(Struct):
     tt: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class PointCovariance2D(Struct):
     """The upper half of the covariance matrix of a point."""
 
@@ -104,7 +91,6 @@ class PointCovariance2D(Struct):
     yy: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Carlike(Struct):
     """A command for a car: m/s, rad."""
 
@@ -112,7 +98,6 @@ class Carlike(Struct):
     steeringAngle: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class SpeedHeading2D(Struct):
     """A speed and its direction: m/s, rad."""
 
@@ -120,105 +105,53 @@ class SpeedHeading2D(Struct):
     heading: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class TimedRGBColour(Struct):
+class TimedRGBColour(Timed[RGBColour]):
     """RGBColour, with its time."""
 
-    tm: Time = Time()
-    data: RGBColour = RGBColour()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPoint2D(Struct):
+class TimedPoint2D(Timed[Point2D]):
     """Point2D, with its time."""
 
-    tm: Time = Time()
-    data: Point2D = Point2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedVector2D(Struct):
+class TimedVector2D(Timed[Vector2D]):
     """Vector2D, with its time."""
 
-    tm: Time = Time()
-    data: Vector2D = Vector2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPose2D(Struct):
+class TimedPose2D(Timed[Pose2D]):
     """Pose2D, with its time."""
 
-    tm: Time = Time()
-    data: Pose2D = Pose2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedVelocity2D(Struct):
+class TimedVelocity2D(Timed[Velocity2D]):
     """Velocity2D, with its time."""
 
-    tm: Time = Time()
-    data: Velocity2D = Velocity2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedAcceleration2D(Struct):
+class TimedAcceleration2D(Timed[Acceleration2D]):
     """Acceleration2D, with its time."""
 
-    tm: Time = Time()
-    data: Acceleration2D = Acceleration2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPoseVel2D(Struct):
+class TimedPoseVel2D(Timed[PoseVel2D]):
     """PoseVel2D, with its time."""
 
-    tm: Time = Time()
-    data: PoseVel2D = PoseVel2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedSize2D(Struct):
+class TimedSize2D(Timed[Size2D]):
     """Size2D, with its time."""
 
-    tm: Time = Time()
-    data: Size2D = Size2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedGeometry2D(Struct):
+class TimedGeometry2D(Timed[Geometry2D]):
     """Geometry2D, with its time."""
 
-    tm: Time = Time()
-    data: Geometry2D = Geometry2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedCovariance2D(Struct):
+class TimedCovariance2D(Timed[Covariance2D]):
     """Covariance2D, with its time."""
 
-    tm: Time = Time()
-    data: Covariance2D = Covariance2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPointCovariance2D(Struct):
+class TimedPointCovariance2D(Timed[PointCovariance2D]):
     """PointCovariance2D, with its time."""
 
-    tm: Time = Time()
-    data: PointCovariance2D = PointCovariance2D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedCarlike(Struct):
+class TimedCarlike(Timed[Carlike]):
     """Carlike, with its time."""
 
-    tm: Time = Time()
-    data: Carlike = Carlike()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedSpeedHeading2D(Struct):
+class TimedSpeedHeading2D(Timed[SpeedHeading2D]):
     """SpeedHeading2D, with its time."""
-
-    tm: Time = Time()
-    data: SpeedHeading2D = SpeedHeading2D()

@@ -1,15 +1,12 @@
-# ruff: noqa: E741, RUF009 - names as in the IDL, defaults are frozen
+# ruff: noqa: E741 - names as in the IDL, defaults are frozen
 """ExtendedDataTypes.idl of OpenRTM-aist 1.x, in space. Lengths in m, angles in rad."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Timed
 from tickrig.wire.rtc_types.idl import Double, Struct
 
 
-@dataclass(frozen=True, slots=True)
 class Point3D(Struct):
     """A point in space, in m."""
 
@@ -18,7 +15,6 @@ class Point3D(Struct):
     z: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Vector3D(Struct):
     """A vector in space, in m."""
 
@@ -27,7 +23,6 @@ class Vector3D(Struct):
     z: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Orientation3D(Struct):
     """Roll, pitch and yaw in rad."""
 
@@ -36,7 +31,6 @@ class Orientation3D(Struct):
     y: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Pose3D(Struct):
     """A pose in space."""
 
@@ -44,7 +38,6 @@ class Pose3D(Struct):
     orientation: Orientation3D = Orientation3D()
 
 
-@dataclass(frozen=True, slots=True)
 class Velocity3D(Struct):
     """A velocity in space: m/s, then roll, pitch and yaw in rad/s."""
 
@@ -56,7 +49,6 @@ class Velocity3D(Struct):
     va: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class AngularVelocity3D(Struct):
     """An angular velocity in rad/s."""
 
@@ -65,7 +57,6 @@ class AngularVelocity3D(Struct):
     avz: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Acceleration3D(Struct):
     """An acceleration in space, in m/s^2."""
 
@@ -74,7 +65,6 @@ class Acceleration3D(Struct):
     az: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class AngularAcceleration3D(Struct):
     """An angular acceleration in rad/s^2."""
 
@@ -83,7 +73,6 @@ class AngularAcceleration3D(Struct):
     aaz: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class PoseVel3D(Struct):
     """A pose and a velocity in space."""
 
@@ -91,7 +80,6 @@ class PoseVel3D(Struct):
     velocities: Velocity3D = Velocity3D()
 
 
-@dataclass(frozen=True, slots=True)
 class Size3D(Struct):
     """A size in space, in m."""
 
@@ -100,7 +88,6 @@ class Size3D(Struct):
     h: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class Geometry3D(Struct):
     """Where a device stands on its parent, and its size."""
 
@@ -108,7 +95,6 @@ class Geometry3D(Struct):
     size: Size3D = Size3D()
 
 
-@dataclass(frozen=True, slots=True)
 class Covariance3D(Struct):
     """The upper half of the covariance matrix of a pose."""
 
@@ -135,7 +121,6 @@ class Covariance3D(Struct):
     aa: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class SpeedHeading3D(Struct):
     """A speed in m/s and its direction."""
 
@@ -143,7 +128,6 @@ class SpeedHeading3D(Struct):
     direction: Orientation3D = Orientation3D()
 
 
-@dataclass(frozen=True, slots=True)
 class OAP(Struct):
     """Orientation, approach and position of an end effector."""
 
@@ -152,7 +136,6 @@ class OAP(Struct):
     position: Vector3D = Vector3D()
 
 
-@dataclass(frozen=True, slots=True)
 class Quaternion(Struct):
     """A rotation."""
 
@@ -162,121 +145,61 @@ class Quaternion(Struct):
     w: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class TimedPoint3D(Struct):
+class TimedPoint3D(Timed[Point3D]):
     """Point3D, with its time."""
 
-    tm: Time = Time()
-    data: Point3D = Point3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedVector3D(Struct):
+class TimedVector3D(Timed[Vector3D]):
     """Vector3D, with its time."""
 
-    tm: Time = Time()
-    data: Vector3D = Vector3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedOrientation3D(Struct):
+class TimedOrientation3D(Timed[Orientation3D]):
     """Orientation3D, with its time."""
 
-    tm: Time = Time()
-    data: Orientation3D = Orientation3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPose3D(Struct):
+class TimedPose3D(Timed[Pose3D]):
     """Pose3D, with its time."""
 
-    tm: Time = Time()
-    data: Pose3D = Pose3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedVelocity3D(Struct):
+class TimedVelocity3D(Timed[Velocity3D]):
     """Velocity3D, with its time."""
 
-    tm: Time = Time()
-    data: Velocity3D = Velocity3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedAngularVelocity3D(Struct):
+class TimedAngularVelocity3D(Timed[AngularVelocity3D]):
     """AngularVelocity3D, with its time."""
 
-    tm: Time = Time()
-    data: AngularVelocity3D = AngularVelocity3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedAcceleration3D(Struct):
+class TimedAcceleration3D(Timed[Acceleration3D]):
     """Acceleration3D, with its time."""
 
-    tm: Time = Time()
-    data: Acceleration3D = Acceleration3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedAngularAcceleration3D(Struct):
+class TimedAngularAcceleration3D(Timed[AngularAcceleration3D]):
     """AngularAcceleration3D, with its time."""
 
-    tm: Time = Time()
-    data: AngularAcceleration3D = AngularAcceleration3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedPoseVel3D(Struct):
+class TimedPoseVel3D(Timed[PoseVel3D]):
     """PoseVel3D, with its time."""
 
-    tm: Time = Time()
-    data: PoseVel3D = PoseVel3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedSize3D(Struct):
+class TimedSize3D(Timed[Size3D]):
     """Size3D, with its time."""
 
-    tm: Time = Time()
-    data: Size3D = Size3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedGeometry3D(Struct):
+class TimedGeometry3D(Timed[Geometry3D]):
     """Geometry3D, with its time."""
 
-    tm: Time = Time()
-    data: Geometry3D = Geometry3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedCovariance3D(Struct):
+class TimedCovariance3D(Timed[Covariance3D]):
     """Covariance3D, with its time."""
 
-    tm: Time = Time()
-    data: Covariance3D = Covariance3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedSpeedHeading3D(Struct):
+class TimedSpeedHeading3D(Timed[SpeedHeading3D]):
     """SpeedHeading3D, with its time."""
 
-    tm: Time = Time()
-    data: SpeedHeading3D = SpeedHeading3D()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedOAP(Struct):
+class TimedOAP(Timed[OAP]):
     """OAP, with its time."""
 
-    tm: Time = Time()
-    data: OAP = OAP()
 
-
-@dataclass(frozen=True, slots=True)
-class TimedQuaternion(Struct):
+class TimedQuaternion(Timed[Quaternion]):
     """Quaternion, with its time."""
-
-    tm: Time = Time()
-    data: Quaternion = Quaternion()

@@ -1,13 +1,20 @@
 """IDL types as Python annotations (OMG IDL to CDR, CORBA 3.0, chapter 15).
 
-A struct is a frozen dataclass whose fields carry these annotations, in the
-order of the IDL file; sequences are tuples, sequences of octets bytes.
+A struct is a class whose fields carry these annotations, in the order of the
+IDL file; sequences are tuples, sequences of octets bytes.
+
+>>> class Speeds(Struct):
+...     left: Double = 0.0
+...     right: Double = 0.0
+>>> Speeds(0.5), Speeds.idl_id()
+(Speeds(left=0.5, right=0.0), 'IDL:RTC/Speeds:1.0')
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar, Final, cast, dataclass_transform, get_args, get_origin
 
 
 class Primitive(Enum):
@@ -46,15 +53,48 @@ String = Annotated[str, Primitive.STRING]
 WString = Annotated[str, Primitive.WSTRING]
 OctetSeq = Annotated[bytes, Primitive.OCTET_SEQ]
 
+_ZEROS: Final[dict[object, object]] = {
+    **{bool: False, int: 0, float: 0.0, str: "", bytes: b""},
+    **{Char: "\0", WChar: "\0"},
+}
 
-class Struct:
-    """A struct of an IDL file; its subclasses are frozen dataclasses.
+
+@dataclass_transform(frozen_default=True)
+class _StructType(type):
+    """Makes a frozen dataclass with slots of each struct.
+
+    A struct made of a generic one, as `Timed[Short]`, has that type in the place of its
+    field `data`, with zero as the default.
+    """
+
+    def __new__(mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> _StructType:
+        made: Any = super().__new__(mcs, name, bases, namespace)
+        if "__slots__" in namespace:  # Struct itself, and what dataclass() makes of a struct
+            return cast(_StructType, made)
+        for base in namespace.get("__orig_bases__", ()):
+            if isinstance(get_origin(base), _StructType):
+                (payload,) = get_args(base)
+                made.__annotations__["data"], made.data = payload, _zero(payload)
+        return cast(_StructType, dataclass(frozen=True, slots=True)(made))
+
+
+def _zero(hint: Any) -> object:
+    """Return the default of a field with this annotation."""
+    if get_origin(hint) is tuple:
+        return ()
+    if get_origin(hint) is Annotated:
+        return _ZEROS.get(hint, _ZEROS[get_args(hint)[0]])
+    return hint()
+
+
+class Struct(metaclass=_StructType):
+    """A struct of an IDL file: a frozen dataclass that can be made without arguments.
 
     Values are not checked until they are encoded.
 
     Attributes:
         idl_module: the IDL module the struct stands in.
-        __match_args__: names of the fields, which the dataclass sets.
+        __match_args__: names of the fields, in the order of the IDL file.
     """
 
     __slots__ = ()

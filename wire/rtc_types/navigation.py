@@ -1,11 +1,9 @@
-# ruff: noqa: N815, RUF009 - names as in the IDL, defaults are frozen
+# ruff: noqa: N815 - names as in the IDL, defaults are frozen
 """InterfaceDataTypes.idl of OpenRTM-aist 1.x: localisation, maps, paths."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Stamped, Time
 from tickrig.wire.rtc_types.extended_2d import (
     Covariance2D,
     Point2D,
@@ -17,7 +15,6 @@ from tickrig.wire.rtc_types.extended_3d import Covariance3D, Pose3D, Velocity3D
 from tickrig.wire.rtc_types.idl import Boolean, Double, OctetSeq, Struct, ULong
 
 
-@dataclass(frozen=True, slots=True)
 class Hypothesis2D(Struct):
     """Where a robot may be in the plane."""
 
@@ -26,15 +23,12 @@ class Hypothesis2D(Struct):
     weight: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Hypotheses2D(Struct):
+class Hypotheses2D(Stamped):
     """All places where a robot may be in the plane."""
 
-    tm: Time = Time()
     hypotheses: tuple[Hypothesis2D, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Hypothesis3D(Struct):
     """Where a robot may be in space."""
 
@@ -43,15 +37,12 @@ class Hypothesis3D(Struct):
     weight: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Hypotheses3D(Struct):
+class Hypotheses3D(Stamped):
     """All places where a robot may be in space."""
 
-    tm: Time = Time()
     hypotheses: tuple[Hypothesis3D, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class OGMapConfig(Struct):
     """Scale in m per cell, size and origin of an occupancy grid map."""
 
@@ -62,7 +53,6 @@ class OGMapConfig(Struct):
     origin: Pose2D = Pose2D()
 
 
-@dataclass(frozen=True, slots=True)
 class OGMapTile(Struct):
     """Part of an occupancy grid map, row by row."""
 
@@ -73,7 +63,6 @@ class OGMapTile(Struct):
     cells: OctetSeq = b""
 
 
-@dataclass(frozen=True, slots=True)
 class PointFeature(Struct):
     """A point on a map."""
 
@@ -82,7 +71,6 @@ class PointFeature(Struct):
     covariance: PointCovariance2D = PointCovariance2D()
 
 
-@dataclass(frozen=True, slots=True)
 class PoseFeature(Struct):
     """A point with a direction on a map."""
 
@@ -91,7 +79,6 @@ class PoseFeature(Struct):
     covariance: Covariance2D = Covariance2D()
 
 
-@dataclass(frozen=True, slots=True)
 class LineFeature(Struct):
     """A line on a map: rho in m, alpha in rad."""
 
@@ -105,17 +92,14 @@ class LineFeature(Struct):
     endSighted: Boolean = False
 
 
-@dataclass(frozen=True, slots=True)
-class Features(Struct):
+class Features(Stamped):
     """All features of a map."""
 
-    tm: Time = Time()
     pointFeatures: tuple[PointFeature, ...] = ()
     poseFeatures: tuple[PoseFeature, ...] = ()
     lineFeatures: tuple[LineFeature, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Waypoint2D(Struct):
     """A way point in the plane: m, rad."""
 
@@ -126,15 +110,12 @@ class Waypoint2D(Struct):
     maxSpeed: Velocity2D = Velocity2D()
 
 
-@dataclass(frozen=True, slots=True)
-class Path2D(Struct):
+class Path2D(Stamped):
     """A path in the plane."""
 
-    tm: Time = Time()
     waypoints: tuple[Waypoint2D, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class Waypoint3D(Struct):
     """A way point in space: m, rad."""
 
@@ -145,9 +126,7 @@ class Waypoint3D(Struct):
     maxSpeed: Velocity3D = Velocity3D()
 
 
-@dataclass(frozen=True, slots=True)
-class Path3D(Struct):
+class Path3D(Stamped):
     """A path in space."""
 
-    tm: Time = Time()
     waypoints: tuple[Waypoint3D, ...] = ()

@@ -1,13 +1,11 @@
-# ruff: noqa: RUF009 - defaults are frozen
 """Types of the reference hardware's own components (RH3 functional specification, data types)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar
 
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Time, Timed
 from tickrig.wire.rtc_types.idl import Double, Long, Short, Struct
 
 
@@ -36,17 +34,12 @@ class RunMode(IntEnum):
     WHEEL_VEL = 7
 
 
-@dataclass(frozen=True, slots=True)
-class TimedState(Struct):
+class TimedState(Timed[Long]):
     """A navigation's state; OpenRTM's own TimedState has a short."""
 
     idl_module: ClassVar[str] = "RH"
 
-    tm: Time = Time()
-    data: Long = 0
 
-
-@dataclass(frozen=True, slots=True)
 class Path(Struct):
     """One relay point for the follower; `coordinate` and `r` are unused but for circles."""
 

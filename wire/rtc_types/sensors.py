@@ -1,12 +1,11 @@
-# ruff: noqa: N815, RUF009 - names as in the IDL, defaults are frozen
+# ruff: noqa: N815 - names as in the IDL, defaults are frozen
 """InterfaceDataTypes.idl of OpenRTM-aist 1.x: cameras, rangers, GPS and other sensors."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.basic import Stamped
 from tickrig.wire.rtc_types.extended_2d import Point2D, RGBColour, Vector2D
 from tickrig.wire.rtc_types.extended_3d import (
     Geometry3D,
@@ -19,7 +18,6 @@ from tickrig.wire.rtc_types.extended_3d import (
 from tickrig.wire.rtc_types.idl import Double, OctetSeq, String, Struct, ULong, UShort
 
 
-@dataclass(frozen=True, slots=True)
 class BumperGeometry(Struct):
     """Geometry of a bumper; roc is its radius of curvature in m."""
 
@@ -28,7 +26,6 @@ class BumperGeometry(Struct):
     roc: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class BumperArrayGeometry(Struct):
     """Geometry of an array of bumpers."""
 
@@ -36,11 +33,9 @@ class BumperArrayGeometry(Struct):
     bumperGeometry: tuple[BumperGeometry, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class CameraImage(Struct):
+class CameraImage(Stamped):
     """An image; pixels divided by fDiv are real values."""
 
-    tm: Time = Time()
     width: UShort = 0
     height: UShort = 0
     bpp: UShort = 0
@@ -49,7 +44,6 @@ class CameraImage(Struct):
     pixels: OctetSeq = b""
 
 
-@dataclass(frozen=True, slots=True)
 class CameraInfo(Struct):
     """Lens of a camera: focal length in m, distortion coefficients."""
 
@@ -61,15 +55,12 @@ class CameraInfo(Struct):
     p2: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class MultiCameraImages(Struct):
+class MultiCameraImages(Stamped):
     """Images of several cameras."""
 
-    tm: Time = Time()
     images: tuple[CameraImage, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class MulticameraGeometry(Struct):
     """Geometry of several cameras."""
 
@@ -77,7 +68,6 @@ class MulticameraGeometry(Struct):
     cameraGeometries: tuple[Geometry3D, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class FiducialInfo(Struct):
     """A fiducial that was detected."""
 
@@ -88,15 +78,12 @@ class FiducialInfo(Struct):
     sizeUncertainty: Size3D = Size3D()
 
 
-@dataclass(frozen=True, slots=True)
-class Fiducials(Struct):
+class Fiducials(Stamped):
     """All fiducials that were detected."""
 
-    tm: Time = Time()
     fiducialsList: tuple[FiducialInfo, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class FiducialFOV(Struct):
     """What a tracker of fiducials sees: m, m, rad."""
 
@@ -105,7 +92,6 @@ class FiducialFOV(Struct):
     viewAngle: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
 class GPSTime(Struct):
     """Time of a GPS receiver; msec is in us."""
 
@@ -121,11 +107,9 @@ class GPSFixType(IntEnum):
     GPS_FIX_DGPS = 2
 
 
-@dataclass(frozen=True, slots=True)
-class GPSData(Struct):
+class GPSData(Stamped):
     """Position of a GPS receiver: deg, deg, m, m, m, rad, m/s, m/s."""
 
-    tm: Time = Time()
     timeFromGPS: GPSTime = GPSTime()
     latitude: Double = 0.0
     longitude: Double = 0.0
@@ -139,11 +123,9 @@ class GPSData(Struct):
     fixType: GPSFixType = GPSFixType.GPS_FIX_NONE
 
 
-@dataclass(frozen=True, slots=True)
-class INSData(Struct):
+class INSData(Stamped):
     """State of an inertial navigation system: deg, deg, m, m."""
 
-    tm: Time = Time()
     latitude: Double = 0.0
     longitude: Double = 0.0
     altitude: Double = 0.0
@@ -152,7 +134,6 @@ class INSData(Struct):
     orientation: Orientation3D = Orientation3D()
 
 
-@dataclass(frozen=True, slots=True)
 class PointCloudPoint(Struct):
     """A point and its colour."""
 
@@ -160,15 +141,12 @@ class PointCloudPoint(Struct):
     colour: RGBColour = RGBColour()
 
 
-@dataclass(frozen=True, slots=True)
-class PointCloud(Struct):
+class PointCloud(Stamped):
     """Points in space."""
 
-    tm: Time = Time()
     points: tuple[PointCloudPoint, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class RangerGeometry(Struct):
     """Geometry of a ranger and of its elements."""
 
@@ -176,7 +154,6 @@ class RangerGeometry(Struct):
     elementGeometries: tuple[Geometry3D, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
 class RangerConfig(Struct):
     """Limits of a ranger: rad, rad, rad, m, m, m, Hz."""
 
@@ -189,21 +166,17 @@ class RangerConfig(Struct):
     frequency: Double = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class RangeData(Struct):
+class RangeData(Stamped):
     """Ranges in m."""
 
-    tm: Time = Time()
     ranges: tuple[Double, ...] = ()
     geometry: RangerGeometry = RangerGeometry()
     config: RangerConfig = RangerConfig()
 
 
-@dataclass(frozen=True, slots=True)
-class IntensityData(Struct):
+class IntensityData(Stamped):
     """Intensities, 0.0..1.0."""
 
-    tm: Time = Time()
     ranges: tuple[Double, ...] = ()
     geometry: RangerGeometry = RangerGeometry()
     config: RangerConfig = RangerConfig()
