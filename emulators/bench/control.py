@@ -10,8 +10,8 @@ from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.scenario.fault_spec import parse_fault_spec
-from tickrig.host.cli.setting import Setting
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
+from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 MAX_LINES: Final = 100

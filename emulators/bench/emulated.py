@@ -7,7 +7,7 @@ from typing import Protocol
 
 from tickrig.device.core import Device, W
 from tickrig.device.physical import Input, Kind, Output
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):

@@ -10,7 +10,7 @@ from tickrig.emulators.bench.emulated import Inputs
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.agenda import Agenda
 from tickrig.emulators.scenario.fault_spec import FaultSpec
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 PRESS_US: Final = 100_000

@@ -15,7 +15,7 @@ from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.rig import Station
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 
 NAME: Final = "canopen-slave"
 

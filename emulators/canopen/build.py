@@ -19,7 +19,7 @@ from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.canopen.rtc import describe_rtc
-from tickrig.host.cli.eds_warnings import tell_findings
+from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.wire.canopen.eds.eds_finding import EdsError
 
@@ -63,7 +63,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
                 f"node {name} is there twice: {found[name].description.file}, {spec.device}"
             )
         found[name] = Described(name, node_id, description)
-    tell_findings(odd for item in found.values() for odd in item.description.warnings)
+    show_findings(odd for item in found.values() for odd in item.description.warnings)
     return list(found.values())
 
 

@@ -16,9 +16,8 @@ from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.rtc import one_line_for
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.cli.size import parse_size
+from tickrig.host.text.values import parse_size, parse_time_us
 from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
 
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")

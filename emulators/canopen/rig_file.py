@@ -12,7 +12,7 @@ from tickrig.emulators.canopen.body.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.choices import MODELS, PROFILES
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.cli.user_file import SUFFIX
+from tickrig.host.text.user_file import SUFFIX
 
 NODE_KEYS: Final = ("id", "eds", "model", "rtc", "profile")
 DEVICE_KEYS: Final = ("eds", "model", "rtc")

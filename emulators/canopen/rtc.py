@@ -15,7 +15,7 @@ from tickrig.device.canopen.device_rtc.make import application_of, make_device_r
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
 from tickrig.emulators.canopen.node.node import NODE_INPUTS
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.user_file import find_class, told
+from tickrig.host.text.user_file import explain_error, find_class
 from tickrig.wire.rtc_canopen.objects import device_info
 
 ANY_ID: Final = 1
@@ -34,7 +34,7 @@ def describe_rtc(spec: str) -> DeviceDescription:
     try:
         make_device_rtc(kind, ANY_ID)
     except Exception as error:  # a user's constructor may raise anything
-        raise ValueError(f"{spec}: {told(error, spec.rpartition(':')[0])}") from None
+        raise ValueError(f"{spec}: {explain_error(error, spec.rpartition(':')[0])}") from None
     return DeviceDescription(
         spec,
         device_info(kind.profile()),
@@ -56,4 +56,4 @@ def one_line_for(devices: Iterable[Path | str]) -> Iterator[None]:
         mine = next((file for file in files if any(file == at.filename for at in frames)), None)
         if mine is None:
             raise
-        raise Refused(f"{files[mine]}: {told(error, mine)}") from error
+        raise Refused(f"{files[mine]}: {explain_error(error, mine)}") from error

@@ -26,8 +26,8 @@ from tickrig.emulators.record.frame_transcript import FrameTranscript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser, Send
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.cli.telling import say
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 

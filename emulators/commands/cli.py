@@ -7,7 +7,7 @@ from typing import Final
 import click
 
 from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.version import version_option
+from tickrig.host.cli.options import version_option
 
 HERE: Final = "tickrig.emulators.commands"
 COMMANDS: Final = {

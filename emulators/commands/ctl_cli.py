@@ -10,10 +10,9 @@ import click
 
 from tickrig.emulators.commands.ctl_completion import buttons, complete, faults, seen, settable
 from tickrig.host.cli.control import ask
-from tickrig.host.cli.duration import format_time
-from tickrig.host.cli.duration_option import time_us
-from tickrig.host.cli.setting import parse_setting
+from tickrig.host.cli.options import time_us
 from tickrig.host.control.requests import Object
+from tickrig.host.text.values import format_time, parse_setting
 
 EMULATOR: Final = "emulator"
 

@@ -9,10 +9,10 @@ import click
 
 from tickrig.emulators.commands.picture import check_plot
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.cli.start import loading
-from tickrig.host.cli.telling import warnings_told
 from tickrig.host.links.errors import DeviceRefused, LinkError
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def rtc_lite(virtual: bool) -> None:
         if virtual:
             run_demo(VirtualStage(), click.echo)
             return
-        with warnings_told(), pty_stage() as stage:
+        with warnings_shown(), pty_stage() as stage:
             run_demo(stage, click.echo)
     except (RuntimeError, OSError, LinkError, RtcRefused) as error:
         raise click.ClickException(str(error)) from error
@@ -92,7 +92,7 @@ def _play_fig120(bus: BusOptions) -> list[Sample]:
     try:
         if not bus:
             return run_demo(VirtualStage(), click.echo)
-        with warnings_told(), bus_stage(bus) as stage:
+        with warnings_shown(), bus_stage(bus) as stage:
             return run_demo(stage, click.echo)
     except (RuntimeError, OSError, SdoCommunicationError) as error:
         raise click.ClickException(str(error)) from error

@@ -14,9 +14,9 @@ from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser
+from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
-from tickrig.host.cli.telling import say, warnings_told
 from tickrig.host.control.clock import ServingClock
 
 RECORDING_ENDED: Final = 3
@@ -58,7 +58,7 @@ class EmulatorRun(ABC):
         faults, scenario = self._checked()
         with ExitStack() as stack:
             if self._tells_warnings:
-                stack.enter_context(warnings_told())
+                stack.enter_context(warnings_shown())
             if self._in_real_time:
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable
 
 import click
 
-from tickrig.host.cli.options import PATH, Decorator, add_options
-from tickrig.host.cli.version import version_option
+from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
 
 Faults = Callable[[click.Context], Iterable[str]]
 """Gives the faults of a device as the command line has it so far."""

@@ -21,8 +21,8 @@ from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Encoder, Line, ScenarioParser, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineKind
 from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.cli.telling import say
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from typing import Final
 from tickrig.emulators.fig120.samples import HEAD, Sample, row
 from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE, WRITES, set_up
 from tickrig.emulators.fig120.stage import Stage
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 
 Echo = Callable[[str], None]
 

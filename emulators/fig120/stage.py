@@ -21,8 +21,8 @@ from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.setting import Setting
 from tickrig.host.control.client import ControlClient
+from tickrig.host.text.values import Setting
 
 BIT_RATE: Final = 1_000_000
 CAST: Final = {PALETTE: "f-palette", MOTOR: "motor-core-unit"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.candump import LogLine

@@ -9,8 +9,8 @@ from pathlib import Path
 from tickrig.device.physical import Output
 from tickrig.emulators.bench.emulated import Emulated, Inputs
 from tickrig.emulators.record.trace import RESET, Header, Mark, Record
-from tickrig.host.cli.setting import Setting
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
+from tickrig.host.text.values import Setting
 
 _logger = log_of(__name__)
 

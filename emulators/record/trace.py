@@ -22,8 +22,7 @@ from enum import StrEnum
 from typing import Final
 
 from tickrig.emulators.record.byte_text import escape, unescape
-from tickrig.host.cli.duration import format_time
-from tickrig.host.cli.setting import Setting, parse_setting
+from tickrig.host.text.values import Setting, format_time, parse_setting
 
 VERSION: Final = 1
 RESET: Final = "reset"

@@ -10,8 +10,7 @@ from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
-from tickrig.host.cli.duration import format_time
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting, format_time
 
 STATE: Final = "state"
 """The output that is watched unasked, where a device has one."""

@@ -11,8 +11,7 @@ from tickrig.emulators.rtc.conf_cli import conf
 from tickrig.emulators.rtc.print_cli import print_
 from tickrig.emulators.rtc.verbs_cli import VERBS
 from tickrig.emulators.rtc.whole_cli import WHOLE
-from tickrig.host.cli.duration_option import time_us
-from tickrig.host.cli.options import PATH, NumberRange
+from tickrig.host.cli.options import PATH, NumberRange, time_us
 from tickrig.host.cli.start import loading
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.emulators.rtc.descriptions import describe_component
-from tickrig.host.cli.user_file import told
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.rtc.configuration.configuration import Configuration
 from tickrig.host.rtc.execution.real_time import RealTime
@@ -16,6 +15,7 @@ from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.system.rts_profile import write_rts_profile
 from tickrig.host.rtc.system.system import describe
 from tickrig.host.rtc.system.system_toml import write_toml
+from tickrig.host.text.user_file import explain_error
 from tickrig.wire.instant import NEVER
 
 
@@ -79,7 +79,7 @@ class SystemControl(RequestDispatcher):
         except ValueError:
             raise
         except Exception as error:  # a user's constructor may raise anything
-            raise ValueError(f"{type_name}: {told(error)}") from error
+            raise ValueError(f"{type_name}: {explain_error(error)}") from error
 
     def _connect(self, request: Object) -> Object:
         first, second = _texts(request, "ports", 2)

@@ -6,8 +6,8 @@ import re
 from contextlib import ExitStack, closing
 from typing import Final
 
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.telling import say
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.reopening_link import ReopeningLink
 from tickrig.host.links.serial_link import SerialLink

@@ -14,7 +14,7 @@ from tickrig.emulators.rtc.at import SYSTEM, at
 from tickrig.emulators.rtc.completion import complete_port
 from tickrig.emulators.rtc.texts import value_line
 from tickrig.host.cli.control import refused_by
-from tickrig.host.cli.duration_option import time_us
+from tickrig.host.cli.options import time_us
 from tickrig.host.control.client import ControlClient
 
 POLL_S: Final = 0.02

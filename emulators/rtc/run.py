@@ -13,16 +13,16 @@ from tickrig.emulators.rtc.console import Console
 from tickrig.emulators.rtc.control import SystemControl
 from tickrig.emulators.rtc.lite import attach_lite
 from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
+from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
-from tickrig.host.cli.telling import say, warnings_told
-from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.system import System, restore
+from tickrig.host.text.user_file import explain_error, find_class
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,7 @@ def run_system(options: SystemOptions) -> None:
     manager = Manager()
     for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
         manager.register(kind)
-    with warnings_told(), ExitStack() as stack:
+    with warnings_shown(), ExitStack() as stack:
         for word in options.lites:
             attach_lite(manager, word, stack, options.lite_boot_us, options.rate_hz)
         _restore(manager, system, options)
@@ -65,7 +65,8 @@ def find_rt_component(spec: str) -> type[RtComponent]:
         kind: type[RtComponent] = find_class(spec, RtComponent)
         kind(f"{kind.spec.type_name}0")
     except Exception as error:  # a user's constructor may raise anything
-        raise Refused(f"--component {spec}: {told(error, spec.rpartition(':')[0])}") from None
+        reason = explain_error(error, spec.rpartition(":")[0])
+        raise Refused(f"--component {spec}: {reason}") from None
     return kind
 
 

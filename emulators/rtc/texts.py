@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from tickrig.host.cli.duration import format_time
+from tickrig.host.text.values import format_time
 
 
 def component_row(component: Any) -> str:

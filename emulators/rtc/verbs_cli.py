@@ -12,8 +12,7 @@ from tickrig.emulators.rtc.at import ask_system, at, components
 from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
 from tickrig.emulators.rtc.settle import settle
 from tickrig.emulators.rtc.texts import component_lines, component_row, port_line
-from tickrig.host.cli.duration_option import time_us
-from tickrig.host.cli.options import PATH, NumberRange, add_options
+from tickrig.host.cli.options import PATH, NumberRange, add_options, time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.relays import Echo, LiteA, LiteB
-from tickrig.host.cli.user_file import SUFFIX, find_class, told
+from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 
 COMPONENTS: Final[Mapping[str, type[Component]]] = MappingProxyType(
     {"echo": Echo, "lite-a": LiteA, "lite-b": LiteB}
@@ -29,5 +29,5 @@ def find_component(spec: str) -> type[Component]:
     try:
         kind()
     except Exception as error:  # a user's constructor may raise anything
-        raise ValueError(f"{spec}: {told(error, spec.rpartition(':')[0])}") from None
+        raise ValueError(f"{spec}: {explain_error(error, spec.rpartition(':')[0])}") from None
     return kind

@@ -17,7 +17,7 @@ from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
 from tickrig.emulators.serial.emulator import LineKind
 from tickrig.host.cli.refused import Refused, refused_at
-from tickrig.host.cli.user_file import told
+from tickrig.host.text.user_file import explain_error
 from tickrig.wire.rtc_lite.codes import Command, ContextType
 from tickrig.wire.rtc_lite.frame import Checksum
 from tickrig.wire.rtc_lite.framing import Framing
@@ -67,7 +67,7 @@ def _run(run: SerialRun, node: str) -> int:
     except click.ClickException:
         raise
     except Exception as error:  # a user's callback may raise anything
-        raise Refused(f"{node}: {told(error, file)}") from error
+        raise Refused(f"{node}: {explain_error(error, file)}") from error
 
 
 def _is_event(line: WireLine) -> bool:

@@ -11,7 +11,7 @@ from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
-from tickrig.host.cli.setting import parse_setting
+from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import HEADER

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.cli.duration import parse_time_us
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
 
 _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)

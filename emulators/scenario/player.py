@@ -25,7 +25,7 @@ from tickrig.emulators.scenario.scenario import (
     Set,
     Watch,
 )
-from tickrig.host.cli.duration import format_time
+from tickrig.host.text.values import format_time
 
 
 @dataclass(frozen=True, slots=True)

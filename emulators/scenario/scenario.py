@@ -13,8 +13,7 @@ from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
 from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.setting import Setting, parse_setting
+from tickrig.host.text.values import Setting, parse_setting, parse_time_us
 
 Encoder = Callable[[bytes], bytes]
 """Makes a line for the wire of the text that a scenario gives."""

@@ -8,7 +8,7 @@ import click
 
 from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.version import version_option
+from tickrig.host.cli.options import version_option
 
 HERE: Final = "tickrig.host.canmon.verbs"
 VERBS: Final = {

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.host.monitor.toml_place import line_of
+from tickrig.host.text.toml_place import line_of
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument

@@ -16,8 +16,8 @@ from click.shell_completion import CompletionItem
 
 from tickrig.host.cli.options import Decorator, add_options
 from tickrig.host.cli.refused import BusUnavailable, Refused
-from tickrig.host.cli.setting import parse_setting
 from tickrig.host.cli.start import loading
+from tickrig.host.text.values import parse_setting
 
 if TYPE_CHECKING:
     import can

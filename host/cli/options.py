@@ -1,4 +1,4 @@
-"""Small parts of which command lines are made."""
+"""Options of which command lines are made."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import click
+
+from tickrig import __version__
 
 PATH: Final = click.Path(path_type=Path)
 
@@ -36,3 +38,17 @@ class NumberRange(click.FloatRange):
         if isnan(number):
             self.fail(f"{value} is no number.", param, ctx)
         return number
+
+
+def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that adds `--version`, in the form that all commands have."""
+    return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
+
+
+def time_us(option: str, word: str) -> int:
+    """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
+    from tickrig.host.cli.refused import refused_at  # noqa: PLC0415 - a TAB needs none
+    from tickrig.host.text.values import parse_time_us  # noqa: PLC0415
+
+    with refused_at(option):
+        return parse_time_us(word)

@@ -6,7 +6,6 @@ from typing import Final
 
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.links.link import Link
-from tickrig.host.log import log_of
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.exchange import Exchange
 from tickrig.host.rrc.inbox import Answer, Inbox
@@ -14,6 +13,7 @@ from tickrig.host.rrc.keep_alive import KeepAlive
 from tickrig.host.rrc.ledger import Ledger
 from tickrig.host.rrc.mirror import WIPING
 from tickrig.host.rrc.refusals import OnRefusals, Refusals
+from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
 from tickrig.wire.rrc.replies import Event, Ok, Refusal

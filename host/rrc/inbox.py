@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.replies import Event, Ok, Refusal, Reply, StatusA, Text, parse_reply

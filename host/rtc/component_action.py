@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, ParamSpec
 
-from tickrig.host.log import log_of
 from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.text.log import log_of
 
 if TYPE_CHECKING:
     from tickrig.host.rtc.execution.execution_context import ExecutionContext

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from tickrig.host.links.link import Link
-from tickrig.host.log import log_of
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.system.manager import Manager
@@ -14,6 +13,7 @@ from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.lookout import Lookout
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.text.log import log_of
 
 RATE_HZ: Final = 10.0
 """A period that two round trips at 57600 bit/s do not fill."""

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.links.link import Link
-from tickrig.host.log import log_of
 from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
 from tickrig.host.rtc_lite.rtno_link import RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, State, Status
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame

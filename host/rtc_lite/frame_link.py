@@ -8,7 +8,7 @@ from typing import Final, Protocol
 
 from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.frame import Frame
 

@@ -7,7 +7,6 @@ from typing import ClassVar, Final
 
 from tickrig.host.links.errors import DeviceRefused, LinkError
 from tickrig.host.links.link import Link
-from tickrig.host.log import log_of
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
@@ -17,6 +16,7 @@ from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.relays import Relays
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.start_up import DeviceProfile, start_up
+from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
 from tickrig.wire.rtc_lite.messages import Reply

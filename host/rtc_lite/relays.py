@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Final
 
-from tickrig.host.log import log_of
 from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.rtc_lite.relay import InRelay, OutRelay
+from tickrig.host.text.log import log_of
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.messages import PortData, PortProfile
 

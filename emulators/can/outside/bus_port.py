@@ -8,7 +8,7 @@ from typing import Final
 import can
 
 from tickrig.host.links.can_message import to_frame, to_message
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.body.wheeled_body import WheeledBody
 from tickrig.device.physical import Input, Kind, QuantityBank
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 
 FAR_M: Final = 1e6
 """As far as a body can be put."""

@@ -13,7 +13,7 @@ from tickrig.device.physical import Output, QuantityBank
 from tickrig.emulators.canopen.body.body_inputs import FrictionTouch, PoseTouch
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.touch import Touch
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 NAME: Final = "body"

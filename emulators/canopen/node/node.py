@@ -13,7 +13,7 @@ from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
 from tickrig.emulators.canopen.node.touch import ObjectTouch, Touch, find_object, object_name
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState

@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.physical import Input, Kind, QuantityBank
 from tickrig.emulators.canopen.node.touch import Later
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 
 ERROR_BITS: Final = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08}
 """Bit of the error register by the first digit of an emergency error code (CiA 301)."""

@@ -11,7 +11,7 @@ from typing import Final
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.user_file import SUFFIX
+from tickrig.host.text.user_file import SUFFIX
 
 LSS: Final = "lss"
 """Instead of a node-ID: the node waits for LSS to give it one."""

@@ -11,7 +11,7 @@ from tickrig.device.physical import Input, Kind, Output
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.touch import Touch
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 
 
 class Part(Protocol):

@@ -14,7 +14,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import UNCONFIGURED
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)
 FORMAT: Final = "tickrig CANopen store 1"

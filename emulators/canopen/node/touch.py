@@ -11,7 +11,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.physical import Input, Kind
-from tickrig.host.cli.setting import Setting
+from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
 

@@ -8,9 +8,8 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.rh3.base_options import base_options
-from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options
+from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
 from tickrig.host.cli.start import loading
-from tickrig.host.cli.version import version_option
 
 COORDINATES: Final = {"ignore_unknown_options": True}
 """So that `-1` is a number and no option."""

@@ -11,9 +11,9 @@ import click
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_word import BusWord, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.values import parse_time_us
 
 Item = TypeVar("Item")
 

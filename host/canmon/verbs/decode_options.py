@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from tickrig.host.cli.eds_warnings import tell_findings
+from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 
@@ -58,7 +58,7 @@ def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
     What is wrong in a file, and not used, is told on standard error.
     """
     found = {node: _read(node, path) for node, path in paths.items()}
-    tell_findings(odd for objects in found.values() for odd in objects.findings)
+    show_findings(odd for objects in found.values() for odd in objects.findings)
     return found
 
 

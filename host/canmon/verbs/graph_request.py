@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from tickrig.host.canmon.output.graph_file import check_graph_path
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.series import Series
 from tickrig.host.monitor.graph.view import View
+from tickrig.host.text.values import parse_time_us
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
 _RANGE: Final = re.compile(r"([1-9])=(-?[0-9.eE+-]+?)\.\.(-?[0-9.eE+-]+)")

@@ -13,7 +13,6 @@ from tickrig.host.canmon.output.pace import Pace
 from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_options
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import (
@@ -22,6 +21,7 @@ from tickrig.host.monitor.transmit.frame_fields import (
     parse_counter,
 )
 from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 from tickrig.wire.errors import WireError

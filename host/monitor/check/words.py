@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
+from tickrig.host.text.values import parse_time_us
 
 Words = Mapping[str, object]
 """Rules by their names with underscores: True, a number, text, a list of texts, or a table."""

@@ -13,8 +13,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Final
 
-from tickrig.host.cli.setting import parse_setting
 from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.text.values import parse_setting
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.errors import FieldError
 

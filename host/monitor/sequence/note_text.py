@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.host.cli.duration import format_time
 from tickrig.host.monitor.sequence.sequence_run import Note
+from tickrig.host.text.values import format_time
 
 
 def note_line(note: Note) -> str:

@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.monitor.sequence.line_sequence import SequenceError
 from tickrig.host.monitor.sequence.pattern import parse_pattern
 from tickrig.host.monitor.sequence.steps import (
@@ -23,7 +22,8 @@ from tickrig.host.monitor.sequence.steps import (
     takes_time,
 )
 from tickrig.host.monitor.sequence.variables import fill_in
-from tickrig.host.monitor.toml_place import line_of
+from tickrig.host.text.toml_place import line_of
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 

@@ -6,11 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from tickrig.host.cli.setting import Setting, parse_setting
 from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
 from tickrig.host.monitor.decode.objects.memory import NodeMemory
 from tickrig.host.monitor.decode.objects.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
+from tickrig.host.text.values import Setting, parse_setting
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.datatypes import DataType

@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_checksum, parse_counter
 from tickrig.host.monitor.transmit.pdo_words import PdoWords
 from tickrig.host.monitor.transmit.transmit_list import ONCE, TransmitRow
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 
 OPTIONS: Final = ("every", "counter", "checksum", "name")

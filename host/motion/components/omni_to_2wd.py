@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Final
 
-from tickrig.host.log import log_of
 from tickrig.host.motion.components.position_input import (
     END_POINT,
     INTERMEDIATE_POINT,
@@ -14,6 +13,7 @@ from tickrig.host.motion.components.position_input import (
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.ports import arrived, newest, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState

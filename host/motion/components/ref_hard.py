@@ -10,7 +10,6 @@ from typing import ClassVar, Final, Protocol
 from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.log import log_of
 from tickrig.host.modbus.master import Answer, ModbusMaster
 from tickrig.host.motion.components.base_texts import fault_text, refusal_text
 from tickrig.host.motion.dead_reckoning import wheel_speeds
@@ -27,6 +26,7 @@ from tickrig.host.rtc import (
     ServicePort,
 )
 from tickrig.host.rtc.configuration.parameter import Parameter
+from tickrig.host.text.log import log_of
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
 from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
 from tickrig.wire.rtc_types import iis

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import cos, sin
 from typing import ClassVar, Final
 
-from tickrig.host.log import log_of
 from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.motion.ports import arrived, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D

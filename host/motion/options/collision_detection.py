@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.log import log_of
 from tickrig.host.motion.components.ref_hard import RefHard
 from tickrig.host.motion.options.watched_distance import WatchedDistance
 from tickrig.host.rtc import (
@@ -16,6 +15,7 @@ from tickrig.host.rtc import (
     RtComponent,
     ServicePort,
 )
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.basic import TimedDouble
 
 _LOG: Final = log_of(__name__)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import ClassVar, Final
 
 from tickrig.host.links.errors import LinkError
-from tickrig.host.log import log_of
 from tickrig.host.motion.options.evdev_pad import EvdevPad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad
 from tickrig.host.motion.options.pad import Hand, Pad, PadOpener
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D

@@ -7,9 +7,9 @@ from typing import ClassVar, Final
 
 from tickrig.host.links.errors import DeviceRefused, LinkError
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.log import log_of
 from tickrig.host.motion.components.ref_hard import Opener
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.text.log import log_of
 from tickrig.host.urg.client import UrgClient
 from tickrig.host.urg.scan import Scan
 from tickrig.wire.rtc_types.basic import Time

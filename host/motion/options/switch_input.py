@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.log import log_of
 from tickrig.host.motion.ports import newest, sound
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
-from tickrig.host.log import log_of
+from tickrig.host.text.log import log_of
 
 _LOG: Final = log_of(__name__)
 

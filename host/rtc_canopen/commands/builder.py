@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
-from tickrig.host.cli.version import version_option
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project
 from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX
 

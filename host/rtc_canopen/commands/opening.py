@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final, TextIO
 import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.cli.eds_warnings import tell_findings
+from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.start import loading
-from tickrig.host.cli.user_file import find_class, told
 from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.text.user_file import explain_error, find_class
 
 if TYPE_CHECKING:
     from tickrig.host.links.can_link import CanLink
@@ -64,7 +64,7 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
         refuse_path("file", error)
     except ValueError as error:
         raise Refused(str(error)) from None
-    tell_findings(server.findings)
+    show_findings(server.findings)
     return server
 
 
@@ -88,7 +88,7 @@ def furnish(server: Server, words: Sequence[str]) -> None:
             server.manager.add(component, server.definition.master.rate_hz)
             server.manager.activate(name)
         except Exception as error:  # a user's file may raise anything
-            raise ValueError(f"--component {name}: {told(error, file)}") from error
+            raise ValueError(f"--component {name}: {explain_error(error, file)}") from error
 
 
 def open_link(

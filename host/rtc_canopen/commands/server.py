@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.duration import parse_time_us
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.messages import warnings_shown
+from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.telling import warnings_told
-from tickrig.host.cli.version import version_option
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.stamped_link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
@@ -27,6 +25,7 @@ from tickrig.host.rtc_canopen.commands.opening import (
     open_link,
     read_server,
 )
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -73,7 +72,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         click.echo(draw_on_paper(server))
         return
     log, quiet, start = (options.pop(name) for name in ("log", "quiet", "start"))
-    with warnings_told(), ExitStack() as stack:
+    with warnings_shown(), ExitStack() as stack:
         if not quiet:
             server.log.listeners.append(lambda event: click.echo(str(event), err=True))
         server.log.listeners += log_listener(log, stack)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tickrig.emulators.record.byte_text import escape, unescape
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.host.cli.duration import format_time, parse_time_us
+from tickrig.host.text.values import format_time, parse_time_us
 from tickrig.wire.instant import NEVER
 
 

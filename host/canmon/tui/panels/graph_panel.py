@@ -22,12 +22,12 @@ from tickrig.host.canmon.tui.widgets.ansi_colour import colour_line
 from tickrig.host.canmon.tui.widgets.ask_line import AskLine
 from tickrig.host.canmon.tui.widgets.picture_view import PictureView
 from tickrig.host.canmon.tui.widgets.title_line import TitleLine
-from tickrig.host.cli.duration import parse_time_us
 from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.graph.drawing.plot import LABEL_WIDTH
 from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
 from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
 from tickrig.host.monitor.graph.view import LEAST_US
+from tickrig.host.text.values import parse_time_us
 from tickrig.host.tui.line import Line
 
 PICTURE: Final = (960, 400)

@@ -32,7 +32,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
     return found
 
 
-def told(error: Exception, file: str = "") -> str:
+def explain_error(error: Exception, file: str = "") -> str:
     """Say in a line what went wrong in a user's file, and where in it if it is named."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"
@@ -58,7 +58,7 @@ def _run(path: Path) -> ModuleType:
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
     except Exception as error:  # a user's file may raise anything
-        raise ValueError(f"{path}: {told(error, str(path))}") from None
+        raise ValueError(f"{path}: {explain_error(error, str(path))}") from None
     return module
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.monitor.toml_place import line_of
+from tickrig.host.text.toml_place import line_of
 
 TEXT = '''\
 # a comment with [[step]]

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tickrig.host.cli.telling import warnings_told
+from tickrig.host.cli.messages import warnings_shown
 
 
 @pytest.mark.parametrize("part", ["host.rtc.ports.port", "emulators.record.recorder"])
@@ -20,7 +20,7 @@ def test_the_library_is_silent_unless_somebody_listens(part: str) -> None:
 
 def test_a_command_tells_warnings_and_no_more(capsys: pytest.CaptureFixture[str]) -> None:
     logger = logging.getLogger("tickrig.host")
-    with warnings_told():
+    with warnings_shown():
         logger.info("all is well")
         logger.warning("beware")
     logger.warning("unheard")

@@ -1,0 +1,83 @@
+"""Values as people write them: times (`1.5s`), sizes (`64k`), settings of inputs (`0x1F`)."""
+
+from __future__ import annotations
+
+import re
+from math import isfinite
+from typing import Final
+
+_TIME: Final = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(s|ms|us)?")
+_UNIT_US: Final = {"s": 1_000_000, "ms": 1_000, "us": 1}
+
+
+def parse_time_us(text: str) -> int:
+    """Read a time in microseconds.
+
+    Raises:
+        ValueError: not a time.
+
+    >>> parse_time_us("1.5s"), parse_time_us("200ms"), parse_time_us("3")
+    (1500000, 200000, 3000000)
+    """
+    match = _TIME.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not a time: write 1.5s, 200ms or 250us")
+    whole, _, fraction = match[1].partition(".")
+    return int(f"{whole}{fraction:0<9}") * _UNIT_US[match[2] or "s"] // 1_000_000_000
+
+
+def format_time(t_us: int) -> str:
+    """Write a time as traces and transcripts do, in seconds.
+
+    >>> format_time(310_000)
+    '0.310000'
+    """
+    return f"{t_us // 1_000_000}.{t_us % 1_000_000:06d}"
+
+
+_SIZE: Final = re.compile(r"([0-9]{1,12})([kKMG])?")
+_SHIFT: Final = {"k": 10, "K": 10, "M": 20, "G": 30}
+
+
+def parse_size(text: str) -> int:
+    """Read a size in bytes.
+
+    Raises:
+        ValueError: not a size.
+
+    >>> parse_size("4096"), parse_size("64k"), parse_size("16M")
+    (4096, 65536, 16777216)
+    """
+    match = _SIZE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not a size: write 4096, 64k or 16M")
+    return int(match[1]) << _SHIFT.get(match[2], 0)
+
+
+Setting = int | float | str
+"""Most inputs take whole numbers alone."""
+
+
+def parse_setting(word: str) -> Setting:
+    """Read a value: a number where it looks like one, else text.
+
+    >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
+    [5, -31, 0.001, 'ready', 'nan']
+    """
+    for kind in (_parse_whole, _parse_fraction):
+        try:
+            return kind(word)
+        except ValueError:
+            continue
+    return word
+
+
+def _parse_whole(word: str) -> int:
+    return int(word, 0)
+
+
+def _parse_fraction(word: str) -> float:
+    value = float(word)
+    if not isfinite(value):
+        raise ValueError
+    return value
