@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import click
 
-from tickrig.wire.canopen.eds.eds_finding import Finding
+if TYPE_CHECKING:
+    from tickrig.wire.canopen.eds.eds_finding import Finding
 
 
 def say(text: str) -> None:
@@ -31,9 +33,9 @@ def warnings_shown() -> Iterator[None]:
 
 def show_findings(findings: Iterable[Finding]) -> None:
     """Say what is wrong in EDS files; what is so in many sections, once."""
-    places: dict[tuple[str, str], list[str]] = {}
+    alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):
-        places.setdefault((finding.file, finding.reason), []).append(finding.section)
-    for (file, reason), (first, *others) in places.items():
+        alike.setdefault((finding.file, finding.reason), []).append(finding)
+    for first, *others in alike.values():
         more = f" (and {len(others)} more like it)" if others else ""
-        say(f"{Finding(file, first, reason)}{more}")
+        say(f"{first}{more}")
