@@ -12,7 +12,7 @@ from enum import Enum
 from math import isfinite
 
 
-class Kind(Enum):
+class SignalType(Enum):
     """What a physical input is."""
 
     LEVEL = "level"  # a quantity: a stick, a voltage, a load
@@ -28,7 +28,7 @@ class Input:
     Attributes:
         name: what scenario files and panels call it.
         text: what it is, for people.
-        kind: level, button or fault.
+        type: level, button, text or fault.
         low: smallest value.
         high: largest value.
         unit: unit of the value, empty for a plain number.
@@ -38,7 +38,7 @@ class Input:
 
     name: str
     text: str
-    kind: Kind = Kind.LEVEL
+    type: SignalType = SignalType.LEVEL
     low: float = 0
     high: float = 1
     unit: str = ""
@@ -63,25 +63,25 @@ class QuantityBank:
     Args:
         table: the inputs.
         groups: names of several inputs that are set together, as `stick`.
-        touched: called after each change.
+        on_change: called after each change.
 
     Attributes:
         table: the inputs by name, in order of declaration.
         changed: whether anything was set since the device last looked.
     """
 
-    __slots__ = ("_touched", "_values", "changed", "groups", "table")
+    __slots__ = ("_on_change", "_values", "changed", "groups", "table")
 
     def __init__(
         self,
         table: Iterable[Input] = (),
         groups: Mapping[str, tuple[str, ...]] | None = None,
-        touched: Callable[[], None] | None = None,
+        on_change: Callable[[], None] | None = None,
     ) -> None:
         self.table: Mapping[str, Input] = {item.name: item for item in table}
         self.groups: Mapping[str, tuple[str, ...]] = dict(groups or {})
         self._values = {name: item.initial for name, item in self.table.items()}
-        self._touched, self.changed = touched, True
+        self._on_change, self.changed = on_change, True
 
     def __getitem__(self, name: str) -> float:
         """Return the present value of an input."""
@@ -95,8 +95,8 @@ class QuantityBank:
         """
         self._values[name] = self.check(name, value)
         self.changed = True
-        if self._touched is not None:
-            self._touched()
+        if self._on_change is not None:
+            self._on_change()
 
     def check(self, name: str, value: float | str) -> float:
         """Return the value that the input would be set to, or raise as `set` does."""
@@ -111,20 +111,20 @@ class QuantityBank:
             raise ValueError(f"{name} {value} is not in {item.low}..{item.high}{unit}")
         return value
 
-    def names(self, kind: Kind) -> tuple[str, ...]:
-        """Return the names of all inputs of a kind."""
-        return tuple(item.name for item in self.table.values() if item.kind is kind)
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return the names of all inputs of a type."""
+        return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
-    def find(self, name: str, kind: Kind | None = None) -> Input:
+    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
         """Return the description of an input.
 
         Raises:
-            ValueError: no such input, or none of this kind.
+            ValueError: no such input, or none of this type.
         """
         item = self.table.get(name)
-        if item is None or kind not in (None, item.kind):
-            wanted = kind.value if kind else "input"
-            known = self.names(kind) if kind else tuple(self.table)
+        if item is None or signal_type not in (None, item.type):
+            wanted = signal_type.value if signal_type else "input"
+            known = self.names(signal_type) if signal_type else tuple(self.table)
             raise ValueError(f"no {wanted} {name!r}; known: {', '.join(known) or 'none'}")
         return item
 

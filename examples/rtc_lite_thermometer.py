@@ -6,7 +6,7 @@ temperature each period, and ends in Error while the sensor is broken.
 
 from __future__ import annotations
 
-from tickrig.device.physical import Input, Kind
+from tickrig.device.physical import Input, SignalType
 from tickrig.device.rtc_lite.component import ERROR, Component, Result
 from tickrig.device.rtc_lite.ports import InPort, OutPort
 from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT
@@ -18,7 +18,7 @@ class Thermometer(Component):
     type_name = "Thermometer"
     physical = (
         Input("temperature_dc", "at the sensor", low=-400, high=1_250, unit="0.1 degC"),
-        Input("sensor_broken", "the cable of the sensor is cut", Kind.FAULT),
+        Input("sensor_broken", "the cable of the sensor is cut", SignalType.FAULT),
     )
     limit = InPort("limit", FLOAT)
     celsius = OutPort("celsius", FLOAT)

@@ -90,7 +90,7 @@ class Rh3Base(NonCopyable):
         """Let time pass up to now."""
         self._catch_up(now_us)
         if self.inputs.changed:
-            self._touched()
+            self._inputs_changed()
         sent = b""
         if self._on:
             self._unseen |= bool(rx) or self.slave.due_us <= now_us
@@ -133,10 +133,10 @@ class Rh3Base(NonCopyable):
         else:
             self._moving = False
 
-    def _touched(self) -> None:
+    def _inputs_changed(self) -> None:
         self.inputs.changed, self._unseen = False, True
         for side in self.sides:
-            side.touched(self.inputs)
+            side.inputs_changed(self.inputs)
         on = not self.inputs["power_cut"]
         if on != self._on:
             self._on = on

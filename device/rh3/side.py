@@ -105,7 +105,7 @@ class Side:
             return False
         return self._speed_loop.settled and self.wheel.held(self.torque)
 
-    def touched(self, inputs: QuantityBank) -> None:
+    def inputs_changed(self, inputs: QuantityBank) -> None:
         """Take over what the world does to the wheel."""
         self.wheel.load = self._per_mille(inputs[f"load_{self.name}_nm"])
         self.wheel.jammed = bool(inputs[f"jam_{self.name}"])

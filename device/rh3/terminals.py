@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Input, Output, SignalType
 
 SIDES: Final = ("left", "right")
 
 INPUTS: Final = (
-    Input("emergency_stop", "the red button is down", Kind.FAULT),
-    Input("bumper", "the bumper touches something", Kind.BUTTON),
+    Input("emergency_stop", "the red button is down", SignalType.FAULT),
+    Input("bumper", "the bumper touches something", SignalType.BUTTON),
     *(
         Input(
             f"load_{side}_nm",
@@ -22,16 +22,19 @@ INPUTS: Final = (
         )
         for side in SIDES
     ),
-    *(Input(f"jam_{side}", f"something holds the {side} wheel", Kind.FAULT) for side in SIDES),
     *(
-        Input(f"encoder_unplugged_{side}", f"no signal of the {side} encoder", Kind.FAULT)
+        Input(f"jam_{side}", f"something holds the {side} wheel", SignalType.FAULT)
         for side in SIDES
     ),
     *(
-        Input(f"short_circuit_{side}", f"windings of the {side} motor touch", Kind.FAULT)
+        Input(f"encoder_unplugged_{side}", f"no signal of the {side} encoder", SignalType.FAULT)
         for side in SIDES
     ),
-    Input("power_cut", "the supply is off, and everything is forgotten", Kind.FAULT),
+    *(
+        Input(f"short_circuit_{side}", f"windings of the {side} motor touch", SignalType.FAULT)
+        for side in SIDES
+    ),
+    Input("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
 )
 
 OUTPUTS: Final = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.device.physical import Input, InputBank, Output, SignalType
 from tickrig.wire.rrc.replies import EventKind
 
-BUTTON: Final = Kind.BUTTON
-FAULT: Final = Kind.FAULT
+BUTTON: Final = SignalType.BUTTON
+FAULT: Final = SignalType.FAULT
 
 INPUTS: Final = (
     Input("rrc_power", "supply of the RRC, from the VR2 battery or USB", initial=1),

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.device.physical import Input, InputBank, Output, SignalType
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.ports import Port
 
 INPUTS: Final = (
     Input("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
-    Input("power_cut", "the supply is off, and everything is forgotten", Kind.FAULT),
-    Input("slow_answer", "the processor is busy elsewhere: each answer is late", Kind.FAULT),
+    Input("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+    Input("slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT),
 )
 """Every node has these; a component may add its own."""
 

@@ -83,7 +83,7 @@ class Urg(NonCopyable):
         """Take what arrived, and go on to now."""
         if self._restarted:
             self._power_up(now_us)
-        sent = self._touched(now_us) if self.inputs.changed else b""
+        sent = self._inputs_changed(now_us) if self.inputs.changed else b""
         if not self._on:
             return b""
         server = self._server
@@ -99,7 +99,7 @@ class Urg(NonCopyable):
         self._lines.clear()
         self._server.power_up(now_us)
 
-    def _touched(self, now_us: int) -> bytes:
+    def _inputs_changed(self, now_us: int) -> bytes:
         inputs, server = self.inputs, self._server
         inputs.changed = False
         on = not inputs["power_cut"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Input, Output, SignalType
 
 FAR_M: Final = 10_000
 
@@ -20,9 +20,9 @@ INPUTS: Final = (
     _place("post_x_m", "place of somebody who stands there"),
     _place("post_y_m", "place of somebody, to the left of x"),
     Input("post_radius_m", "how wide; 0 if nobody is there", high=FAR_M, unit="m", real=True),
-    Input("laser_broken", "the laser gives no light", Kind.FAULT),
-    Input("motor_jammed", "something holds the mirror", Kind.FAULT),
-    Input("power_cut", "the supply is off, and everything is forgotten", Kind.FAULT),
+    Input("laser_broken", "the laser gives no light", SignalType.FAULT),
+    Input("motor_jammed", "something holds the mirror", SignalType.FAULT),
+    Input("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
 )
 
 GROUPS: Final = {

@@ -7,7 +7,7 @@ from typing import Final
 from tickrig.emulators.bench.emulated import look_at
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
-from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.scenario.fault_spec import parse_fault_spec
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
@@ -26,7 +26,7 @@ class Control(RequestDispatcher):
         emulator: what is controlled. It must not be stepping meanwhile.
     """
 
-    def __init__(self, emulator: Workbench) -> None:
+    def __init__(self, emulator: RunningEmulator) -> None:
         self._emulator = emulator
         super().__init__(
             {
@@ -49,7 +49,7 @@ class Control(RequestDispatcher):
             "tick_us": device.tick_us,
             "inputs": [
                 {
-                    **{"name": item.name, "text": item.text, "kind": item.kind.value},
+                    **{"name": item.name, "text": item.text, "kind": item.type.value},
                     **{"low": item.low, "high": item.high, "unit": item.unit},
                 }
                 for item in device.inputs.table.values()
@@ -61,7 +61,7 @@ class Control(RequestDispatcher):
             ],
             "wire_faults": [
                 {"name": name, "text": kind.text, "rated": kind.rated}
-                for name, kind in emulator.wire.kinds.items()
+                for name, kind in emulator.wire.fault_types.items()
             ],
         }
 
@@ -87,12 +87,12 @@ class Control(RequestDispatcher):
     def _press(self, request: Object) -> Object:
         duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, MAX_PRESS_US)
         emulator = self._emulator
-        emulator.operator.press(emulator.touch_us, text_of(request, "name"), duration_us)
+        emulator.operator.press(emulator.effective_us, text_of(request, "name"), duration_us)
         return {}
 
     def _fault(self, request: Object) -> Object:
         emulator = self._emulator
-        emulator.operator.fault(emulator.touch_us, parse_fault_spec(text_of(request, "spec")))
+        emulator.operator.fault(emulator.effective_us, parse_fault_spec(text_of(request, "spec")))
         return {}
 
     def _clear(self, request: Object) -> Object:

@@ -1,4 +1,4 @@
-"""What an emulator needs of a device: that it can be ticked, touched and looked at."""
+"""What an emulator needs of a device: that it can be ticked, and has signals."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from tickrig.device.core import Device, W
-from tickrig.device.physical import Input, Kind, Output
 from tickrig.host.text.values import Setting
+from tickrig.device.physical import Input, Output, SignalType
 
 
 class Inputs(Protocol):
@@ -40,17 +40,17 @@ class Inputs(Protocol):
         """Return the value that it would be set to, or raise as `set` would."""
         ...
 
-    def names(self, kind: Kind) -> tuple[str, ...]:
-        """Return the names of all inputs of a kind."""
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return the names of all inputs of a type."""
         ...
 
-    def find(self, name: str, kind: Kind | None = None) -> Input:
-        """Return the description of an input; ValueError if there is none of the kind."""
+    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
+        """Return the description of an input; ValueError if there is none of this type."""
         ...
 
 
-class Touchable(Protocol):
-    """A device that can be touched and looked at between ticks."""
+class HasSignals(Protocol):
+    """A device with named inputs and outputs, to be set and read between ticks."""
 
     @property
     def tick_us(self) -> int:
@@ -72,10 +72,10 @@ class Touchable(Protocol):
         ...
 
 
-class Emulated(Device[W], Touchable, Protocol[W]):
-    """A device on a wire that can be touched."""
+class Emulated(Device[W], HasSignals, Protocol[W]):
+    """A device on a wire, with signals."""
 
 
-def look_at(device: Touchable, name: str) -> Setting:
+def look_at(device: HasSignals, name: str) -> Setting:
     """Return the present value of an input or output; KeyError if there is none."""
     return device.inputs[name] if name in device.inputs.table else device.read(name)

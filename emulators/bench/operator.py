@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Final, Protocol
 
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.emulators.bench.emulated import Inputs
 from tickrig.emulators.bench.names import known
-from tickrig.emulators.rig.agenda import Agenda
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario.fault_spec import FaultSpec
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -35,7 +35,7 @@ class WireFaults(Protocol):
     """Where faults of a wire are armed by name: `FaultyPort`, or a whole bus."""
 
     @property
-    def kinds(self) -> Mapping[str, WireFault]:
+    def fault_types(self) -> Mapping[str, WireFault]:
         """The faults that can be armed."""
         ...
 
@@ -64,7 +64,7 @@ class Operator:
     Args:
         inputs: the physical inputs of the device.
         tick_us: the device's control period.
-        agenda: where releases and faults of a later time are entered.
+        event_queue: where releases and faults of a later time are entered.
         wire: the port at which wire faults are armed.
         note: told of each change, as `power_button=1`.
     """
@@ -73,11 +73,16 @@ class Operator:
         self,
         inputs: Inputs,
         tick_us: int,
-        agenda: Agenda,
+        event_queue: EventQueue,
         wire: WireFaults,
         note: Callable[[str], None] = lambda text: None,
     ) -> None:
-        self._inputs, self._tick_us, self._agenda, self._wire = inputs, tick_us, agenda, wire
+        self._inputs, self._tick_us, self._event_queue, self._wire = (
+            inputs,
+            tick_us,
+            event_queue,
+            wire,
+        )
         self.note = note
 
     def set(self, name: str, *values: Setting) -> None:
@@ -87,7 +92,7 @@ class Operator:
             ValueError: no such input or group, a value too many, too few or out of range.
         """
         for member, value in self.check_set(name, *values):
-            self._agenda.drop(("release", member))
+            self._event_queue.drop(("release", member))
             self._drop_fault(member)
             self._put(member, value)
 
@@ -110,13 +115,13 @@ class Operator:
         self.check_press(name, duration_us)
         self._put(name, 1)
         seen_us = -(-now_us // self._tick_us) * self._tick_us
-        self._agenda.put(
+        self._event_queue.put(
             ("release", name), seen_us + duration_us, lambda now_us: self._put(name, 0)
         )
 
     def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
         """Raise ValueError unless `press` can be done."""
-        self._inputs.find(name, Kind.BUTTON)
+        self._inputs.find(name, SignalType.BUTTON)
         if duration_us < 1:
             raise ValueError(f"a press lasts at least 1 us, not {duration_us} us")
 
@@ -132,16 +137,20 @@ class Operator:
             raise ValueError(f"fault {spec.name} would have ended before now")
         self._drop_fault(spec.name)
         if spec.from_us > now_us:
-            self._agenda.put(("begin", spec.name), spec.from_us, lambda now_us: self._begin(spec))
+            self._event_queue.put(
+                ("begin", spec.name), spec.from_us, lambda now_us: self._begin(spec)
+            )
         else:
             self._begin(spec)
         if spec.to_us != NEVER:
-            self._agenda.put(("end", spec.name), spec.to_us, lambda now_us: self._end(spec.name))
+            self._event_queue.put(
+                ("end", spec.name), spec.to_us, lambda now_us: self._end(spec.name)
+            )
 
     def check_fault(self, spec: FaultSpec) -> None:
         """Raise ValueError unless there is such a fault and its rate makes sense."""
         self.check_clear(spec.name)
-        if spec.name in self._wire.kinds:
+        if spec.name in self._wire.fault_types:
             self._wire.check(spec.name, spec.rate)
         elif spec.rate is not None:
             raise ValueError(f"{spec.name} takes no rate, got {spec.rate:g}")
@@ -160,7 +169,7 @@ class Operator:
     @property
     def faults(self) -> tuple[str, ...]:
         """Names of all faults there are, of the wire and of the device."""
-        return (*self._wire.kinds, *self._inputs.names(Kind.FAULT))
+        return (*self._wire.fault_types, *self._inputs.names(SignalType.FAULT))
 
     @property
     def active_faults(self) -> tuple[str, ...]:
@@ -172,18 +181,18 @@ class Operator:
         return name in self._inputs.table and bool(self._inputs[name])
 
     def _drop_fault(self, name: str) -> None:
-        self._agenda.drop(("begin", name))
-        self._agenda.drop(("end", name))
+        self._event_queue.drop(("begin", name))
+        self._event_queue.drop(("end", name))
 
     def _begin(self, spec: FaultSpec) -> None:
-        if spec.name in self._wire.kinds:
+        if spec.name in self._wire.fault_types:
             self._wire.arm(spec.name, spec.rate)
             self.note(spec.name if spec.rate is None else f"{spec.name}={spec.rate:g}")
         else:
             self._put(spec.name, 1)
 
     def _end(self, name: str) -> None:
-        if name in self._wire.kinds:
+        if name in self._wire.fault_types:
             self._wire.clear(name)
             self.note(f"{name}=0")
         else:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tickrig.emulators.bench.emulated import Touchable
-from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.bench.emulated import HasSignals
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.end import Accepted, CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge
 from tickrig.emulators.can.outside.without_echo import CountingPort
@@ -20,7 +20,7 @@ from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER
 
 
-class CanEmulator(Workbench):
+class CanEmulator(RunningEmulator):
     """Devices, their bus, their operator, and a rig that runs them.
 
     One more end of the bus belongs to the caller: what it sends is heard by all
@@ -42,7 +42,7 @@ class CanEmulator(Workbench):
     def __init__(  # noqa: PLR0913 - options, by keyword
         self,
         name: str,
-        physical: Touchable,
+        physical: HasSignals,
         stations: Sequence[Station[Frames]],
         wire: CanWire,
         *,
@@ -59,7 +59,11 @@ class CanEmulator(Workbench):
         beyond = self._open_end(None if outside else frozenset())
         bridges = [CanBridge(beyond, outside)] if outside else []
         self.rig = Rig(
-            *stations, bridges=bridges, couplings=couplings, clock=clock, agenda=self.agenda
+            *stations,
+            bridges=bridges,
+            couplings=couplings,
+            clock=clock,
+            event_queue=self.event_queue,
         )
 
     def _open_end(self, accepts: Accepted = None) -> CanEnd:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from tickrig.device.core import Device
-from tickrig.emulators.can.controller import CanController
+from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER
@@ -82,7 +82,7 @@ class CanEnd:
     def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
         self.wire, self.number, self._accepts = wire, number, accepts
         self.segment = wire.bus
-        self.controller = CanController()
+        self.controller = ErrorCounters()
         self.queue: deque[CanFrame] = deque()
         self.inbox: list[CanFrame] = []
         self.stamps: list[int] = []  # when the frames of `inbox` had arrived

@@ -24,7 +24,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class CanFaultKind:
+class CanFaultType:
     """A fault that can be armed by name.
 
     Attributes:
@@ -38,22 +38,22 @@ class CanFaultKind:
     verdict: Verdict | None = None
 
 
-CAN_FAULTS: Final[Mapping[str, CanFaultKind]] = MappingProxyType(
+CAN_FAULTS: Final[Mapping[str, CanFaultType]] = MappingProxyType(
     {
-        "drop": CanFaultKind(
+        "drop": CanFaultType(
             "each frame is acknowledged and then taken by nobody, at this rate",
             verdict=Verdict.DROPPED,
         ),
-        "corrupt": CanFaultKind(
+        "corrupt": CanFaultType(
             "a bit of each frame is turned over, at this rate", verdict=Verdict.CORRUPTED
         ),
-        "duplicate": CanFaultKind(
+        "duplicate": CanFaultType(
             "each frame is sent again, its sender saw the last bit wrong, at this rate",
             verdict=Verdict.DUPLICATED,
         ),
-        "delay": CanFaultKind("each time a node sends, it is held for 10 ms, at this rate"),
-        "babble": CanFaultKind("a broken node sends 000# without a pause", rated=False),
-        "short": CanFaultKind("the lines touch: nobody can send", rated=False),
+        "delay": CanFaultType("each time a node sends, it is held for 10 ms, at this rate"),
+        "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
+        "short": CanFaultType("the lines touch: nobody can send", rated=False),
     }
 )
 
@@ -69,12 +69,12 @@ class CanFaults:
         changed: told of each fault that begins (True) or ends (False).
 
     Attributes:
-        kinds: the faults that can be armed, by name.
+        fault_types: the faults that can be armed, by name.
         active: whether any is armed.
         place: a number from which the place of a turned bit is taken.
     """
 
-    kinds = CAN_FAULTS
+    fault_types = CAN_FAULTS
 
     def __init__(self, seed: int, changed: Callable[[str, bool], None]) -> None:
         self._seed, self._changed = seed, changed
@@ -90,7 +90,7 @@ class CanFaults:
 
     def check(self, name: str, rate: float | None) -> None:
         """Raise ValueError unless the fault can be armed like this."""
-        check_rate(name, rate, rated=self.kinds[name].rated)
+        check_rate(name, rate, rated=self.fault_types[name].rated)
 
     def arm(self, name: str, rate: float | None = None) -> None:
         """Let a fault begin, at the time the bus has reached; one of the same name is replaced.
@@ -116,7 +116,7 @@ class CanFaults:
         if self._verdict is None:
             self._verdict = Verdict.SENT
             for name in self._armed:
-                verdict = self.kinds[name].verdict
+                verdict = self.fault_types[name].verdict
                 if verdict and self._hits(name, name) and self._verdict is Verdict.SENT:
                     self._verdict = verdict
             self.place = self._chance("place").draw()

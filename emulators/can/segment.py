@@ -8,8 +8,8 @@ from math import gcd
 from typing import TYPE_CHECKING, Final
 
 from tickrig.emulators.can.arbiter import CanArbiter
-from tickrig.emulators.can.confinement import CanConfinement
-from tickrig.emulators.can.controller import CanController
+from tickrig.emulators.can.error_counters import ErrorCounters
+from tickrig.emulators.can.fault_confinement import FaultConfinement
 from tickrig.emulators.can.faults import CanFaults, Verdict
 from tickrig.emulators.can.priority import dominant, first_difference
 from tickrig.emulators.can.recovery import Recovery
@@ -61,7 +61,7 @@ class CanSegment:
         self.routes = CanRoutes()
         self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
         self._faults, self._observers = faults, observers
-        self._confinement = CanConfinement(self.routes.ends, self._state_changed)
+        self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
         self._recovery = Recovery(self.bit)
         self._arbiter = CanArbiter(start_us * self.unit)
         self._on_bus = 0  # ends that acknowledge
@@ -318,7 +318,7 @@ class CanSegment:
     def _come_back(self) -> None:
         """Let nodes return from bus-off."""
         for end in self._recovery.take(self._start):
-            self._confinement.count(self._due_us, end, CanController.restart)
+            self._confinement.count(self._due_us, end, ErrorCounters.restart)
 
     def _take_off(self, frame: CanFrame) -> None:
         """Take a frame that went well from its queues."""

@@ -10,7 +10,7 @@ from typing import Final
 import click
 
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
-from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.outside_bus import open_bus
 from tickrig.emulators.can.wire import CanWire
@@ -72,7 +72,7 @@ class CanopenRun(EmulatorRun):
         self._described: list[Described] = []
         self._channel = VIRTUAL_CHANNEL
 
-    def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
+    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
         self._described = describe_nodes(self._options.specs, self._options.profile)
         if not self._described:
             raise Refused(NO_NODE)
@@ -132,7 +132,7 @@ class CanopenRun(EmulatorRun):
         wire.observers.append(trace.hear)
         return trace
 
-    def _attend(self, bench: Workbench, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
         options = self._options
         if not (options.scenario or options.verbose):
             return None
@@ -142,7 +142,7 @@ class CanopenRun(EmulatorRun):
             transcript.watch(0, *(name for name, item in outputs if not item.unit))
         return Player(bench, scenario, transcript, stays=options.in_real_time)
 
-    def _greet(self, bench: Workbench) -> None:
+    def _greet(self, bench: RunningEmulator) -> None:
         nodes = [f"{item.name} ({item.description.file})" for item in self._described]
         more = f" and {len(nodes) - SHOWN_NODES} more" if len(nodes) > SHOWN_NODES else ""
         say(f"CANopen slave {', '.join(nodes[:SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser
@@ -46,7 +46,7 @@ class EmulatorRun(ABC):
     def __init__(self, options: RunOptions, *, in_real_time: bool) -> None:
         self._shared, self._in_real_time = options, in_real_time
         self._clock = ServingClock()
-        self._running: Workbench | None = None
+        self._running: RunningEmulator | None = None
         self._stopped = False
 
     def run(self) -> int:
@@ -82,19 +82,19 @@ class EmulatorRun(ABC):
         return True
 
     @abstractmethod
-    def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
+    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
         """Build what options and scenario are checked against; nothing is opened."""
 
     @abstractmethod
-    def _open(self, stack: ExitStack) -> Workbench:
+    def _open(self, stack: ExitStack) -> RunningEmulator:
         """Open the outside world; each thing is given back at the end."""
 
     @abstractmethod
-    def _greet(self, bench: Workbench) -> None:
+    def _greet(self, bench: RunningEmulator) -> None:
         """Say where it is and how to talk to it."""
 
     @abstractmethod
-    def _attend(self, bench: Workbench, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
         """Have the run written down as far as that is wanted."""
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
@@ -109,7 +109,7 @@ class EmulatorRun(ABC):
         except ValueError as error:
             raise Refused(str(error)) from None
 
-    def _go_on(self, bench: Workbench) -> None:
+    def _go_on(self, bench: RunningEmulator) -> None:
         """Step until somebody stops it."""
         while bench.running and not self._stopped:
             bench.step()
@@ -119,11 +119,11 @@ class EmulatorRun(ABC):
         if self._running:
             self._running.stop()
 
-    def _sum_up(self, bench: Workbench, player: Player | None) -> int:
+    def _sum_up(self, bench: RunningEmulator, player: Player | None) -> int:
         """Say how it went; 3 if it was not recorded to the end, 1 if an expectation was missed."""
         rig = bench.rig
-        worst = f" (up to {rig.late_us / 1_000:.1f} ms)" if rig.late_steps else ""
-        late = f"; late ticks: {rig.late_steps}{worst}" if self._in_real_time else ""
+        worst = f" (up to {rig.worst_late_us / 1_000:.1f} ms)" if rig.late_ticks else ""
+        late = f"; late ticks: {rig.late_ticks}{worst}" if self._in_real_time else ""
         lost = "".join(f"; {what.replace('lost_', '')} lost: {n}" for what, n in bench.lost.items())
         say(f"ran {rig.now_us / 1e6:.3f} s{late}{lost}")
         if player and player.met + player.missed:

@@ -21,7 +21,7 @@ def line_options(wire_faults: str, terminals: str) -> Decorator:
 
     def device_faults(context: click.Context) -> Iterator[str]:
         inputs = load(f"{terminals}:INPUTS")
-        return (item.name for item in inputs if item.kind.value == "fault")
+        return (item.name for item in inputs if item.type.value == "fault")
 
     return add_options(
         click.option("--link", type=PATH, help="Symbolic link to make to the terminal."),

@@ -11,15 +11,15 @@ from pathlib import Path
 import click
 
 from tickrig.emulators.bench.emulated import Emulated
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.trace import Config, Header
 from tickrig.emulators.record.transcript import Transcript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Encoder, Line, ScenarioParser, Sender
-from tickrig.emulators.serial.emulator import Emulator, LineKind
+from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -44,7 +44,7 @@ def by_miniterm(link: str, baud: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class DeviceType:
     """What the command line of one kind of device adds.
 
     Attributes:
@@ -64,7 +64,7 @@ class Kind:
     is_event: Callable[[WireLine], bool] = lambda line: True
     panel: Callable[[Emulator], None] | None = None
     senders: Mapping[str, Sender] | None = None
-    line: LineKind = field(default_factory=LineKind)
+    line: LineSettings = field(default_factory=LineSettings)
     talk: Callable[[str, int], str] = by_miniterm
 
 
@@ -79,12 +79,12 @@ class SerialRun(EmulatorRun):
     """
 
     def __init__(
-        self, kind: Kind, device: Emulated[bytes], config: Config, options: Options
+        self, kind: DeviceType, device: Emulated[bytes], config: Config, options: Options
     ) -> None:
         super().__init__(options, in_real_time=options.in_real_time)
         self._kind, self._device, self._config, self._options = kind, device, config, options
 
-    def _rehearsal(self) -> tuple[Workbench, ScenarioParser]:
+    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
         if self._options.panel:
             self._check_panel()
         kind = self._kind
@@ -144,7 +144,7 @@ class SerialRun(EmulatorRun):
         except OSError as error:
             refuse_path("trace", error)
 
-    def _attend(self, bench: Workbench, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
         options, everything = self._options, bool(self._options.scenario)
         if options.panel or not (everything or options.verbose):
             return None
@@ -153,13 +153,13 @@ class SerialRun(EmulatorRun):
         transcript = Transcript(bench, click.echo, wanted)
         return Player(bench, scenario, transcript, stays=options.in_real_time)
 
-    def _go_on(self, bench: Workbench) -> None:
+    def _go_on(self, bench: RunningEmulator) -> None:
         if self._options.panel and self._kind.panel and isinstance(bench, Emulator):
             self._kind.panel(bench)
             return
         super()._go_on(bench)
 
-    def _greet(self, bench: Workbench) -> None:
+    def _greet(self, bench: RunningEmulator) -> None:
         if self._options.panel:
             return
         click.echo(bench.link)

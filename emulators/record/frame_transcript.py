@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tickrig.emulators.bench.workbench import Workbench
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.transcript import Transcript
 
 
@@ -16,7 +16,7 @@ class FrameTranscript(Transcript):
         write: takes the lines.
     """
 
-    def __init__(self, emulator: Workbench, write: Callable[[str], None]) -> None:
+    def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:
         super().__init__(emulator, write, lambda line: False)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:

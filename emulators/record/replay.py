@@ -96,13 +96,13 @@ def replay(recording: Recording, device: Emulated[bytes]) -> Difference | None:
     for record in records:
         if record.mark is Mark.PHYSICAL:
             rig.run_to(record.at_us - 1)
-            _touch(device, record)
+            _set_signal(device, record)
     rig.run_to(recording.until_us)
     said = [record for record in records if record.mark is Mark.FROM_DEVICE]
     return _first_difference(said, port.sent)
 
 
-def _touch(device: Emulated[bytes], record: Record) -> None:
+def _set_signal(device: Emulated[bytes], record: Record) -> None:
     if record.text == RESET:
         device.reset()
         return

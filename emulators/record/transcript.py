@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.emulators.bench.emulated import look_at
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
 from tickrig.host.text.values import Setting, format_time
@@ -27,18 +27,18 @@ class Transcript:
 
     def __init__(
         self,
-        emulator: Workbench,
+        emulator: RunningEmulator,
         write: Callable[[str], None],
         wanted: Callable[[WireLine], bool] = lambda line: True,
     ) -> None:
         self._emulator, self._write, self._wanted = emulator, write, wanted
         self._shown: dict[str, Setting] = {}
         self._sending = False
-        emulator.operator.note = lambda text: self.tell(emulator.touch_us, "!", text)
+        emulator.operator.note = lambda text: self.tell(emulator.effective_us, "!", text)
         emulator.log.listeners.append(self._hear)
         emulator.after_step.append(self._look)
         if STATE in emulator.device.outputs:
-            self.watch(emulator.touch_us, STATE)
+            self.watch(emulator.effective_us, STATE)
 
     def tell(self, now_us: int, mark: str, text: str) -> None:
         """Write a line."""

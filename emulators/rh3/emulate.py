@@ -6,12 +6,12 @@ from typing import Any, Final
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.build import NAME, config_to_trace
 from tickrig.emulators.rh3.frame_log import frame_splitter
 from tickrig.emulators.rh3.verbs import verbs
-from tickrig.emulators.serial.emulator import LineKind
+from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 
 CYCLE: Final = b"01 17 "
@@ -22,12 +22,12 @@ def emulate(baud: int, options: dict[str, Any]) -> int:
     """Run a base as the command line says, and return the exit status."""
     settings = {name: options.pop(name) for name in ("address", *NAMES)}
     parameters = read_parameters({**settings, "seed": options["seed"]})
-    kind = Kind(
+    kind = DeviceType(
         NAME,
         "RH3 base",
         is_event=_is_event,
         senders=verbs(parameters.address),
-        line=LineKind(baud, splitter=frame_splitter, wire=Rs485Line),
+        line=LineSettings(baud, splitter=frame_splitter, wire=Rs485Line),
         talk=lambda link, baud: (
             f" Any Modbus RTU master can open this path, as address {parameters.address}."
             f" To address 1:\n  rh3 goto 1 0 0 --device {link} --baud {baud}"

@@ -15,7 +15,7 @@ Fault = Callable[[int, W], W]
 
 
 @dataclass(frozen=True, slots=True)
-class FaultKind(Generic[W]):
+class FaultType(Generic[W]):
     """A fault that can be armed by name.
 
     Attributes:
@@ -37,13 +37,15 @@ class FaultyPort(Generic[W]):
 
     Args:
         port: the port behind it.
-        kinds: the faults that can be armed, by name.
+        fault_types: the faults that can be armed, by name.
         seed: seed of all chance in it.
     """
 
-    def __init__(self, port: Port[W], kinds: Mapping[str, FaultKind[W]], seed: int = 0) -> None:
+    def __init__(
+        self, port: Port[W], fault_types: Mapping[str, FaultType[W]], seed: int = 0
+    ) -> None:
         self._port, self._seed = port, seed
-        self.kinds = kinds
+        self.fault_types = fault_types
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
 
@@ -54,7 +56,7 @@ class FaultyPort(Generic[W]):
 
     def check(self, name: str, rate: float | None) -> None:
         """Raise ValueError unless the fault can be armed like this."""
-        check_rate(name, rate, rated=self.kinds[name].rated)
+        check_rate(name, rate, rated=self.fault_types[name].rated)
 
     def arm(self, name: str, rate: float | None = None) -> None:
         """Let a fault begin; one of the same name is replaced.
@@ -64,7 +66,7 @@ class FaultyPort(Generic[W]):
             ValueError: a rate is missing, out of range or too much.
         """
         self.check(name, rate)
-        threshold, make = threshold_of(rate or 0), self.kinds[name].make
+        threshold, make = threshold_of(rate or 0), self.fault_types[name].make
         self._to_device[name] = make(Chance(self._seed, f"{name} >"), threshold)
         self._from_device[name] = make(Chance(self._seed, f"{name} <"), threshold)
 

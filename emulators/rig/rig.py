@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, Protocol
 
 from tickrig.device.core import Device, NonCopyable, W
-from tickrig.emulators.rig.agenda import Agenda
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import Port, Wire, WirePort
 from tickrig.emulators.rig.timetable import Timetable
 from tickrig.wire.instant import NEVER
@@ -77,7 +77,7 @@ class Rig(NonCopyable):
     Stations on a shared wire stand in a timetable and cost nothing until they
     have work; the others are looked at in every step.
 
-    What the agenda holds is done by whoever makes time pass, in whatever way:
+    What the event_queue holds is done by whoever makes time pass, in whatever way:
     after all that happens before its time, and before the tick of its time.
 
     Args:
@@ -86,14 +86,14 @@ class Rig(NonCopyable):
         couplings: what joins the devices beside their wires, in the order in which they act.
         clock: a `VirtualClock` unless given.
         dense: run every tick of every device.
-        agenda: what is to be done between ticks; a new one unless given.
+        event_queue: what is to be done between ticks; a new one unless given.
 
     Attributes:
-        agenda: what is to be done between ticks.
-        acting_us: the time for which an action of the agenda is being done, else None.
+        event_queue: what is to be done between ticks.
+        acting_us: the time for which an action of the event_queue is being done, else None.
         now_us: time since the start of the rig.
-        late_us: by how much the latest step was late.
-        late_steps: how many steps began more than `LATE_US` late.
+        worst_late_us: by how much the worst step was late.
+        late_ticks: how many steps began more than `LATE_US` late.
     """
 
     def __init__(
@@ -103,10 +103,10 @@ class Rig(NonCopyable):
         couplings: Sequence[Coupling] = (),
         clock: Clock | None = None,
         dense: bool = False,
-        agenda: Agenda | None = None,
+        event_queue: EventQueue | None = None,
     ) -> None:
-        self.now_us = self.late_us = self.late_steps = 0
-        self.agenda = agenda or Agenda()
+        self.now_us = self.worst_late_us = self.late_ticks = 0
+        self.event_queue = event_queue or EventQueue()
         self.acting_us: int | None = None
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
@@ -189,7 +189,7 @@ class Rig(NonCopyable):
     @property
     def _planned_us(self) -> int:
         """The next action, or the next tick that is known to have work."""
-        now_us, next_us = self.now_us, min(self._timetable.first_us, self.agenda.due_us)
+        now_us, next_us = self.now_us, min(self._timetable.first_us, self.event_queue.due_us)
         for bridge in self._bridges:
             next_us = min(next_us, bridge.due_us)
         if self._jumps:
@@ -223,7 +223,7 @@ class Rig(NonCopyable):
 
     def _happen(self, next_us: int) -> None:
         """Do what is due next: all actions of that time, or else its tick."""
-        if self.agenda.due_us <= next_us:
+        if self.event_queue.due_us <= next_us:
             self._act(next_us)
         else:
             self._run(next_us)
@@ -233,7 +233,7 @@ class Rig(NonCopyable):
         self._pass_to(max(self.now_us, now_us - 1))
         self.acting_us = now_us
         try:
-            self.agenda.run(now_us)
+            self.event_queue.run(now_us)
         finally:
             self.acting_us = None
         self._look()
@@ -253,8 +253,8 @@ class Rig(NonCopyable):
     def _run(self, now_us: int) -> None:
         late_us = self._clock.wait_until(now_us)
         self.now_us = self._open_us = now_us
-        self.late_us = max(self.late_us, late_us)
-        self.late_steps += late_us > LATE_US
+        self.worst_late_us = max(self.worst_late_us, late_us)
+        self.late_ticks += late_us > LATE_US
         for bridge in self._bridges:
             bridge.take_in(now_us)
         for wire in self._wires:

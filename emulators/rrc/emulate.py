@@ -8,7 +8,7 @@ from typing import Any, Final
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rrc.build import NAME, config_to_trace
 from tickrig.emulators.serial.emulator import Emulator
@@ -31,7 +31,7 @@ def _panel(emulator: Emulator) -> None:
     run_panel(emulator)
 
 
-KIND: Final = Kind(NAME, "RRC", {"check": _with_check}, _is_event, _panel)
+KIND: Final = DeviceType(NAME, "RRC", {"check": _with_check}, _is_event, _panel)
 
 
 def emulate(power_on_event: str, options: Mapping[str, Any]) -> int:

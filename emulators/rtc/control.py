@@ -149,7 +149,7 @@ class SystemControl(RequestDispatcher):
             "components": len(self._manager.components),
             "now_us": self._manager.now_us,
             "late_ticks": self._runner.late_ticks,
-            "late_us": self._runner.late_us,
+            "late_us": self._runner.worst_late_us,
         }
 
     def _stop(self, request: Object) -> Object:

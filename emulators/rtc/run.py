@@ -104,7 +104,7 @@ def _run(manager: Manager, runner: RealTime, options: SystemOptions) -> None:
     names = ", ".join(component.instance_name for component in manager.components) or "Nothing"
     say(f"{names}. Ctrl-C ends.\n  tickrig rtc ls -l --at {options.control}")
     runner.run()
-    worst = f" (up to {runner.late_us / 1_000:.1f} ms)" if runner.late_ticks else ""
+    worst = f" (up to {runner.worst_late_us / 1_000:.1f} ms)" if runner.late_ticks else ""
     say(f"ran {manager.now_us / 1e6:.3f} s; late ticks: {runner.late_ticks}{worst}")
 
 

@@ -9,13 +9,13 @@ import click
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun
+from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
 from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
 from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.verbs import verbs
-from tickrig.emulators.serial.emulator import LineKind
+from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.text.user_file import explain_error
 from tickrig.wire.rtc_lite.codes import Command, ContextType
@@ -43,12 +43,12 @@ def emulate(  # noqa: PLR0913, PLR0917 - the command line
         config = NodeConfig(Framing(framing), Checksum(checksum), ec, timer_hz or DEFAULT_RATE_HZ)
     with refused_at("--node"):
         device = RtcLiteNode(find_component(node), config)
-    kind = Kind(
+    kind = DeviceType(
         NAME,
         f"RTC-Lite node {device.component.type_name}",
         is_event=_is_event,
         senders=verbs(device.component, config),
-        line=LineKind(baud, LINE_FAULTS, frame_splitter(config)),
+        line=LineSettings(baud, LINE_FAULTS, frame_splitter(config)),
         talk=lambda link, baud: (
             f" Its proxy opens this path:\n  tickrig rtc run SYSTEM.toml --lite NAME={link}@{baud}"
         ),

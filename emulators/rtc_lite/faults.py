@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.emulators.rig.faults import Fault, FaultKind
+from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.wire.rtc_lite.codes import Command
 
@@ -39,10 +39,10 @@ def _ping(chance: Chance, threshold: int) -> Fault[bytes]:
     return lambda now_us, data: _PING_ANSWER.sub(cut, data)
 
 
-LINE_FAULTS: Final[Mapping[str, FaultKind[bytes]]] = MappingProxyType(
+LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = MappingProxyType(
     {
         **BYTE_FAULTS,
-        "noise": FaultKind("a byte of chance comes before each byte at this rate", _noise),
-        "ping": FaultKind("every n-th answer to a PING is lost, at a rate of 1/n", _ping),
+        "noise": FaultType("a byte of chance comes before each byte at this rate", _noise),
+        "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _ping),
     }
 )

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import assert_never
 
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.transcript import Transcript
@@ -53,7 +53,7 @@ class Player:
 
     def __init__(
         self,
-        emulator: Workbench,
+        emulator: RunningEmulator,
         scenario: Sequence[Line],
         transcript: Transcript,
         *,
@@ -64,16 +64,16 @@ class Player:
         self.met = self.missed = 0
         emulator.log.listeners.append(self._hear)
         for line in scenario:
-            emulator.agenda.put(line, line.at_us, partial(self._carry_out, line))
+            emulator.event_queue.put(line, line.at_us, partial(self._carry_out, line))
         if not stays and not any(isinstance(line.action, End) for line in scenario):
             end_us = max((_end_us(line) for line in scenario), default=0)
-            emulator.agenda.put(self, end_us, self._end)
+            emulator.event_queue.put(self, end_us, self._end)
 
     def finish(self, now_us: int) -> None:
         """Count the expectations that are still open as missed."""
         for item in list(self._open):
             self._miss(item, now_us)
-            self._emulator.agenda.drop(item)
+            self._emulator.event_queue.drop(item)
 
     def _carry_out(self, line: Line, now_us: int) -> None:
         """Do it; what the device itself refuses counts as missed."""
@@ -111,14 +111,14 @@ class Player:
         pattern = re.compile(".*".join(map(re.escape, expect.text.split("*"))))
         item = _Expectation(line, expect, pattern)
         self._open.append(item)
-        self._emulator.agenda.put(item, now_us + expect.within_us, partial(self._miss, item))
+        self._emulator.event_queue.put(item, now_us + expect.within_us, partial(self._miss, item))
 
     def _hear(self, heard: WireLine) -> None:
         text = escape(heard.data)
         if heard.mark is Mark.FROM_DEVICE:
             for item in [item for item in self._open if item.pattern.fullmatch(text)]:
                 self._open.remove(item)
-                self._emulator.agenda.drop(item)
+                self._emulator.event_queue.drop(item)
                 self.met += 1
 
     def _miss(self, item: _Expectation, now_us: int) -> None:

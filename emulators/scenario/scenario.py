@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.emulators.bench.emulated import Touchable
+from tickrig.emulators.bench.emulated import HasSignals
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
 from tickrig.emulators.record.byte_text import unescape
@@ -115,7 +115,7 @@ class ScenarioParser:
 
     def __init__(
         self,
-        device: Touchable,
+        device: HasSignals,
         operator: Operator,
         encoders: Mapping[str, Encoder] | None = None,
         *,

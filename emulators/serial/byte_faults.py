@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.chance import Chance
-from tickrig.emulators.rig.faults import Fault, FaultKind
+from tickrig.emulators.rig.faults import Fault, FaultType
 
 
 def _flip(chance: Chance, threshold: int) -> Fault[bytes]:
@@ -37,11 +37,11 @@ def _cut(chance: Chance, threshold: int) -> Fault[bytes]:
     return lambda now_us, data: b""
 
 
-BYTE_FAULTS: Final[Mapping[str, FaultKind[bytes]]] = MappingProxyType(
+BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = MappingProxyType(
     {
-        "flip": FaultKind("each bit is turned over at this rate", _flip),
-        "drop": FaultKind("each byte is lost at this rate", _drop),
-        "dup": FaultKind("each byte arrives twice at this rate", _dup),
-        "cut": FaultKind("nothing passes", _cut, rated=False),
+        "flip": FaultType("each bit is turned over at this rate", _flip),
+        "drop": FaultType("each byte is lost at this rate", _drop),
+        "dup": FaultType("each byte arrives twice at this rate", _dup),
+        "cut": FaultType("nothing passes", _cut, rated=False),
     }
 )

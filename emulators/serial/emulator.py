@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from tickrig.emulators.bench.emulated import Emulated
+from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.wire_log import Splitter, WireLog
-from tickrig.emulators.bench.workbench import Workbench
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.clock import Clock
-from tickrig.emulators.rig.faults import FaultKind, FaultyPort
+from tickrig.emulators.rig.faults import FaultType, FaultyPort
 from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.tap import Tap
@@ -35,7 +35,7 @@ class Outside(Port[bytes], Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class LineKind:
+class LineSettings:
     """What the serial line of a kind of device is like.
 
     Attributes:
@@ -46,12 +46,12 @@ class LineKind:
     """
 
     baud: int = 115_200
-    faults: Mapping[str, FaultKind[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
+    faults: Mapping[str, FaultType[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
     splitter: Callable[[Mark], Splitter] | None = None
     wire: Callable[[int], ByteLine] = SerialLine
 
 
-class Emulator(Workbench):
+class Emulator(RunningEmulator):
     """A device, its line, its operator, and a rig that runs them.
 
     Args:
@@ -79,10 +79,10 @@ class Emulator(Workbench):
         seed: int = 0,
         trace: TraceFile | None = None,
         link: str = "",
-        line: LineKind | None = None,
+        line: LineSettings | None = None,
     ) -> None:
         self._trace, self._outside = trace, outside
-        line = line or LineKind()
+        line = line or LineSettings()
         self.line = line.wire(line.baud)
         port = FaultyPort(self.line.a, line.faults, seed)
         super().__init__(name, device, port, link)
@@ -91,7 +91,7 @@ class Emulator(Workbench):
         station = Station(TracedDevice(device, trace) if trace else device, port)
         self.host_end = HostEnd(self.line.b, self.log.hear)
         bridges = [Bridge(self.line.b, Tap(outside, self.log.hear))] if outside else []
-        self.rig = Rig(station, bridges=bridges, clock=clock, agenda=self.agenda)
+        self.rig = Rig(station, bridges=bridges, clock=clock, event_queue=self.event_queue)
 
     @property
     def _host_due_us(self) -> int:

@@ -10,9 +10,9 @@ from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
 from tickrig.emulators.bench.wire_log import WireLine
-from tickrig.emulators.commands.serial_run import Kind, Options, SerialRun, by_miniterm
+from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun, by_miniterm
 from tickrig.emulators.record.trace import Mark
-from tickrig.emulators.serial.emulator import LineKind
+from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.build import (
     NAME,
@@ -36,8 +36,8 @@ def emulate(serial: str, noise: float, scip: str, baud: int, options: dict[str, 
     with refused_at("--serial"):
         parameters = UrgParameters(serial=serial, noise=noise, seed=options["seed"], scip=scip)
     world = _world(options.pop("size"), options.pop("walls"), options.pop("posts"))
-    line = LineKind(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
-    kind = Kind(NAME, "URG-04LX", is_event=_is_event, line=line, talk=partial(_talk, scip))
+    line = LineSettings(baud, wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES))
+    kind = DeviceType(NAME, "URG-04LX", is_event=_is_event, line=line, talk=partial(_talk, scip))
     config = config_to_trace(parameters, world)
     return SerialRun(kind, Urg(parameters, world), config, Options(**options)).run()
 

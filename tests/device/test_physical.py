@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.physical import Input, InputBank, Kind
+from tickrig.device.physical import Input, InputBank, SignalType
 
 
 def bank() -> InputBank:
     level = Input("level_v", "a level", low=-5, high=5, unit="V", initial=1)
-    return InputBank([level, Input("key", "a key", Kind.BUTTON), Input("gauge", "", high=9)])
+    return InputBank([level, Input("key", "a key", SignalType.BUTTON), Input("gauge", "", high=9)])
 
 
 def test_an_input_begins_at_its_initial_value() -> None:
@@ -41,8 +41,8 @@ def test_a_wrong_input_says_what_is_allowed(name: str, value: float | str, reaso
 
 
 def test_an_input_of_another_kind_is_not_found() -> None:
-    assert bank().find("key", Kind.BUTTON).name == "key"
+    assert bank().find("key", SignalType.BUTTON).name == "key"
     with pytest.raises(ValueError, match="no button 'level_v'; known: key"):
-        bank().find("level_v", Kind.BUTTON)
+        bank().find("level_v", SignalType.BUTTON)
     with pytest.raises(ValueError, match="no fault 'key'; known: none"):
-        bank().find("key", Kind.FAULT)
+        bank().find("key", SignalType.FAULT)

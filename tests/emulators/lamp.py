@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.device.physical import Input, InputBank, Kind, Output
+from tickrig.device.physical import Input, InputBank, Output, SignalType
 from tickrig.wire.instant import NEVER
 
 OUTPUTS = {"state": Output("state", "Lit or Dark"), "count": Output("count", "bytes heard", "B")}
@@ -15,10 +15,10 @@ class Lamp:
         self.inputs = InputBank(
             (
                 Input("lamp", "lamp", initial=1),
-                Input("key", "key", Kind.BUTTON),
+                Input("key", "key", SignalType.BUTTON),
                 Input("x_mm", "x", low=-10, high=10, unit="mm"),
                 Input("y_mm", "y", low=-10, high=10, unit="mm"),
-                Input("dead", "broken", Kind.FAULT),
+                Input("dead", "broken", SignalType.FAULT),
             ),
             {"place": ("x_mm", "y_mm")},
         )

@@ -43,14 +43,14 @@ CONFIGS = [
 Act = tuple[int, bytes | tuple[str, int]]
 """How long to wait in microseconds, then bytes to send or an input to set."""
 
-touches = st.sampled_from(
+input_changes = st.sampled_from(
     [
         *(("callback_ms", 0), ("callback_ms", 7), ("callback_ms", 150)),
         *(("slow_answer", 0), ("slow_answer", 1), ("power_cut", 0), ("power_cut", 1)),
     ]
 )
 waits = st.sampled_from([0, 1, 300, 1_000, 2_500, 10_000, 19_900, 20_100, 99_000, 101_000, 700_000])
-acts = st.lists(st.tuples(waits, st.sampled_from(FRAMES) | touches), max_size=40)
+acts = st.lists(st.tuples(waits, st.sampled_from(FRAMES) | input_changes), max_size=40)
 START = DIALOGUE[1:3]
 AFTERWARDS_US = 450_000
 """The longest dead time, three callbacks of 150 ms, has passed, and each time-out."""

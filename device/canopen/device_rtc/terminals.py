@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Input, Output, SignalType
 
 SHUT_DOWN: Final = "shut_down"
 
@@ -15,7 +15,7 @@ INPUTS: Final = (
     Input(
         SHUT_DOWN,
         "button: the component ends, and the node is silent until a power cut",
-        Kind.BUTTON,
+        SignalType.BUTTON,
     ),
 )
 """Every DeviceRTC has these; a component may add its own."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.errors.error_behaviour import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
-from tickrig.device.physical import Input, Kind, QuantityBank
+from tickrig.device.physical import Input, QuantityBank, SignalType
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 
 NO_BEHAVIOUR: Final = 0
@@ -38,7 +38,7 @@ class DeviceFault:
     @property
     def input(self) -> Input:
         """The physical input."""
-        return Input(self.name, self.text, Kind.FAULT)
+        return Input(self.name, self.text, SignalType.FAULT)
 
 
 INPUT_OVERCURRENT: Final = DeviceFault(

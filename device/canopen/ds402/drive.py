@@ -198,7 +198,7 @@ class Ds402(Application):
         self.motor.step_to(now_us)
         if self.inputs.changed:
             self.inputs.changed = False
-            self._touched()
+            self._inputs_changed()
         return NEVER if self.motor.resting else now_us + TICK_US
 
     def start(self) -> None:
@@ -249,7 +249,7 @@ class Ds402(Application):
         self._configure()
         if self.inputs.changed:
             self.inputs.changed = False
-            self._touched()
+            self._inputs_changed()
         if self.switches.by_angle:
             self.switches.look(self.motor.shaft_deg)
         self.axis.wrap()
@@ -261,7 +261,7 @@ class Ds402(Application):
             self.settings = read_settings(self.parameters, self.motor.counts_per_turn)
             self.axis.configure(self.settings)
 
-    def _touched(self) -> None:
+    def _inputs_changed(self) -> None:
         inputs = self.inputs
         self.switches.set(inputs)
         wired = (

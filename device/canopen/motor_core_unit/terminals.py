@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.device.physical import Input, Kind, Output, QuantityBank
+from tickrig.device.physical import Input, Output, QuantityBank, SignalType
 from tickrig.device.servo.servo import Servo
 
 LOAD: Final = "torque from outside at the shaft, positive drives it forward"
@@ -16,10 +16,10 @@ INPUTS: Final = (
     Input("shaft_load_nm", LOAD, low=-100, high=100, unit="Nm", real=True),
     Input("load_kg_m2", "inertia of what is on the shaft", high=10, unit="kg m2", real=True),
     Input("ambient_c", "air around it", low=-40, high=125, unit="degC", initial=25, real=True),
-    Input("shaft_blocked", "the shaft is held", Kind.FAULT),
-    Input("encoder_unplugged", "the plug of the motor encoder is off", Kind.FAULT),
-    Input("motor_phase_open", "a wire of the motor is off", Kind.FAULT),
-    Input("short_circuit", "two wires of the motor touch", Kind.FAULT),
+    Input("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    Input("encoder_unplugged", "the plug of the motor encoder is off", SignalType.FAULT),
+    Input("motor_phase_open", "a wire of the motor is off", SignalType.FAULT),
+    Input("short_circuit", "two wires of the motor touch", SignalType.FAULT),
 )
 
 OUTPUTS: Final = (

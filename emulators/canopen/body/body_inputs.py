@@ -7,8 +7,8 @@ from math import degrees, radians
 from typing import Final
 
 from tickrig.device.body.wheeled_body import WheeledBody
-from tickrig.device.physical import Input, Kind, QuantityBank
 from tickrig.host.text.values import Setting
+from tickrig.device.physical import Input, QuantityBank, SignalType
 
 FAR_M: Final = 1e6
 """As far as a body can be put."""
@@ -16,7 +16,7 @@ FAR_M: Final = 1e6
 MOST_FRICTION: Final = 10
 
 
-class PoseTouch:
+class PoseSignal:
     """One coordinate of a body; setting it puts the body elsewhere, wheels and speed as they are.
 
     Args:
@@ -28,7 +28,7 @@ class PoseTouch:
 
     def __init__(self, body: WheeledBody, name: str, text: str, unit: str) -> None:
         most = 180 if name == "heading_deg" else FAR_M
-        self.item = Input(name, text, Kind.LEVEL, -most, most, unit, real=True)
+        self.item = Input(name, text, SignalType.LEVEL, -most, most, unit, real=True)
         self._body, self._bank = body, QuantityBank([self.item])
 
     def read(self) -> float:
@@ -58,7 +58,7 @@ class PoseTouch:
         self._body.pose = pose
 
 
-class FrictionTouch:
+class FrictionSignal:
     """The ground's friction, of a body that can slip."""
 
     def __init__(self, body: WheeledBody) -> None:

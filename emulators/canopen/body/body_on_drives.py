@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 from tickrig.device.body.wheeled_body import WheeledBody
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.physical import Output, QuantityBank
-from tickrig.emulators.canopen.body.body_inputs import FrictionTouch, PoseTouch
+from tickrig.emulators.canopen.body.body_inputs import FrictionSignal, PoseSignal
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.touch import Touch
 from tickrig.host.text.values import Setting
+from tickrig.emulators.canopen.node.signals import Signal
 from tickrig.wire.instant import NEVER
 
 NAME: Final = "body"
@@ -65,16 +65,16 @@ class BodyOnDrives:
     def __init__(self, body: WheeledBody, wheels: Collection[Wheel]) -> None:
         self.body = body
         self._shafts = {wheel.name: _Shaft(wheel) for wheel in wheels}
-        self.physical: Mapping[str, Touch] = {
-            touch.item.name: touch
-            for touch in (
-                PoseTouch(body, "x_m", "place", "m"),
-                PoseTouch(body, "y_m", "place, to the left of x", "m"),
-                PoseTouch(body, "heading_deg", "from x towards y", "deg"),
+        self.physical: Mapping[str, Signal] = {
+            signal.item.name: signal
+            for signal in (
+                PoseSignal(body, "x_m", "place", "m"),
+                PoseSignal(body, "y_m", "place, to the left of x", "m"),
+                PoseSignal(body, "heading_deg", "from x towards y", "deg"),
             )
         }
         if body.parameters.friction is not None:
-            self.physical = {**self.physical, "friction": FrictionTouch(body)}
+            self.physical = {**self.physical, "friction": FrictionSignal(body)}
         self.outputs: Mapping[str, Output] = {item.name: item for item in BODY_OUTPUTS}
         self.groups: Mapping[str, tuple[str, ...]] = MappingProxyType(
             {"pose": ("x_m", "y_m", "heading_deg")}
@@ -91,11 +91,11 @@ class BodyOnDrives:
         self.body.step({name: shaft.angle_rad for name, shaft in self._shafts.items()})
         self._load()
 
-    def touch(self, name: str) -> Touch | None:
+    def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
         return self.physical.get(name)
 
-    def touchable(self) -> list[str]:
+    def signal_names(self) -> list[str]:
         """Return all names."""
         return list(self.physical)
 

@@ -12,8 +12,8 @@ from tickrig.device.physical import Output
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
-from tickrig.emulators.canopen.node.touch import ObjectTouch, Touch, find_object, object_name
 from tickrig.host.text.values import Setting
+from tickrig.emulators.canopen.node.signals import ObjectSignal, Signal, find_object, object_name
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
@@ -73,7 +73,7 @@ class Node(NonCopyable):
         self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
         bank = self.application.inputs
-        self.physical: Mapping[str, Touch] = {
+        self.physical: Mapping[str, Signal] = {
             "power_off": Switch("power_off", "its supply is cut", self._switch),
             "unplugged": Switch("unplugged", "its CAN plug is pulled", self._plug),
             "emergency": Emergency(slave, self._defer),
@@ -128,16 +128,16 @@ class Node(NonCopyable):
         self._ticked = True
         return self.slave.tick(now_us, rx)
 
-    def touch(self, name: str) -> Touch | None:
+    def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
         if (physical := self.physical.get(name)) is not None:
             return physical
         entry = find_object(self.slave.dictionary, name)
         if entry is None:
             return None
-        return ObjectTouch(object_name(self.slave.dictionary, entry), entry, self._defer)
+        return ObjectSignal(object_name(self.slave.dictionary, entry), entry, self._defer)
 
-    def touchable(self) -> list[str]:
+    def signal_names(self) -> list[str]:
         """Return all names."""
         dictionary = self.slave.dictionary
         return [*self.physical, *(object_name(dictionary, entry) for entry in dictionary)]

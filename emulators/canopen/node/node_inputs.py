@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Input, Kind, QuantityBank
-from tickrig.emulators.canopen.node.touch import Later
 from tickrig.host.text.values import Setting
+from tickrig.device.physical import Input, QuantityBank, SignalType
+from tickrig.emulators.canopen.node.signals import Later
 
 ERROR_BITS: Final = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08}
 """Bit of the error register by the first digit of an emergency error code (CiA 301)."""
@@ -17,7 +17,7 @@ COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
 
 class Switch:
-    """A physical fault of every node; see `Touch`.
+    """A physical fault of every node; see `Signal`.
 
     Args:
         name: what it is called.
@@ -26,7 +26,7 @@ class Switch:
     """
 
     def __init__(self, name: str, text: str, switch: Callable[[int], None]) -> None:
-        self.item = Input(name, text, Kind.FAULT)
+        self.item = Input(name, text, SignalType.FAULT)
         self._switch, self._value = switch, 0
 
     def read(self) -> int:
@@ -83,11 +83,11 @@ class Quantity:
     Args:
         bank: the inputs of the node's application.
         item: which of them.
-        touched: called after each change.
+        on_change: called after each change.
     """
 
-    def __init__(self, bank: QuantityBank, item: Input, touched: Callable[[], None]) -> None:
-        self._bank, self.item, self._touched = bank, item, touched
+    def __init__(self, bank: QuantityBank, item: Input, on_change: Callable[[], None]) -> None:
+        self._bank, self.item, self._on_change = bank, item, on_change
 
     def read(self) -> float:
         """Return the present value."""
@@ -100,7 +100,7 @@ class Quantity:
     def write(self, value: Setting) -> None:
         """Set it; the device's next tick sees it."""
         self._bank.set(self.item.name, value)
-        self._touched()
+        self._on_change()
 
 
 def _register_bit(code: int) -> int:

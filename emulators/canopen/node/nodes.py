@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Protocol
 
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Input, Output, SignalType
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.touch import Touch
 from tickrig.host.text.values import Setting
+from tickrig.emulators.canopen.node.signals import Signal
 
 
 class Part(Protocol):
@@ -25,14 +25,14 @@ class Part(Protocol):
     """
 
     name: str
-    physical: Mapping[str, Touch]
+    physical: Mapping[str, Signal]
     groups: Mapping[str, tuple[str, ...]]
     outputs: Mapping[str, Output]
 
-    def touch(self, name: str) -> Touch | None:
+    def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
 
-    def touchable(self) -> list[str]:
+    def signal_names(self) -> list[str]:
         """Return all names."""
         ...
 
@@ -113,42 +113,42 @@ class NodeInputs:
 
     def __getitem__(self, name: str) -> Setting:
         """Return the present value of an input."""
-        return self._touch(name).read()
+        return self._signal(name).read()
 
     def set(self, name: str, value: Setting) -> None:
         """Set an input; ValueError if there is none, or it does not take the value."""
-        self._touch(name).write(value)
+        self._signal(name).write(value)
 
     def check(self, name: str, value: Setting) -> Setting:
         """Return the value, or raise ValueError as `set` would, as far as can be known before."""
-        return self._touch(name).check(value)
+        return self._signal(name).check(value)
 
-    def find(self, name: str, kind: Kind | None = None) -> Input:
-        """Return the description of an input; ValueError if there is none of the kind."""
+    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
+        """Return the description of an input; ValueError if there is none of this type."""
         item = self.table.get(name)
-        if item is None or kind not in (None, item.kind):
-            wanted = kind.value if kind else "input"
-            names = self.names(kind) if kind else self.table
+        if item is None or signal_type not in (None, item.type):
+            wanted = signal_type.value if signal_type else "input"
+            names = self.names(signal_type) if signal_type else self.table
             raise ValueError(f"no {wanted} {name!r}; known: {known(names) or 'none'}")
         return item
 
-    def names(self, kind: Kind) -> tuple[str, ...]:
-        """Return the names of all inputs of a kind; objects are levels and texts."""
-        if kind in (Kind.BUTTON, Kind.FAULT):
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return the names of all inputs of a type; objects are levels and texts."""
+        if signal_type in (SignalType.BUTTON, SignalType.FAULT):
             return tuple(
                 self._nodes.full_name(part, name)
                 for part in self._nodes.parts
-                for name, touch in part.physical.items()
-                if touch.item.kind is kind
+                for name, signal in part.physical.items()
+                if signal.item.type is signal_type
             )
-        return tuple(name for name in self.table if self.table[name].kind is kind)
+        return tuple(name for name in self.table if self.table[name].type is signal_type)
 
-    def _touch(self, name: str) -> Touch:
+    def _signal(self, name: str) -> Signal:
         part, rest = self._nodes.find(name)
-        touch = part.touch(rest) if part else None
-        if touch is None:
+        signal = part.signal(rest) if part else None
+        if signal is None:
             raise ValueError(f"no input {name!r}; known: {known(self.table)}")
-        return touch
+        return signal
 
 
 class _Table(Mapping[str, Input]):
@@ -159,18 +159,18 @@ class _Table(Mapping[str, Input]):
 
     def __getitem__(self, name: str) -> Input:
         part, rest = self._nodes.find(name)
-        touch = part.touch(rest) if part else None
-        if part is None or touch is None:
+        signal = part.signal(rest) if part else None
+        if part is None or signal is None:
             raise KeyError(name)
-        return replace(touch.item, name=self._nodes.full_name(part, touch.item.name))
+        return replace(signal.item, name=self._nodes.full_name(part, signal.item.name))
 
     def __contains__(self, name: object) -> bool:
         part, rest = self._nodes.find(name) if isinstance(name, str) else (None, "")
-        return part is not None and part.touch(rest) is not None
+        return part is not None and part.signal(rest) is not None
 
     def __iter__(self) -> Iterator[str]:
         nodes = self._nodes
-        return (nodes.full_name(part, name) for part in nodes.parts for name in part.touchable())
+        return (nodes.full_name(part, name) for part in nodes.parts for name in part.signal_names())
 
     def __len__(self) -> int:
-        return sum(len(part.touchable()) for part in self._nodes.parts)
+        return sum(len(part.signal_names()) for part in self._nodes.parts)

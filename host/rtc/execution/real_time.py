@@ -27,7 +27,7 @@ class RealTime:
 
     Periods that are late run one after the other, each told the time at which
     it was due. A system that always takes longer than its periods falls behind
-    for good, and `late_us` says so.
+    for good, and `worst_late_us` says so.
 
     Args:
         schedule: what is run, from its present on.
@@ -36,14 +36,14 @@ class RealTime:
     Attributes:
         running: False once `stop` was called.
         late_ticks: how many ticks began more than `LATE_US` late.
-        late_us: by how much the latest of them was late.
+        worst_late_us: by how much the worst of them was late.
         after_tick: told the time after each tick.
     """
 
     def __init__(self, schedule: Schedule, clock: Clock) -> None:
         self._schedule, self._clock = schedule, clock
         self._start_us = schedule.now_us
-        self.running, self.late_ticks, self.late_us = True, 0, 0
+        self.running, self.late_ticks, self.worst_late_us = True, 0, 0
         self.after_tick: list[Callable[[int], None]] = []
 
     def run(self) -> None:
@@ -56,7 +56,7 @@ class RealTime:
         schedule = self._schedule
         until_us = min(schedule.due_us, schedule.now_us + PAUSE_US)
         late_us = self._clock.wait_until(until_us - self._start_us)
-        self.late_us = max(self.late_us, late_us)
+        self.worst_late_us = max(self.worst_late_us, late_us)
         self.late_ticks += late_us > LATE_US
         schedule.run_to(until_us)
         for listener in tuple(self.after_tick):

@@ -20,12 +20,12 @@ orders = st.one_of(
     st.builds(lambda a, b: Request(16, write=(0x104, (*a, *b))), pairs, pairs),
     st.builds(lambda a, b: Request(23, (0x200, 14), (0x100, (*a, *b))), pairs, pairs),
 ).map(lambda request: encode_frame(1, encode_request(request)))
-touches = st.tuples(
+input_changes = st.tuples(
     st.sampled_from(["emergency_stop", "bumper", "jam_left", "load_right_nm", "power_cut"]),
     st.integers(0, 1),
 )
 steps = st.lists(
-    st.tuples(orders | touches | st.binary(max_size=20), st.integers(3, 400)), max_size=15
+    st.tuples(orders | input_changes | st.binary(max_size=20), st.integers(3, 400)), max_size=15
 )
 
 

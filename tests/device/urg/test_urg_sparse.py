@@ -15,12 +15,12 @@ lines = st.sampled_from(
         *("SCIP2.0", "V", "L0", "L1", "G38038603", "S1152000000000"),
     ]
 ).map(lambda line: line.encode() + b"\n")
-touches = st.tuples(
+input_changes = st.tuples(
     st.sampled_from(["laser_broken", "motor_jammed", "power_cut", "post_radius_m"]),
     st.integers(0, 1),
 )
 steps = st.lists(
-    st.tuples(lines | touches | st.binary(max_size=20), st.integers(1, 300)), max_size=15
+    st.tuples(lines | input_changes | st.binary(max_size=20), st.integers(1, 300)), max_size=15
 )
 
 

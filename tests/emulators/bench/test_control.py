@@ -52,7 +52,7 @@ def test_set_takes_one_value_or_those_of_a_group(emulator: Emulator) -> None:
 def test_a_press_ends_by_the_time_of_the_rig(emulator: Emulator) -> None:
     emulator.step()
     assert ask(emulator, "press", name="key", duration_us=2_000)["ok"]
-    assert emulator.agenda.due_us == 4_000
+    assert emulator.event_queue.due_us == 4_000
     assert emulator.device.inputs["key"] == 1
 
 

@@ -8,7 +8,7 @@ from tickrig.emulators.serial.emulator import Emulator
 
 
 def run_to(emulator: Emulator, t_us: int) -> None:
-    emulator.agenda.put("pause", t_us, lambda now_us: None)
+    emulator.event_queue.put("pause", t_us, lambda now_us: None)
     while emulator.rig.now_us < t_us - 1:
         emulator.step()
 
@@ -61,7 +61,7 @@ def test_a_press_ends_by_itself(emulator: Emulator) -> None:
 
 @pytest.mark.parametrize("at_us", [5_000, 5_001, 5_500, 5_999])
 def test_a_press_is_seen_however_short(emulator: Emulator, at_us: int) -> None:
-    emulator.agenda.put("p", at_us, lambda now_us: emulator.operator.press(now_us, "key", 1))
+    emulator.event_queue.put("p", at_us, lambda now_us: emulator.operator.press(now_us, "key", 1))
     run_to(emulator, 9_000)
     assert said(emulator) == [b"hi", b"click"]
     assert emulator.device.inputs["key"] == 0

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
-from tickrig.emulators.can.controller import CanController
 from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.emulators.can.wire import CanWire
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
@@ -25,7 +25,7 @@ def counters(*ends: CanEnd) -> list[tuple[int, int, ErrorState]]:
 
 
 def test_the_counters_follow_the_standard() -> None:
-    controller = CanController()
+    controller = ErrorCounters()
     for _ in range(15):
         controller.transmit_failed()
     assert (controller.tec, controller.state) == (120, ACTIVE)
@@ -41,7 +41,7 @@ def test_the_counters_follow_the_standard() -> None:
 
 
 def test_a_passive_receiver_comes_back_with_a_good_frame() -> None:
-    controller = CanController()
+    controller = ErrorCounters()
     for _ in range(200):
         controller.receive_failed()
     assert (controller.rec, controller.state) == (128, PASSIVE)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Input, Kind, Output
+from tickrig.device.physical import Input, Output, SignalType
 
 TABLE = (
     Input("knob_v", "voltage of the knob", high=5, unit="V", real=True),
     Input("di1", "first line"),
     Input("di2", "second line"),
-    Input("bell", "a button", Kind.BUTTON),
-    Input("burnt", "its filament is gone", Kind.FAULT),
+    Input("bell", "a button", SignalType.BUTTON),
+    Input("burnt", "its filament is gone", SignalType.FAULT),
 )
 
 

@@ -30,10 +30,10 @@ HEARD = r"""0.001000 < hi\n
 def record(path: Path, *, device: Emulated[bytes] | None = None, close: bool = True) -> str:
     trace = TraceFile(path, Header("lamp", {"seed": 0}))
     emulator = Emulator("lamp", device or Lamp(), trace=trace)
-    emulator.agenda.put(1, 1_100, lambda now_us: emulator.send(now_us, b"ab\xff"))
-    emulator.agenda.put(2, 4_100, lambda now_us: emulator.operator.set("key", 1))
-    emulator.agenda.put(3, 4_200, lambda now_us: emulator.operator.set("x_mm", -3))
-    emulator.agenda.put(4, 9_001, lambda now_us: emulator.stop())
+    emulator.event_queue.put(1, 1_100, lambda now_us: emulator.send(now_us, b"ab\xff"))
+    emulator.event_queue.put(2, 4_100, lambda now_us: emulator.operator.set("key", 1))
+    emulator.event_queue.put(3, 4_200, lambda now_us: emulator.operator.set("x_mm", -3))
+    emulator.event_queue.put(4, 9_001, lambda now_us: emulator.stop())
     while emulator.running:
         emulator.step()
     if close:
@@ -132,8 +132,8 @@ def test_a_full_disk_is_said_once_and_the_emulator_goes_on(
 ) -> None:
     trace = TraceFile(Path("/dev/full"), Header("lamp"))
     emulator = Emulator("lamp", Lamp(), trace=trace)
-    emulator.agenda.put(1, 2_000, lambda now_us: emulator.send(now_us, b"ab\n"))
-    emulator.agenda.put(2, 9_000, lambda now_us: emulator.stop())
+    emulator.event_queue.put(1, 2_000, lambda now_us: emulator.send(now_us, b"ab\n"))
+    emulator.event_queue.put(2, 9_000, lambda now_us: emulator.stop())
     while emulator.running:
         emulator.step()
     emulator.close()

@@ -43,8 +43,8 @@ def on_panel(act: Act, size: tuple[int, int] = (80, 24)) -> None:
 
 def pass_time(emulator: Emulator, duration_us: int) -> None:
     until_us = emulator.rig.now_us + duration_us
-    emulator.agenda.put("until", until_us, lambda now_us: None)
-    while emulator.agenda.due_us <= until_us:
+    emulator.event_queue.put("until", until_us, lambda now_us: None)
+    while emulator.event_queue.due_us <= until_us:
         emulator.step()
 
 
@@ -181,7 +181,7 @@ def on_screen(panel: RrcPanel) -> list[str]:
 
 
 def drive_in_limit_mode(emulator: Emulator) -> None:
-    emulator.operator.press(emulator.touch_us, "power_button", 100_000)
+    emulator.operator.press(emulator.effective_us, "power_button", 100_000)
     pass_time(emulator, 500_000)
     emulator.operator.set("stick", -100, -100)
     emulator.send(emulator.rig.now_us, b"statusA1\nlimit6464ffffff\n")
@@ -256,7 +256,7 @@ def test_f1_explains_the_keys_and_escape_leaves_the_help(size: tuple[int, int]) 
 def test_the_sa_line_is_told_in_words_and_goes_with_the_stream() -> None:
     async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
         drive_in_limit_mode(emulator)
-        emulator.operator.press(emulator.touch_us, "alarm_button", 20_000)
+        emulator.operator.press(emulator.effective_us, "alarm_button", 20_000)
         pass_time(emulator, 50_000)
         await panel.look()
         told = "stick -100 -100  out -100 -100  gauge 10  speed 1  up 0 down 0 alarm 2"

@@ -25,11 +25,13 @@ def test_an_action_comes_before_the_tick_of_its_time() -> None:
     emulator, seen = Emulator("lamp", Lamp(b"")), list[tuple[int, int]]()
 
     def act(now_us: int) -> None:
-        seen.append((now_us, emulator.touch_us))
+        seen.append((now_us, emulator.effective_us))
         emulator.operator.set("lamp", 0)
 
-    emulator.agenda.put("act", 5_000, act)
-    emulator.agenda.put("odd", 5_500, lambda now_us: seen.append((now_us, emulator.touch_us)))
+    emulator.event_queue.put("act", 5_000, act)
+    emulator.event_queue.put(
+        "odd", 5_500, lambda now_us: seen.append((now_us, emulator.effective_us))
+    )
     for _ in range(5):
         emulator.step()
     assert seen == [(5_000, 5_000), (5_500, 5_500)]
@@ -37,9 +39,9 @@ def test_an_action_comes_before_the_tick_of_its_time() -> None:
 
 def test_what_is_done_between_ticks_takes_effect_at_the_next_one() -> None:
     emulator = Emulator("lamp", Lamp(b""))
-    assert emulator.touch_us == 0
+    assert emulator.effective_us == 0
     emulator.step()
-    assert (emulator.rig.now_us, emulator.touch_us) == (1_000, 2_000)
+    assert (emulator.rig.now_us, emulator.effective_us) == (1_000, 2_000)
 
 
 def test_bytes_that_find_a_buffer_full_are_counted() -> None:

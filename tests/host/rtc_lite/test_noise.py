@@ -17,7 +17,7 @@ from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.relays import Echo
-from tickrig.emulators.rig.faults import Fault, FaultKind
+from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings
 from tickrig.wire.rtc_lite.codes import ContextType
@@ -90,8 +90,8 @@ def spoilt_bench(spoils: list[Spoil], config: NodeConfig) -> Bench:
     def make(chance: Chance, threshold: int) -> Fault[bytes]:
         return lambda now_us, data: next(ways, keep)(data)
 
-    kind: FaultKind[bytes] = FaultKind("as the test wants", make, rated=False)
-    bench.lines[0].kinds = {"spoil": kind}
+    kind: FaultType[bytes] = FaultType("as the test wants", make, rated=False)
+    bench.lines[0].fault_types = {"spoil": kind}
     bench.lines[0].arm("spoil")
     return bench
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402.motion import switches
-from tickrig.device.physical import Input, Kind, Output, QuantityBank
+from tickrig.device.physical import Input, Output, QuantityBank, SignalType
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -17,8 +17,8 @@ ENCODER_UNPLUGGED: Final = "encoder_unplugged"
 
 DRIVE_INPUTS: Final = (
     *switches.INPUTS,
-    Input(SHORT_CIRCUIT, "the motor cable has a short circuit", Kind.FAULT),
-    Input(ENCODER_UNPLUGGED, "the encoder cable is pulled", Kind.FAULT),
+    Input(SHORT_CIRCUIT, "the motor cable has a short circuit", SignalType.FAULT),
+    Input(ENCODER_UNPLUGGED, "the encoder cable is pulled", SignalType.FAULT),
 )
 """Of any drive."""
 
@@ -27,8 +27,8 @@ PLANT_INPUTS: Final = (
     Input("load_nm", "torque on the shaft, forward", low=-1_000, high=1_000, unit="Nm", real=True),
     Input("load_kg_m2", "inertia on the shaft", high=1_000, unit="kg m2", real=True),
     Input("ambient_c", "air temperature", low=-40, high=85, unit="degC", initial=25, real=True),
-    Input("shaft_blocked", "the shaft is held", Kind.FAULT),
-    Input("motor_phase_open", "a wire of the motor is broken", Kind.FAULT),
+    Input("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    Input("motor_phase_open", "a wire of the motor is broken", SignalType.FAULT),
 )
 """Of a drive whose motor has physics."""
 

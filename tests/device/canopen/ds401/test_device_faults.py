@@ -9,7 +9,7 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.objects import RW
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.wire.canopen.nmt import NmtState
 
 ROWS: list[Row] = [(0x6200, 1, U8, 0x01), (0x6207, 1, U8, 0xF0), (0x6401, 1, I16, 0)]
@@ -40,8 +40,8 @@ def test_a_fault_is_told_when_it_comes_and_when_it_goes(
 
 
 def test_a_module_has_the_faults_of_its_terminals() -> None:
-    assert Board([]).module.inputs.names(Kind.FAULT) == ("internal_failure",)
-    assert Board([(0x6411, 1, I16, 0)]).module.inputs.names(Kind.FAULT) == (
+    assert Board([]).module.inputs.names(SignalType.FAULT) == ("internal_failure",)
+    assert Board([(0x6411, 1, I16, 0)]).module.inputs.names(SignalType.FAULT) == (
         "internal_failure",
         "output_overload",
     )

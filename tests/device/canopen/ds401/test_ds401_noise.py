@@ -11,7 +11,7 @@ from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.models import f_palette
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 
@@ -66,12 +66,12 @@ levels = st.tuples(st.sampled_from(["lines", "channels", "faults"]), st.integers
 events = st.lists(st.tuples(st.integers(1, 15), st.one_of(frames(INDICES), levels)), max_size=30)
 
 
-def touch(module: Ds401, what: str, level: int) -> None:
+def set_input(module: Ds401, what: str, level: int) -> None:
     """Set one of the physical inputs to a level that it takes."""
     chosen = {
         "lines": [name for name in module.inputs.table if name.startswith("di")],
         "channels": [name for name in module.inputs.table if name.startswith("ai")],
-        "faults": list(module.inputs.names(Kind.FAULT)),
+        "faults": list(module.inputs.names(SignalType.FAULT)),
     }[what]
     if not chosen:
         return
@@ -101,7 +101,7 @@ def run(dictionary: Dictionary, story: list[Event], *, dense: bool) -> list[str]
         if isinstance(event, CanFrame):
             tick(event)
         else:
-            touch(module, *event)
+            set_input(module, *event)
             tick()
         seen.append(str({name: module.read(name) for name in module.outputs}))
     return seen

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.motor_core_unit.bench import UnitBench
 from tickrig.device.canopen.motor_core_unit.terminals import INPUTS
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
 
 OBJECTS = (0x1016, 0x1017, 0x1029, 0x2000, 0x2010, 0x2011, 0x6411, 0x6443, 0x6444)
@@ -36,15 +36,15 @@ def frames(draw: st.DrawFn) -> str:
 
 
 @st.composite
-def touches(draw: st.DrawFn) -> tuple[str, float]:
+def input_changes(draw: st.DrawFn) -> tuple[str, float]:
     """Draw what the world does."""
     item = draw(st.sampled_from(INPUTS))
-    if item.kind is Kind.FAULT:
+    if item.type is SignalType.FAULT:
         return item.name, draw(st.integers(0, 1))
     return item.name, draw(st.floats(item.low, item.high))
 
 
-things = st.lists(st.tuples(st.integers(1, 400), st.one_of(frames(), touches())), max_size=12)
+things = st.lists(st.tuples(st.integers(1, 400), st.one_of(frames(), input_changes())), max_size=12)
 
 
 def play(bench: UnitBench, wanted: list[tuple[int, str | tuple[str, float]]]) -> UnitBench:

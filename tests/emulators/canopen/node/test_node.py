@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
@@ -163,11 +163,11 @@ def test_the_things_of_several_nodes_have_the_node_before_them() -> None:
 
 def test_an_input_is_found_by_its_kind() -> None:
     inputs = Bench(5).physical.inputs
-    assert inputs.find("power_off", Kind.FAULT).text == "its supply is cut"
+    assert inputs.find("power_off", SignalType.FAULT).text == "its supply is cut"
     with pytest.raises(ValueError, match="no button '0x1017'; known: none"):
-        inputs.find("0x1017", Kind.BUTTON)
-    assert "0x6000:1" in inputs.names(Kind.LEVEL)
-    assert "0x1008" in inputs.names(Kind.TEXT)
+        inputs.find("0x1017", SignalType.BUTTON)
+    assert "0x6000:1" in inputs.names(SignalType.LEVEL)
+    assert "0x1008" in inputs.names(SignalType.TEXT)
     with pytest.raises(ValueError, match="no input 'x'; known: power_off"):
         inputs.find("x")
     for name, value in (("power_off", 2), ("power_off", "x"), ("emergency", -1)):

@@ -10,7 +10,7 @@ import pytest
 
 from tests.emulators.canopen.dimmer import Dimmer
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.physical import Kind
+from tickrig.device.physical import SignalType
 from tickrig.emulators.bench.control import Control
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
@@ -66,7 +66,7 @@ def test_a_physical_fault_comes_and_goes_and_the_device_tells_it() -> None:
     bench = dimmers(5)
     assert "burnt" in bench.operator.faults
     bench.operator.fault(0, parse_fault_spec("burnt@20ms-30ms"))
-    while bench.rig.now_us < 40_000 and bench.agenda.due_us < 40_000:
+    while bench.rig.now_us < 40_000 and bench.event_queue.due_us < 40_000:
         bench.step()
     bench.rig.run_to(40_000)
     bench.step()
@@ -116,4 +116,4 @@ def test_a_scenario_names_them() -> None:
         "1ms set knob_v 2.5\n+0s set di 1 0\n+0s press bell\n+0s watch lamp_pct\n2ms fault burnt\n"
     )
     assert len(ScenarioParser(bench.device, bench.operator).parse(text, "x")) == 5
-    assert bench.device.inputs.find("burnt", Kind.FAULT).text == "its filament is gone"
+    assert bench.device.inputs.find("burnt", SignalType.FAULT).text == "its filament is gone"

@@ -128,9 +128,9 @@ def test_what_is_done_from_the_inside_counts_for_the_frames_of_the_tick() -> Non
     node = Node("r1", make_slave(make_dictionary(()), NODE_ID), wire)
     master, rig = wire.end(), Rig(Station(node, node.port))
     rig.run_for(5_000)
-    touch = node.touch("0x1005")
-    assert touch is not None
-    touch.write(0x81)
+    signal = node.signal("0x1005")
+    assert signal is not None
+    signal.write(0x81)
     heard: list[int] = []
     node.slave.on_sync.append(heard.append)
     master.send(rig.now_us, frames("081#"))

@@ -57,7 +57,7 @@ def send_by_link(emulator: Emulator) -> None:
 
 
 def step(emulator: Emulator | CanEmulator) -> None:
-    emulator.agenda.put("end", TO_US + 1, lambda now_us: None)
+    emulator.event_queue.put("end", TO_US + 1, lambda now_us: None)
     while emulator.rig.now_us < TO_US:
         emulator.step()
 
@@ -75,7 +75,7 @@ DRIVES: dict[str, Drive] = {
 @pytest.mark.parametrize("drive", DRIVES.values(), ids=DRIVES)
 def test_on_a_line_faults_come_and_go_and_buttons_are_released(drive: Drive) -> None:
     emulator, seen = Emulator("lamp", Lamp(b"")), list[tuple[int, str]]()
-    emulator.operator.note = lambda text: seen.append((emulator.touch_us, text))
+    emulator.operator.note = lambda text: seen.append((emulator.effective_us, text))
     emulator.operator.press(0, "key", 1_500_500)
     emulator.operator.fault(0, parse_fault_spec("cut@2s-3s"))
     drive(emulator)
@@ -112,9 +112,9 @@ def test_on_a_bus_faults_come_and_go_and_what_is_planned_is_done(drive: CanDrive
     wire = CanWire()
     slave = make_slave(DESCRIPTION.make_dictionary(), 5, application=Dimmer)
     emulator, seen = make_bench(wire, [Node("5", slave, wire)]), list[tuple[int, str]]()
-    emulator.operator.note = lambda text: seen.append((emulator.touch_us, text))
+    emulator.operator.note = lambda text: seen.append((emulator.effective_us, text))
     emulator.operator.fault(0, parse_fault_spec("short@2s-3s"))
-    emulator.agenda.put("turn", 1_500_500, lambda now_us: emulator.operator.set("knob_v", 2.5))
+    emulator.event_queue.put("turn", 1_500_500, lambda now_us: emulator.operator.set("knob_v", 2.5))
     drive(emulator, wire)
     assert seen == [(1_500_500, "knob_v=2.5"), (2_000_000, "short"), (3_000_000, "short=0")]
     assert emulator.device.read("lamp_pct") == 50
@@ -124,7 +124,7 @@ def test_a_button_pressed_beside_a_client_is_released() -> None:
     emulator = Emulator("rrc", rrc := Rrc())
     client = RrcClient(SimLink(emulator.rig, emulator.host_end))
     client.start()
-    emulator.operator.press(emulator.touch_us, "power_button", 300_000)
+    emulator.operator.press(emulator.effective_us, "power_button", 300_000)
     client.wait_for(EventKind.POWER_ON_SUCCESS, 5_000_000)
     client.run_for(300_000)
     assert rrc.inputs["power_button"] == 0
@@ -163,7 +163,7 @@ def test_what_is_due_comes_before_the_tick_of_its_time_and_after_all_before(dens
         lamp.inputs.set("lamp", 0 if lamp.inputs["lamp"] else 1)
 
     for at_us in (2_000, 2_500, 4_000):
-        rig.agenda.put(at_us, at_us, touch)
+        rig.event_queue.put(at_us, at_us, touch)
     rig.run_to(1_000)
     assert seen.pop() == ("tick", 1_000)  # the first, at power-on
     rig.run_to(3_999)
@@ -181,9 +181,9 @@ def test_what_is_due_at_once_is_done_without_a_tick_more() -> None:
             return super().tick(now_us, rx)
 
     emulator, done = Emulator("lamp", Counted(b"")), list[int]()
-    emulator.agenda.put("first", 0, done.append)
+    emulator.event_queue.put("first", 0, done.append)
     emulator.rig.run_to(5_000)
-    emulator.agenda.put("late", 3_000, done.append)
+    emulator.event_queue.put("late", 3_000, done.append)
     emulator.rig.run_for(0)
     assert (done, ticks, emulator.rig.now_us) == ([0, 5_000], [1_000], 5_000)
     assert emulator.rig.next_us == NEVER
@@ -191,17 +191,17 @@ def test_what_is_due_at_once_is_done_without_a_tick_more() -> None:
 
 def test_an_action_that_fails_is_over() -> None:
     emulator = Emulator("lamp", Lamp(b""))
-    emulator.agenda.put("bad", 7_000, lambda now_us: emulator.operator.set("lamp", 2))
+    emulator.event_queue.put("bad", 7_000, lambda now_us: emulator.operator.set("lamp", 2))
     with pytest.raises(ValueError, match="lamp 2 is not in"):
         emulator.rig.run_to(10_000)
-    assert emulator.touch_us == 7_000
+    assert emulator.effective_us == 7_000
     emulator.rig.run_to(10_000)
-    assert emulator.touch_us == 11_000
+    assert emulator.effective_us == 11_000
 
 
 @given(st.lists(st.tuples(st.integers(0, 20_000), st.sampled_from(["lamp", "key", "dead"]))))
 def test_dense_and_sparse_runs_are_the_same_whatever_is_done(
-    touches: list[tuple[int, str]],
+    input_changes: list[tuple[int, str]],
 ) -> None:
     def heard(*, dense: bool) -> list[tuple[int, bytes]]:
         line, lamp = SerialLine(), Lamp()
@@ -211,8 +211,8 @@ def test_dense_and_sparse_runs_are_the_same_whatever_is_done(
         def toggle(name: str, now_us: int) -> None:
             lamp.inputs.set(name, 1 - lamp.inputs[name])
 
-        for number, (at_us, name) in enumerate(touches):
-            rig.agenda.put(number, at_us, partial(toggle, name))
+        for number, (at_us, name) in enumerate(input_changes):
+            rig.event_queue.put(number, at_us, partial(toggle, name))
         while link.now_us < 30_000:
             link.send(b"x")
             lines.append((link.now_us, link.receive(3_000)))

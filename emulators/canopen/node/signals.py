@@ -1,4 +1,4 @@
-"""What somebody inside a CANopen device can read and set, by name."""
+"""Named signals of a CANopen node: dictionary entries, read and set without the bus."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Final, Protocol
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.core.entry import Access, Entry
-from tickrig.device.physical import Input, Kind
 from tickrig.host.text.values import Setting
+from tickrig.device.physical import Input, SignalType
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
 
@@ -25,8 +25,8 @@ _NAME: Final = re.compile(r"0x([0-9A-Fa-f]{4})(?::([0-9]{1,3}|0x[0-9A-Fa-f]{1,2}
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 
 
-class Touch(Protocol):
-    """One thing that can be read and set."""
+class Signal(Protocol):
+    """A named value of a device that can be read and set between ticks."""
 
     @property
     def item(self) -> Input:
@@ -66,7 +66,7 @@ Later = Callable[[Callable[[], None]], None]
 """Takes what is to be done at the beginning of the node's next tick."""
 
 
-class ObjectTouch:
+class ObjectSignal:
     """An object of the dictionary, from the inside.
 
     Access is not asked for, except that a constant stays what it is. The service
@@ -85,11 +85,13 @@ class ObjectTouch:
 
     @property
     def item(self) -> Input:
-        """Name, kind and range; the unit is the data type."""
-        entry, kind = self._entry, self._entry.data_type
+        """Name, type and range; the unit is the data type."""
+        entry, data_type = self._entry, self._entry.data_type
         low, high = self._limits()
-        shape = Kind.LEVEL if _is_number(kind) else Kind.TEXT
-        return Input(self._name, f"{entry.name} ({_access(entry)})", shape, low, high, kind.name)
+        shape = SignalType.LEVEL if _is_number(data_type) else SignalType.TEXT
+        return Input(
+            self._name, f"{entry.name} ({_access(entry)})", shape, low, high, data_type.name
+        )
 
     def read(self) -> Setting:
         """Return the present value: a number, text, or bytes in hex."""
@@ -117,17 +119,17 @@ class ObjectTouch:
         self._later(partial(_change, entry, data))
 
     def _encode(self, value: Setting) -> bytes:
-        entry, kind = self._entry, self._entry.data_type
+        entry, data_type = self._entry, self._entry.data_type
         if Access.CONST in entry.access:
             raise ValueError(f"{self._name} is constant")
         low, high = self._limits()
-        if _is_number(kind) and not isinstance(value, str) and not low <= value <= high:
+        if _is_number(data_type) and not isinstance(value, str) and not low <= value <= high:
             raise ValueError(f"{self._name} {value} is not in {low}..{high}")
         try:
-            data = kind.encode(_value(kind, value))
+            data = data_type.encode(_value(data_type, value))
         except ValueError as error:
             raise ValueError(f"{self._name} {value!r}: {error}") from None
-        if not kind.size and len(data) > entry.max_bytes:
+        if not data_type.size and len(data) > entry.max_bytes:
             raise ValueError(f"{self._name} holds {entry.max_bytes} bytes, not {len(data)}")
         return data
 
@@ -144,8 +146,8 @@ def _change(entry: Entry, data: bytes) -> None:
         entry.written()
 
 
-def _is_number(kind: DataType) -> bool:
-    return kind.is_integer or kind in (DataType.REAL32, DataType.REAL64)
+def _is_number(data_type: DataType) -> bool:
+    return data_type.is_integer or data_type in (DataType.REAL32, DataType.REAL64)
 
 
 def _access(entry: Entry) -> str:
@@ -156,21 +158,21 @@ def _access(entry: Entry) -> str:
     )
 
 
-def _range(kind: DataType) -> tuple[float, float]:
-    if kind.is_integer:
-        half = 1 << (kind.bits - 1)
-        return (-half, half - 1) if kind.signed else (0, 2 * half - 1)
-    if not _is_number(kind):
+def _range(data_type: DataType) -> tuple[float, float]:
+    if data_type.is_integer:
+        half = 1 << (data_type.bits - 1)
+        return (-half, half - 1) if data_type.signed else (0, 2 * half - 1)
+    if not _is_number(data_type):
         return 0, 0
-    most = REAL32_MAX if kind is DataType.REAL32 else REAL64_MAX
+    most = REAL32_MAX if data_type is DataType.REAL32 else REAL64_MAX
     return -most, most
 
 
-def _value(kind: DataType, value: Setting) -> Value:
+def _value(data_type: DataType, value: Setting) -> Value:
     """Return what the data type takes; FieldError if this is no value of it."""
-    if kind in _TEXTS:
+    if data_type in _TEXTS:
         return str(value)
-    if _is_number(kind):
+    if _is_number(data_type):
         return value
     text = str(value)
     try:
@@ -178,4 +180,4 @@ def _value(kind: DataType, value: Setting) -> Value:
             return bytes.fromhex(text.removeprefix(HEX))
     except ValueError:
         pass
-    raise FieldError(f"{kind.name} takes bytes, as {HEX}01ff")
+    raise FieldError(f"{data_type.name} takes bytes, as {HEX}01ff")

@@ -13,7 +13,7 @@ BACK_FROM_PASSIVE: Final = 119
 """REC after a good frame in a passive receiver; 119 to 127 is allowed."""
 
 
-class CanController:
+class ErrorCounters:
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
     Not emulated: the receiver's further 8 for a dominant bit after its error

@@ -1,19 +1,19 @@
-"""Emulated devices with all that can be done to them while they run."""
+"""A running emulator: its rig, operator, event queue and wire log."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from tickrig.emulators.bench.emulated import Touchable
+from tickrig.emulators.bench.emulated import HasSignals
 from tickrig.emulators.bench.operator import Operator, WireFaults
 from tickrig.emulators.bench.wire_log import WireLog
-from tickrig.emulators.rig.agenda import Agenda
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.rig import Rig
 from tickrig.wire.instant import NEVER
 
 
-class Workbench(ABC):
+class RunningEmulator(ABC):
     """A rig, the hands at its devices, and what is to be done and seen.
 
     Args:
@@ -24,7 +24,7 @@ class Workbench(ABC):
 
     Attributes:
         operator: sets inputs, presses buttons, makes faults.
-        agenda: what is to be done between ticks, by whoever makes the rig's time pass.
+        event_queue: what is to be done between ticks, by whoever makes the rig's time pass.
         log: the latest lines or frames on the wire.
         rig: the rig.
         after_step: told the time after each step.
@@ -33,20 +33,20 @@ class Workbench(ABC):
 
     rig: Rig
 
-    def __init__(self, name: str, device: Touchable, wire: WireFaults, link: str) -> None:
+    def __init__(self, name: str, device: HasSignals, wire: WireFaults, link: str) -> None:
         self.name, self.wire, self.link, self.running = name, wire, link, True
         self._touched = device
-        self.agenda, self.log = Agenda(), WireLog()
+        self.event_queue, self.log = EventQueue(), WireLog()
         self.after_step: list[Callable[[int], None]] = []
-        self.operator = Operator(device.inputs, device.tick_us, self.agenda, wire)
+        self.operator = Operator(device.inputs, device.tick_us, self.event_queue, wire)
 
     @property
-    def device(self) -> Touchable:
+    def device(self) -> HasSignals:
         """The physical side of the device."""
         return self._touched
 
     @property
-    def touch_us(self) -> int:
+    def effective_us(self) -> int:
         """When what is done now takes effect: at once in an action, else at the next tick."""
         if self.rig.acting_us is not None:
             return self.rig.acting_us
@@ -56,7 +56,7 @@ class Workbench(ABC):
     def step(self) -> None:
         """Go to the next time at which something happens, and let it happen."""
         next_us = min(self.rig.next_us, self._host_due_us)
-        if self.agenda.due_us <= min(next_us, NEVER - 1):
+        if self.event_queue.due_us <= min(next_us, NEVER - 1):
             self.rig.step()  # the actions alone; the tick of their time is the next step
         elif next_us < NEVER:
             self.rig.run_to(next_us)
@@ -101,8 +101,8 @@ class Workbench(ABC):
             "device": self.name,
             "link": self.link,
             "now_us": self.rig.now_us,
-            "late_steps": self.rig.late_steps,
-            "late_us": self.rig.late_us,
+            "late_steps": self.rig.late_ticks,
+            "late_us": self.rig.worst_late_us,
             **self.lost,
             "faults": " ".join(self.operator.active_faults),
             "trace_error": self.trace_error,

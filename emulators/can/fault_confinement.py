@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from tickrig.emulators.can.controller import CanController
+from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.wire.can_error import ErrorState
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
 
-class CanConfinement:
+class FaultConfinement:
     """Counts what went well and what failed; a good frame costs nothing on a sound bus.
 
     Args:
@@ -31,7 +31,7 @@ class CanConfinement:
         """Count a good frame."""
         marked, self.marked = self.marked, []
         for end in marked:
-            good = CanController.transmitted if end in senders else CanController.received
+            good = ErrorCounters.transmitted if end in senders else ErrorCounters.received
             self.count(at_us, end, good)
 
     def failed(self, at_us: int, senders: list[CanEnd]) -> None:
@@ -39,23 +39,23 @@ class CanConfinement:
         self.failed_to_send(at_us, senders)
         for end in self._ends:
             if end not in senders:
-                self.count(at_us, end, CanController.receive_failed)
+                self.count(at_us, end, ErrorCounters.receive_failed)
 
     def failed_to_send(self, at_us: int, senders: Iterable[CanEnd]) -> None:
         """Count an error that only its senders saw."""
         for end in senders:
-            self.count(at_us, end, CanController.transmit_failed)
+            self.count(at_us, end, ErrorCounters.transmit_failed)
 
     def unheard(self, at_us: int, senders: list[CanEnd]) -> None:
         """Count a frame that nobody acknowledged."""
         for end in senders:
-            self.count(at_us, end, CanController.not_acknowledged)
+            self.count(at_us, end, ErrorCounters.not_acknowledged)
 
-    def count(self, at_us: int, end: CanEnd, event: Callable[[CanController], None]) -> None:
+    def count(self, at_us: int, end: CanEnd, event: Callable[[ErrorCounters], None]) -> None:
         """Let something happen to one node's counters, and tell if its state changed."""
         controller = end.controller
         state = controller.state
-        if state is ErrorState.BUS_OFF and event is not CanController.restart:
+        if state is ErrorState.BUS_OFF and event is not ErrorCounters.restart:
             return
         event(controller)
         if not controller.clean and end not in self.marked:

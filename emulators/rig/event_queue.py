@@ -1,4 +1,4 @@
-"""What is to be done between the ticks of a rig, and when."""
+"""A queue of what is to be done between ticks, by time and order of entering."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Entry = tuple[int, int, Hashable, Action]
 """When, the number of its entering, its key, and what."""
 
 
-class Agenda:
+class EventQueue:
     """Actions by time; those of the same time in the order they were entered."""
 
     def __init__(self) -> None:

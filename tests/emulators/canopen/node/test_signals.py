@@ -8,8 +8,8 @@ import pytest
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
 from tickrig.device.canopen.core.entry import Access, Entry
-from tickrig.device.physical import Kind
-from tickrig.emulators.canopen.node.touch import ObjectTouch, find_object, object_name
+from tickrig.device.physical import SignalType
+from tickrig.emulators.canopen.node.signals import ObjectSignal, find_object, object_name
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
@@ -31,7 +31,7 @@ def dictionary() -> Dictionary:
     return Dictionary(entries, {0x6000: ObjectInfo("inputs", ObjectCode.ARRAY)})
 
 
-def touch(name: str, objects: Dictionary | None = None) -> tuple[ObjectTouch, Entry]:
+def signal(name: str, objects: Dictionary | None = None) -> tuple[ObjectSignal, Entry]:
     objects = objects or dictionary()
     entry = find_object(objects, name)
     assert entry is not None
@@ -39,7 +39,7 @@ def touch(name: str, objects: Dictionary | None = None) -> tuple[ObjectTouch, En
     def at_once(act: Callable[[], None]) -> None:
         act()
 
-    return ObjectTouch(object_name(objects, entry), entry, at_once), entry
+    return ObjectSignal(object_name(objects, entry), entry, at_once), entry
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def touch(name: str, objects: Dictionary | None = None) -> tuple[ObjectTouch, En
     ],
 )
 def test_an_object_is_named_by_index_and_sub_index(name: str, canonical: str) -> None:
-    assert touch(name)[0].item.name == canonical
+    assert signal(name)[0].item.name == canonical
 
 
 @pytest.mark.parametrize("name", ["0x5000", "0x6000:2", "6000:1", "0x600", "0x6000:999", "", "x"])
@@ -63,16 +63,16 @@ def test_what_is_no_object_is_not_found(name: str) -> None:
 
 
 def test_an_object_tells_what_it_is() -> None:
-    item = touch("0x2006")[0].item
-    assert (item.text, item.kind, item.low, item.high, item.unit) == (
-        *("limited (ro)", Kind.LEVEL, -5, 5),
+    item = signal("0x2006")[0].item
+    assert (item.text, item.type, item.low, item.high, item.unit) == (
+        *("limited (ro)", SignalType.LEVEL, -5, 5),
         "INTEGER16",
     )
-    item = touch("0x2007")[0].item
-    assert (item.text, item.kind, item.unit) == ("text (wo)", Kind.TEXT, "VISIBLE_STRING")
-    assert touch("0x2008")[0].item.text == "blob (hidden)"
-    assert touch("0x1000")[0].item.text == "device type (const)"
-    assert (touch("0x1017")[0].item.low, touch("0x1017")[0].item.high) == (0, 0xFFFF)
+    item = signal("0x2007")[0].item
+    assert (item.text, item.type, item.unit) == ("text (wo)", SignalType.TEXT, "VISIBLE_STRING")
+    assert signal("0x2008")[0].item.text == "blob (hidden)"
+    assert signal("0x1000")[0].item.text == "device type (const)"
+    assert (signal("0x1017")[0].item.low, signal("0x1017")[0].item.high) == (0, 0xFFFF)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_an_object_tells_what_it_is() -> None:
     ],
 )
 def test_it_is_set_whatever_the_bus_may_do(name: str, value: Any, shown: Any) -> None:
-    hand, _ = touch(name)
+    hand, _ = signal(name)
     hand.write(hand.check(value))
     assert hand.read() == shown
 
@@ -112,7 +112,7 @@ def test_it_is_set_whatever_the_bus_may_do(name: str, value: Any, shown: Any) ->
     ],
 )
 def test_what_it_cannot_be_is_refused(name: str, value: Any, error: str) -> None:
-    hand, entry = touch(name)
+    hand, entry = signal(name)
     before = entry.data
     with pytest.raises(ValueError, match=error):
         hand.write(value)
@@ -120,7 +120,7 @@ def test_what_it_cannot_be_is_refused(name: str, value: Any, error: str) -> None
 
 
 def test_the_owner_of_an_object_judges_and_acts() -> None:
-    hand, entry = touch("0x1017")
+    hand, entry = signal("0x1017")
     acted: list[int] = []
 
     def guard(value: object) -> None:
@@ -135,7 +135,7 @@ def test_the_owner_of_an_object_judges_and_acts() -> None:
 
 
 def test_a_value_that_is_made_on_demand_is_made() -> None:
-    hand, entry = touch("0x1017")
+    hand, entry = signal("0x1017")
     entry.source = lambda: b"\x34\x12"
     assert hand.read() == 0x1234
     entry.source = lambda: b"\x34"
