@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from tickrig.device.core import Device, W
-from tickrig.host.text.values import Setting
 from tickrig.device.physical import Input, Output, SignalType
+from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):

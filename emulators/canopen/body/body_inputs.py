@@ -7,8 +7,8 @@ from math import degrees, radians
 from typing import Final
 
 from tickrig.device.body.wheeled_body import WheeledBody
-from tickrig.host.text.values import Setting
 from tickrig.device.physical import Input, QuantityBank, SignalType
+from tickrig.host.text.values import Setting
 
 FAR_M: Final = 1e6
 """As far as a body can be put."""

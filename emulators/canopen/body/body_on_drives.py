@@ -12,8 +12,8 @@ from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.emulators.canopen.body.body_inputs import FrictionSignal, PoseSignal
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.host.text.values import Setting
 from tickrig.emulators.canopen.node.signals import Signal
+from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 NAME: Final = "body"

@@ -12,8 +12,8 @@ from tickrig.device.physical import Output
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
-from tickrig.host.text.values import Setting
 from tickrig.emulators.canopen.node.signals import ObjectSignal, Signal, find_object, object_name
+from tickrig.host.text.values import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.host.text.values import Setting
 from tickrig.device.physical import Input, QuantityBank, SignalType
 from tickrig.emulators.canopen.node.signals import Later
+from tickrig.host.text.values import Setting
 
 ERROR_BITS: Final = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08}
 """Bit of the error register by the first digit of an emergency error code (CiA 301)."""

@@ -10,8 +10,8 @@ from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.physical import Input, Output, SignalType
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.host.text.values import Setting
 from tickrig.emulators.canopen.node.signals import Signal
+from tickrig.host.text.values import Setting
 
 
 class Part(Protocol):

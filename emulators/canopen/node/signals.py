@@ -10,8 +10,8 @@ from typing import Final, Protocol
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
 from tickrig.device.canopen.core.entry import Access, Entry
-from tickrig.host.text.values import Setting
 from tickrig.device.physical import Input, SignalType
+from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
 
