@@ -3,6 +3,6 @@
 from tickrig.host.rrc.client import RrcClient
 from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.inbox import Arrival
-from tickrig.host.rrc.refusals import OnRefusals
+from tickrig.host.rrc.reply_matcher import OnRefusals
 
 __all__ = ["Arrival", "OnRefusals", "RrcClient", "RrcRefused", "RrcStopped"]

@@ -169,7 +169,7 @@ class Stage:
         """Compare; not before EV:Initialized, which tells that the RRC was off or starts again."""
         if not self.quiet or self.rrc.state in (RrcState.OFF, RrcState.INITIALIZE):
             return
-        truth, belief = self.rrc._settings, self.client._ledger.mirror
+        truth, belief = self.rrc._settings, self.client._settings
         assert belief.stable == truth.stable, "stablemode"
         assert belief.watchdog_10ms == truth.watchdog_ticks, "watchdog"
         assert belief.locked == truth.speed_locked, "lock"

@@ -1,0 +1,264 @@
+"""Which reply of an RRC answers which command, and what follows from it."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final, NamedTuple
+
+from tickrig.host.rrc.exchange import NAMELESS, Exchange
+from tickrig.host.rrc.inbox import Answer
+from tickrig.wire.rrc.commands import Command, Limit, Output, SpeedMode, StableMode, Watchdog
+from tickrig.wire.rrc.replies import Ok, Refusal, Text
+
+SETTLED_US: Final = 100_000
+"""An ER would have come by then: 10 periods of the RRC."""
+
+MOTION: Final = ("output", "limit")
+
+
+class OnRefusals(Enum):
+    """What the client does after too many refusals in a row (RRC manual, notes)."""
+
+    POWER_OFF = "poweroff"  # send poweroff; renew the watchdog no more
+    WATCHDOG = "watchdog"  # send nothing, so that the watchdog trips; poweroff if none is set
+
+
+class RefusalCounter:
+    """Counts for each command how many times in a row it was refused.
+
+    Each command has a row of its own: a `beep` that works in between must not
+    hide that every `output` is refused.
+
+    Args:
+        limit: how many in a row are too many.
+
+    Attributes:
+        stopped: reason of the last refusal once there were too many, else None.
+
+    Raises:
+        ValueError: a limit below 1.
+    """
+
+    def __init__(self, limit: int) -> None:
+        if limit < 1:
+            raise ValueError(f"{limit} refusals: at least 1 must be allowed to come")
+        self.limit = limit
+        self.stopped: str | None = None
+        self._rows: Counter[str] = Counter()
+
+    def accepted(self, name: str) -> None:
+        """Note a command that was carried out: its row ends."""
+        del self._rows[name]
+
+    def refused(self, name: str, reason: str) -> None:
+        """Note a refusal; `stopped` is set if with this one there are too many."""
+        self._rows[name] += 1
+        if self.stopped is None and self._rows[name] >= self.limit:
+            self.stopped = reason
+
+    def clear(self) -> None:
+        """Begin again."""
+        self._rows.clear()
+        self.stopped = None
+
+
+@dataclass(slots=True)
+class BelievedSettings:
+    """Settings of the RRC that change how the client talks, as far as they are known.
+
+    Attributes:
+        stable: stablemode: CHECK on every line, no OK.
+        watchdog_10ms: time of the watchdog, 0 is off.
+        locked: whether the controller's speed buttons are locked.
+        drive: the command that chose who drives, None if that is not certain.
+    """
+
+    stable: bool = False
+    watchdog_10ms: int = 0
+    locked: int = 0
+    drive: type[Limit | Output] | None = None
+
+    def sent(self, command: Command) -> None:
+        """Note a command whose fate is not waited for; who drives may have changed."""
+        if isinstance(command, Limit | Output) and self.drive is not type(command):
+            self.drive = None
+        else:
+            self.accepted(command)
+
+    def accepted(self, command: Command) -> None:
+        """Note a command that the RRC carried out."""
+        match command:
+            case StableMode(on):
+                self.stable = bool(on)
+            case Watchdog(time_10ms):
+                self.watchdog_10ms = time_10ms
+            case SpeedMode(_, locked):
+                self.locked = locked
+            case Limit() | Output():
+                self.drive = type(command)
+
+    def clear(self) -> None:
+        """Forget the settings, as the RRC does in Initialize."""
+        self.stable, self.watchdog_10ms, self.locked, self.drive = False, 0, 0, None
+
+
+class _Sent(NamedTuple):
+    at_us: int
+    command: Command
+
+    @property
+    def name(self) -> str:
+        return self.command.name.decode()
+
+
+class UnconfirmedCommands:
+    """Commands that were sent and that nobody waits for, until a reply or time tells their fate.
+
+    Replies come in the order of the commands, so a reply belongs to the oldest
+    command of its name. An ER without a name goes to the account of a motion
+    command if there is one: the safe side, where it cannot be known.
+    """
+
+    def __init__(self) -> None:
+        self._sent: deque[_Sent] = deque()
+        self._doubted_us = -1  # what was sent up to then may be carried out, or lost
+
+    @property
+    def doubt_ends_us(self) -> int:
+        """When the fate of all that was sent before a restart will be known; 0 if it is."""
+        in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
+        return self._doubted_us + SETTLED_US if in_doubt else 0
+
+    def doubt(self) -> None:
+        """Note that the RRC was initialized: what waits in its buffer is still to come."""
+        if self._sent:
+            self._doubted_us = self._sent[-1].at_us
+
+    def add(self, now_us: int, command: Command) -> None:
+        """Note a command that was just sent."""
+        self._sent.append(_Sent(now_us, command))
+
+    def carried_out(self, name: str) -> Command | None:
+        """Take out the command that an OK belongs to; return the newest of its name.
+
+        That one counts: it was carried out or will be, if the older ones were not lost with
+        the RRC's power, and this OK is its own.
+        """
+        same = [sent for sent in self._sent if sent.name == name]
+        if not same:
+            return None
+        self._sent.remove(same[0])
+        return same[-1].command
+
+    def refused(self, reason: str) -> str | None:
+        """Take out the command that an ER belongs to, and return its name."""
+        wanted = (*MOTION, None) if reason in NAMELESS else (reason,)
+        for name in wanted:
+            for sent in self._sent:
+                if name in (None, sent.name):
+                    self._sent.remove(sent)
+                    return sent.name
+        return None
+
+    def settle(self, now_us: int) -> list[str]:
+        """Take out those that no reply came for in time; return their names."""
+        settled = []
+        while self._sent and self._sent[0].at_us + SETTLED_US <= now_us:
+            settled.append(self._sent.popleft().name)
+        return settled
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._sent.clear()
+
+
+class ReplyMatcher:
+    """Gives each reply to the command it belongs to.
+
+    Args:
+        max_refusals: how many refusals in a row are too many, 1 or more.
+
+    Attributes:
+        settings: settings of the RRC as far as they are known.
+        refusals: refusals in a row.
+        unconfirmed: commands that nobody waits for.
+    """
+
+    def __init__(self, max_refusals: int) -> None:
+        self.settings = BelievedSettings()
+        self.refusals = RefusalCounter(max_refusals)
+        self.unconfirmed = UnconfirmedCommands()
+
+    def sent(self, now_us: int, command: Command) -> None:
+        """Note a command that nobody waits for."""
+        self.unconfirmed.add(now_us, command)
+        self.settings.sent(command)
+
+    def take(self, reply: Answer, exchange: Exchange | None) -> bool:
+        """Account for a reply; False if no command awaits it."""
+        match reply:
+            case Refusal(reason):
+                counts = exchange is None or not exchange.refuses_barrier_too(reason)
+                name = self._refused_name(reply, exchange)
+                if counts:
+                    self.refusals.refused(name, reason)
+                return True
+            case Ok(name) if self._take_unawaited(name, exchange):
+                return True
+            case Ok() | Text():
+                return exchange is not None and self._take_answer(reply, exchange)
+
+    def settle(self, now_us: int) -> None:
+        """With stablemode, take commands as carried out that no ER came for."""
+        for name in self.unconfirmed.settle(now_us):
+            if self.settings.stable:
+                self.refusals.accepted(name)
+
+    def initialized(self) -> None:
+        """Note that the RRC was initialized: nothing that was known holds any more.
+
+        But a command that waited in its receive buffer meanwhile is carried out after that.
+        """
+        self.settings.clear()
+        self.refusals.clear()
+        self.unconfirmed.doubt()
+
+    def clear(self) -> None:
+        """Forget all: the talk begins again."""
+        self.initialized()
+        self.unconfirmed.clear()
+
+    def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
+        """Return the name of the refused command, empty if that cannot be known.
+
+        Commands are answered in order: the oldest one that can be meant is
+        meant. But where carried out commands have no answer that cannot be
+        known, and the awaited one goes first: better to report a setting as
+        refused that was not than the other way round.
+        """
+        if exchange is not None and exchange.has_barrier and exchange.take(refusal):
+            return exchange.name
+        if (name := self.unconfirmed.refused(refusal.reason)) is not None:
+            return name
+        return exchange.name if exchange is not None and exchange.take(refusal) else ""
+
+    def _take_unawaited(self, name: str, exchange: Exchange | None) -> bool:
+        """Account for an OK to a command that nobody waits for; False if it is not one."""
+        in_doubt = self.unconfirmed.doubt_ends_us > 0
+        command = self.unconfirmed.carried_out(name)
+        if command is None:
+            return False
+        awaited_too = in_doubt and exchange is not None and exchange.name == name
+        self.refusals.accepted(name)
+        self.settings.sent(exchange.command if exchange and awaited_too else command)
+        return True
+
+    def _take_answer(self, answer: Ok | Text, exchange: Exchange) -> bool:
+        was_done = exchange.done
+        taken = exchange.take(answer)
+        if exchange.done and not was_done and exchange.refusal is None:
+            self.refusals.accepted(exchange.name)
+            self.settings.accepted(exchange.command)
+        return taken
