@@ -13,7 +13,7 @@ from tickrig.device.physical import Input, InputBank
 from tickrig.device.rtc_lite.ports import InPort, OutPort, Port
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import Status
-from tickrig.wire.rtc_lite.names import encode_name
+from tickrig.wire.rtc_lite.values import encode_name
 
 ERROR: Final = Status.ERROR
 """What a callback returns that failed."""

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 RATE_HZ: Final = range(1, 1_001)
 """Rates that a tick of 1 ms can hold."""

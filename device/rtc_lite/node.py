@@ -18,8 +18,7 @@ from tickrig.device.timer import Timer
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame, fault_frame
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Frame, Framing, fault_frame
 from tickrig.wire.rtc_lite.layout import REQUESTS
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 

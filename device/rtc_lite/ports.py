@@ -15,8 +15,7 @@ from typing import Generic, TypeVar
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
 from tickrig.wire.rtc_lite.messages import PORT_COUNTS_BYTES
-from tickrig.wire.rtc_lite.names import encode_name
-from tickrig.wire.rtc_lite.values import PortType
+from tickrig.wire.rtc_lite.values import PortType, encode_name
 
 T = TypeVar("T")
 

@@ -9,8 +9,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.record.trace import Config
 from tickrig.emulators.rtc_lite.components import find_component
 from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 NAME: Final = "rtc-lite"
 

@@ -8,8 +8,7 @@ import click
 
 from tickrig.emulators.commands.serial_options import line_options
 from tickrig.host.cli.start import loading
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
 def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:

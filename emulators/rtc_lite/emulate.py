@@ -19,8 +19,7 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.text.user_file import explain_error
 from tickrig.wire.rtc_lite.codes import Command, ContextType
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 ROUTINE: Final = tuple(
     command.value

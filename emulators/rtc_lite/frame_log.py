@@ -15,7 +15,7 @@ from tickrig.emulators.bench.wire_log import Splitter
 from tickrig.emulators.record.trace import Mark
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
 from tickrig.wire.rtc_lite.rtno import PacketDecoder
 
@@ -52,7 +52,7 @@ class _PacketSplitter:
             out += [SHOWN[LinkFault.TIMEOUT]] if decoder.begun else []
             decoder.clear()
         self._heard_us = at_us
-        for found in decoder.push(data):
+        for found in decoder.packets(data):
             out.append(SHOWN[found] if isinstance(found, LinkFault) else b"".join(found))
         return out
 

@@ -14,8 +14,7 @@ from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import HEADER
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import HEADER, Framing
 from tickrig.wire.rtc_lite.messages import PortData
 from tickrig.wire.rtc_lite.values import PortType
 

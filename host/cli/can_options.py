@@ -147,7 +147,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
         import can  # noqa: PLC0415 - slow
         from can.util import load_config  # noqa: PLC0415
 
-    from tickrig.host.links.multicast_group import keep_to_group  # noqa: PLC0415
+    from tickrig.host.links.can_link import keep_to_group  # noqa: PLC0415
 
     _check_interface(options.interface)
     given = _given(options)

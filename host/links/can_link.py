@@ -3,19 +3,89 @@
 from __future__ import annotations
 
 import errno
+import os
+import socket
+import sys
 import time
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from contextlib import suppress
+from typing import Any, Final
 
 import can
 
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.multicast_group import keep_to_group
-from tickrig.host.links.stamp_clock import StampClock
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.link import Stamped, StampedLink
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import CONTROLLER_BYTE, ControllerFlag, ErrorClass, ErrorState
+
+DRIFT: Final = 5_000
+"""Two clocks part by less than one in so many: 200 ppm."""
+
+
+class StampClock:
+    """Tells by a stamp of the driver when a frame had arrived.
+
+    Where the driver's clock begins is unknown (1970, power-on), and it drifts. A frame
+    is read after it has arrived, so the two clocks differ by the least difference that was
+    seen. A frame that was not there at the last look has arrived since then: so bad stamps,
+    and a driver's clock that is set, matter only while the host is late.
+
+    >>> clock = StampClock()
+    >>> clock.at_us(7.0, 0, 100), clock.at_us(7.3, 100, 900_000)  # stopped for 0.9 s
+    (100, 300160)
+    >>> clock.at_us(0.0, 900_000, 910_000)  # a driver without stamps
+    910000
+    """
+
+    def __init__(self) -> None:
+        self._ahead_us = 0
+        self._stamp_us: int | None = None
+
+    def at_us(self, stamp_s: float, looked_us: int, now_us: int) -> int:
+        """Return when a frame had arrived.
+
+        Args:
+            stamp_s: what the driver says, in seconds on its clock; 0 if it says nothing.
+            looked_us: when the last look found nothing more.
+            now_us: when the frame was read.
+        """
+        stamp_us = round(stamp_s * 1e6)
+        if stamp_us <= 0:
+            return now_us
+        ahead_us = now_us - stamp_us
+        if self._stamp_us is not None and stamp_us >= self._stamp_us:
+            least_us = self._ahead_us + (stamp_us - self._stamp_us) // DRIFT
+            ahead_us = min(ahead_us, least_us)
+        self._stamp_us, self._ahead_us = stamp_us, ahead_us
+        return max(looked_us, stamp_us + ahead_us)
+
+
+INTERFACE: Final = "udp_multicast"
+IP_MULTICAST_ALL: Final = 49
+IPV6_MULTICAST_ALL: Final = 29
+
+
+def keep_to_group(bus: can.BusABC, interface: str) -> None:
+    """Let a bus hear its own group alone, from now on; other interfaces are left as they are.
+
+    python-can binds the socket of `udp_multicast` to a port alone. Linux then gives it what
+    comes on that port for any group that any program of this machine has joined (ip(7),
+    IP_MULTICAST_ALL). Elsewhere there is no such option, and no need.
+    """
+    if interface != INTERFACE or sys.platform != "linux":
+        return
+    with socket.socket(fileno=os.dup(bus.fileno())) as sock:
+        with suppress(OSError):  # IPv6 before Linux 4.20
+            if sock.family == socket.AF_INET6:
+                sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+            else:
+                sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+        with suppress(BlockingIOError):
+            while True:  # what came before
+                sock.recv(1, socket.MSG_DONTWAIT)
+
 
 SEND_TIMEOUT_S = 1
 PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
@@ -144,3 +214,54 @@ def _error_state(message: can.Message) -> ErrorState | None:
     if flags & PASSIVE:
         return ErrorState.PASSIVE
     return ErrorState.ACTIVE if ControllerFlag.ACTIVE in flags else None
+
+
+ECHO_US: Final = 1_000_000
+"""An echo that has not come by then was lost."""
+
+
+class EchoFreeLink:
+    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
+
+    A frame of somebody else that is the same as one whose echo is awaited is taken
+    for the echo, and the echo for it.
+
+    Args:
+        link: the link behind it.
+    """
+
+    def __init__(self, link: StampedLink) -> None:
+        self._link = link
+        self._awaited: deque[tuple[int, CanFrame]] = deque()
+
+    @property
+    def now_us(self) -> int:
+        """The clock of the link behind it."""
+        return self._link.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        """Send, and await the echo."""
+        self._awaited += [(self.now_us, frame) for frame in traffic]
+        self._link.send(traffic)
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        """Return what others sent; nothing, maybe before its time, if it was all echo."""
+        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+
+    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+        """Return a time, and what others sent by then."""
+        now_us, heard = self._link.hear(timeout_us)
+        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
+            self._awaited.popleft()
+        return now_us, tuple((at_us, frame) for at_us, frame in heard if not self._is_echo(frame))
+
+    def close(self) -> None:
+        """Close the link behind it."""
+        self._link.close()
+
+    def _is_echo(self, frame: CanFrame) -> bool:
+        for place, (_, awaited) in enumerate(self._awaited):
+            if awaited == frame:
+                del self._awaited[place]
+                return True
+        return False

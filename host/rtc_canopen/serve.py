@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tickrig.host.links.stamped_link import StampedLink
+from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_file import read_definition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile, read_device_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.link import Stamped
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode

@@ -13,8 +13,7 @@ from tickrig.host.rtc_lite.watch import Watch
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, State, Status
 from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Frame, Framing
 from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     PortData,

@@ -6,8 +6,7 @@ from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite.frame_link import FrameLink
 from tickrig.wire.rtc_lite.codes import Command, Status
 from tickrig.wire.rtc_lite.frame import Frame
-from tickrig.wire.rtc_lite.rtno import LETTERS
-from tickrig.wire.rtc_lite.rtno_replies import RtnoReplies, encode_request
+from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
 
 class RtnoLink(FrameLink):

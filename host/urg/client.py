@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import tau
 from typing import Final
 
 from tickrig.host.links.errors import DeviceRefused
 from tickrig.host.links.link import Link
-from tickrig.host.urg.scan import Scan
 from tickrig.wire.errors import WireError
 from tickrig.wire.scip import status
 from tickrig.wire.scip.command import Command
@@ -14,6 +16,38 @@ from tickrig.wire.scip.description import Specification
 from tickrig.wire.scip.reply import Reply, ReplySplitter
 from tickrig.wire.scip.scan import WIDTHS, parse_scan
 from tickrig.wire.scip.scip1 import SWITCH
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What a sensor measured in one turn.
+
+    Attributes:
+        time_ms: its timer when the turn began, 24 bits.
+        first: step of the first number.
+        cluster: steps for each number.
+        distances_mm: as they came; what is below DMIN is a code, no distance.
+        kind: limits and steps of the sensor.
+    """
+
+    time_ms: int
+    first: int
+    cluster: int
+    distances_mm: tuple[int, ...]
+    kind: Specification
+
+    def angle_rad(self, place: int) -> float:
+        """Return the direction of a number, from straight ahead to the left."""
+        step = self.first + place * self.cluster + (self.cluster - 1) / 2
+        return (step - self.kind.front) * tau / self.kind.resolution
+
+    def points(self) -> Iterator[tuple[float, float]]:
+        """Yield direction in rad and distance in m, where there is one."""
+        low, high = self.kind.nearest_mm, self.kind.farthest_mm
+        for place, distance_mm in enumerate(self.distances_mm):
+            if low <= distance_mm <= high:
+                yield self.angle_rad(place), distance_mm / 1_000
+
 
 SILENCE_US: Final = 500_000
 """How long there may be no good scan: five turns; more where scans are left out."""

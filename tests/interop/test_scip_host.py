@@ -18,8 +18,7 @@ from hokuyolx import HokuyoLX
 
 from tickrig.emulators.bench.child import running
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.urg.client import UrgClient
-from tickrig.host.urg.scan import Scan
+from tickrig.host.urg.client import Scan, UrgClient
 
 pytestmark = pytest.mark.realtime
 

@@ -19,7 +19,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.values import LONG
 
 ROOT = Path(__file__).parents[2]

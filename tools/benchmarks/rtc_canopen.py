@@ -12,7 +12,7 @@ from tickrig.device.canopen.device_rtc.make import make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import OutPort as DeviceOutPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.link import Stamped
 from tickrig.host.rtc import InPort, ModuleSpec, RtComponent
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role, SystemDefinition
 from tickrig.host.rtc_canopen.definition.device_file import read_device_file

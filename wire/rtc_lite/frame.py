@@ -18,6 +18,14 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
 
+
+class Framing(StrEnum):
+    """Frames, or the packets of a relative."""
+
+    LITE = "lite"  # the frames of RTC-Lite
+    RTNO = "rtno"  # bridge mode: packets of RTno
+
+
 HEADER: Final = b"\n"
 """0x0A (DECISION L4). It may occur in data: only the parser's position tells."""
 

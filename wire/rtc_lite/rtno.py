@@ -8,6 +8,8 @@ state alone. What RTno has no letter for cannot be sent in bridge mode.
 [Frame(command=<Command.STATE: b'CX'>, data=b'')]
 >>> encode_packet(Frame(Command.STATE, b"@I")).hex(" ")
 '0a 0a 58 01 49 a2'
+>>> encode_request(Frame(Command.STATE)).hex(" ")
+'0a 0a 58 00 58'
 """
 
 from __future__ import annotations
@@ -17,9 +19,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault
-from tickrig.wire.rtc_lite.frame import Frame
-from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REQUESTS
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, Status
+from tickrig.wire.rtc_lite.frame import Frame, fault_frame
+from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES, REQUESTS, WITH_FIELDS
 
 HEADER: Final = b"\n\n"
 EMPTY_PACKET_BYTES: Final = 5
@@ -38,6 +40,28 @@ LETTERS: Final[Mapping[Command, bytes]] = MappingProxyType(
 _REQUESTS: Final = {LETTERS[command]: command for command in REQUESTS if command in LETTERS}
 _WITHOUT_STATUS: Final = (Command.STATE, Command.CONTEXT)
 _PROFILES: Final = (Command.IN_PROFILE, Command.OUT_PROFILE)
+
+
+TYPE_NAME: Final = b"RTno"
+"""Stands for the type of a component, which a device of RTno does not tell."""
+
+_FAULT: Final = LETTERS[Command.CHECKSUM_FAULT]
+_COMMANDS: Final = {
+    letter: command for command, letter in LETTERS.items() if command not in FAULT_COMMANDS.values()
+}
+_STATES: Final = {
+    Command.ACTIVATE: b"A",
+    Command.DEACTIVATE: b"I",
+    Command.EXECUTE: b"A",
+    Command.ERROR: b"E",
+    Command.RESET: b"I",
+}
+"""The state after a command that was obeyed."""
+
+
+def encode_request(frame: Frame) -> bytes:
+    """Write a request as a packet; KeyError if RTno has no letter for it."""
+    return pack(LETTERS[frame.command], frame.data)
 
 
 def encode_packet(frame: Frame) -> bytes:
@@ -88,7 +112,7 @@ class PacketDecoder:
         self.lost = False
         self._packet.clear()
 
-    def push(self, data: bytes) -> list[Packet | LinkFault]:
+    def packets(self, data: bytes) -> list[Packet | LinkFault]:
         """Take bytes in; give whole packets out, and what was wrong with others."""
         out = []
         for code in data:
@@ -119,34 +143,19 @@ class PacketDecoder:
 
 
 @dataclass(slots=True)
-class RtnoDecoder:
+class RtnoDecoder(PacketDecoder):
     """Reads the packets of a proxy as frames; used as `Decoder` is.
 
-    Attributes:
-        lost: an unknown letter or more data than fit came: all is thrown away
-            until `clear`.
+    An unknown letter has the same effect as more data than fit.
     """
-
-    lost: bool = field(default=False, init=False)
-    _packets: PacketDecoder = field(default_factory=PacketDecoder, init=False)
-
-    @property
-    def begun(self) -> bool:
-        """Whether a packet has begun that is not whole."""
-        return self._packets.begun
-
-    def clear(self) -> None:
-        """Forget a packet that has only begun, and look for a header again."""
-        self.lost = False
-        self._packets.clear()
 
     def push(self, data: bytes) -> list[Frame | LinkFault]:
         """Take bytes in; give whole packets out as frames, and what was wrong with others."""
         out = []
-        for found in () if self.lost else self._packets.push(data):
+        for found in self.packets(data):
             out.append(found if isinstance(found, LinkFault) else _frame_of(found))
             if out[-1] is LinkFault.UNKNOWN:
-                self._packets.clear()
+                self.clear()
                 self.lost = True
                 break
         return out
@@ -157,3 +166,65 @@ def _frame_of(packet: Packet) -> Frame | LinkFault:
     if command is None or REQUESTS[command](packet.data) != len(packet.data):
         return LinkFault.UNKNOWN
     return Frame(command, packet.data)
+
+
+@dataclass(slots=True)
+class RtnoReplies(PacketDecoder):
+    r"""Reads the packets of a device as frames; used as `Decoder(REPLIES)` is.
+
+    RTno leaves out what a frame has: the status of a state, the state after a
+    command, the numbers and the type of a profile. They are put in where they
+    follow from the rest; the state after a refusal is `?`, which is none.
+
+    >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
+    [Frame(command=<Command.STATE: b'CX'>, data=b'@I')]
+    """
+
+    _ports: dict[Command, int] = field(default_factory=dict, init=False)  # since the last profile
+
+    def push(self, data: bytes) -> list[Frame | LinkFault]:
+        """Take bytes in; give whole packets out as frames, and what was wrong with others."""
+        return [
+            found if isinstance(found, LinkFault) else self._frame_of(found)
+            for found in self.packets(data)
+        ]
+
+    def _frame_of(self, packet: Packet) -> Frame | LinkFault:
+        if packet.letter == _FAULT:
+            return _fault_of(packet.data)
+        command = _COMMANDS.get(packet.letter)
+        if command is None:
+            return LinkFault.UNKNOWN
+        data = self._complete(command, packet.data)
+        if len(data) > MAX_DATA_BYTES or REPLIES[command](data) != len(data):
+            return LinkFault.UNKNOWN
+        return Frame(command, data)
+
+    def _complete(self, command: Command, data: bytes) -> bytes:
+        """Put in what RTno leaves out."""
+        if command in {Command.STATE, Command.CONTEXT}:
+            return bytes([Status.OK]) + data
+        if command in _PROFILES:
+            self._ports[command] = self._ports.get(command, 0) + 1
+            return bytes([len(data)]) + data
+        if not data or data[0] not in WITH_FIELDS:
+            return data
+        if command is Command.PROFILE:
+            counts = bytes(self._ports.pop(profile, 0) & 0xFF for profile in _PROFILES)
+            return data + counts + bytes([len(TYPE_NAME)]) + TYPE_NAME
+        if command in _STATES:
+            return data + (_STATES[command] if data[0] == Status.OK else _state_after(data[0]))
+        return data
+
+
+def _state_after(status: int) -> bytes:
+    """Return the state after a command that failed or was refused."""
+    return b"E" if status == Status.ERROR else b"?"
+
+
+def _fault_of(data: bytes) -> Frame | LinkFault:
+    """Read a fault, which RTno tells with its code negated."""
+    try:
+        return fault_frame(LinkFault(-data[0] & 0xFF))
+    except (IndexError, ValueError):
+        return LinkFault.UNKNOWN

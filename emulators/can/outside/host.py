@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.errors import LinkClosed, LinkTimeout
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.link import Stamped
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

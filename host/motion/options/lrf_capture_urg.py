@@ -10,8 +10,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.components.ref_hard import Opener
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
-from tickrig.host.urg.client import UrgClient
-from tickrig.host.urg.scan import Scan
+from tickrig.host.urg.client import Scan, UrgClient
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
 

@@ -15,7 +15,7 @@ from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.start import loading
-from tickrig.host.links.stamped_link import StampedLink
+from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.text.user_file import explain_error, find_class
 
@@ -101,8 +101,7 @@ def open_link(
         bus_state: told what its CAN controller reports.
         stack: closes it.
     """
-    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415
-    from tickrig.host.links.echo_free_link import EchoFreeLink  # noqa: PLC0415
+    from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
 
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)

@@ -16,7 +16,7 @@ from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.stamped_link import StampedLink
+from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
     BusFailed,
     bus_of,

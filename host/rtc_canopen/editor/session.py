@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.links.stamped_link import StampedLink
+from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.definition.definition_file import save_definition
 from tickrig.host.rtc_canopen.events import Listener
 from tickrig.host.rtc_canopen.serve import open_server

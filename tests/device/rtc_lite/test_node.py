@@ -15,8 +15,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.ports import InPort, OutPort
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 from tickrig.wire.rtc_lite.values import BOOLEAN, LONG, LONG_SEQ, OCTET_SEQ
 
 WRITE_42 = "PS\x02\x04in*\0\0\0"

@@ -7,7 +7,7 @@ from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Framing
 
 
 def test_frames_of_both_directions_are_shown_without_header_and_checksum() -> None:

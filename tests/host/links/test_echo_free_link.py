@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tests.emulators.can.can_bench import frames
-from tickrig.host.links.echo_free_link import EchoFreeLink
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.can_link import EchoFreeLink
+from tickrig.host.links.link import Stamped
 from tickrig.wire.can import Frames
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.links.stamp_clock import StampClock
+from tickrig.host.links.can_link import StampClock
 
 
 def test_frames_that_are_read_late_have_the_times_of_the_bus() -> None:

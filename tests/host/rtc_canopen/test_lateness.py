@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.host.links.stamped_link import Stamped
+from tickrig.host.links.link import Stamped
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.events import EventKind
 

@@ -21,7 +21,7 @@ from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings
 from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 NOISY_US = 3_000_000

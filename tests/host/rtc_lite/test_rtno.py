@@ -10,8 +10,7 @@ from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc_lite import Settings
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
-from tickrig.wire.rtc_lite.frame import Checksum
-from tickrig.wire.rtc_lite.framing import Framing
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 RTNO = Settings(framing=Framing.RTNO, rediscover=True)

@@ -9,8 +9,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.urg.client import UrgClient
-from tickrig.host.urg.scan import Scan
+from tickrig.host.urg.client import Scan, UrgClient
 
 
 class SensorBench:

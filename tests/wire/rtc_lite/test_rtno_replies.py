@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from tickrig.wire.rtc_lite.codes import Command, LinkFault
 from tickrig.wire.rtc_lite.frame import Frame, fault_frame
-from tickrig.wire.rtc_lite.rtno import encode_packet, pack
-from tickrig.wire.rtc_lite.rtno_replies import RtnoReplies, encode_request
+from tickrig.wire.rtc_lite.rtno import RtnoReplies, encode_packet, encode_request, pack
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from tickrig.wire.rtc_lite.messages import (
     parse_port_profile,
     parse_reply,
 )
-from tickrig.wire.rtc_lite.names import encode_name
 from tickrig.wire.rtc_lite.values import (
     CHAR,
     CHAR_SEQ,
@@ -30,6 +29,7 @@ from tickrig.wire.rtc_lite.values import (
     PORT_TYPES,
     SHORT,
     PortType,
+    encode_name,
 )
 
 ROWS = VECTORS["marshalling"]

@@ -12,7 +12,7 @@ import pytest
 from tests.host.rtc_canopen.bench import SYSTEMS
 from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.stamped_link import Stamped, StampedLink
+from tickrig.host.links.link import Stamped, StampedLink
 from tickrig.host.rtc_canopen.editor.session import Session
 from tickrig.host.rtc_canopen.events import Event, EventKind
 from tickrig.host.rtc_canopen.serve import open_server
