@@ -32,7 +32,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
     return found
 
 
-def explain_error(error: Exception, file: str = "") -> str:
+def explain_error(error: BaseException, file: str = "") -> str:
     """Say in a line what went wrong in a user's file, and where in it if it is named."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"

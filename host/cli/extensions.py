@@ -1,0 +1,96 @@
+"""What installed packages add to ours: entry points, read when needed (docs/extending.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from tickrig.host.cli.start import load
+from tickrig.host.text.user_file import explain_error
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+T = TypeVar("T")
+
+
+class ExtensionError(ValueError):
+    """An extension that is not there or cannot be used; the text is one line."""
+
+
+@dataclass(frozen=True)
+class ExtensionGroup(Generic[T]):
+    """One entry-point group: what we bring ourselves, and what other packages add.
+
+    Nothing is imported, and no metadata is read, before somebody asks. What is built in
+    needs no installation; an entry point of the same name does not replace it.
+
+    Args:
+        name: of the group, as `tickrig.devices`.
+        what: what its members are called, for people, as `device`.
+        built_in: ours by name, each as `MODULE:NAME`.
+        accepts: True for what may be a member.
+        wanted: what that is, for people, as `a DeviceType`.
+    """
+
+    name: str
+    what: str
+    built_in: Mapping[str, str]
+    accepts: Callable[[Any], bool]
+    wanted: str
+
+    def names(self) -> list[str]:
+        """Return all names, ours first, without loading anything."""
+        return [*self.built_in, *sorted({point.name for point in self._foreign()})]
+
+    def load(self, name: str) -> T:
+        """Return the member of this name.
+
+        Raises:
+            ExtensionError: there is none, or it cannot be loaded.
+        """
+        if name in self.built_in:
+            return self._checked(f"{self.what} {name!r}", self.built_in[name])
+        for point in self._foreign():
+            if point.name == name:
+                return self._load_foreign(point)
+        known = ", ".join(self.names())
+        raise ExtensionError(f"no {self.what} {name!r}; known: {known}")
+
+    def load_all(self, tell: Callable[[str], None]) -> dict[str, T]:
+        """Return all members by name; what cannot be loaded is left out, and told in a line.
+
+        Args:
+            tell: takes a line for people.
+        """
+        members = {name: self.load(name) for name in self.built_in}
+        for point in self._foreign():
+            try:
+                members.setdefault(point.name, self._load_foreign(point))
+            except ExtensionError as error:
+                tell(str(error))
+        return members
+
+    def _foreign(self) -> Iterator[EntryPoint]:
+        """Give the entry points of other packages."""
+        from importlib.metadata import entry_points  # noqa: PLC0415 - slow
+
+        seen = set[tuple[str, str]]()  # a package may be found twice on the path
+        for point in entry_points(group=self.name):
+            if point.name not in self.built_in and (point.name, point.value) not in seen:
+                seen.add((point.name, point.value))
+                yield point
+
+    def _load_foreign(self, point: EntryPoint) -> T:
+        package = point.dist.name if point.dist else "?"
+        return self._checked(f"{self.what} {point.name!r} of package {package}", point.value)
+
+    def _checked(self, place: str, path: str) -> T:
+        try:
+            found: T = load(path.partition("[")[0].strip())
+        except (Exception, SystemExit) as error:  # a foreign module may raise anything
+            raise ExtensionError(f"{place} ({path}): {explain_error(error)}") from error
+        if not self.accepts(found):
+            raise ExtensionError(f"{place} ({path}) is not {self.wanted}")
+        return found
