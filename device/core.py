@@ -2,26 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NoReturn, Protocol, SupportsIndex, TypeVar
+from typing import Protocol, TypeVar
 
 W = TypeVar("W")  # one tick's traffic: bytes on a line, tuple[CanFrame, ...] on CAN
-
-
-class NonCopyable:
-    """A machine that is neither copied nor pickled; `copy.copy`, `deepcopy` and `pickle` raise.
-
-    Its parts are joined by closures and callbacks. Those of a copy would go on
-    acting on the original, without a word.
-    """
-
-    __slots__ = ()
-
-    def __reduce_ex__(self, protocol: SupportsIndex, /) -> NoReturn:
-        """Refuse; everything that copies asks here."""
-        raise TypeError(
-            f"{type(self).__name__} cannot be copied or pickled: the copy would act on the"
-            " original; make a new one"
-        )
 
 
 class Device(Protocol[W]):

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
 
+from tickrig.device.twin import Immutable
+
 
 class SignalType(Enum):
     """What a physical input is."""
@@ -22,7 +24,7 @@ class SignalType(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Input:
+class Input(Immutable):
     """A physical input.
 
     Attributes:
@@ -47,7 +49,7 @@ class Input:
 
 
 @dataclass(frozen=True, slots=True)
-class Output:
+class Output(Immutable):
     """A physical output: what an observer would see on the device."""
 
     name: str

@@ -7,7 +7,7 @@ from math import cos, pi, sin
 from typing import Final, NamedTuple
 
 from tickrig.device.body.pose import Pose
-from tickrig.device.core import NonCopyable
+from tickrig.device.twin import Copyable, Immutable
 
 STEP_S: Final = 1e-3
 
@@ -24,7 +24,7 @@ class Velocity(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OmniParameters:
+class OmniParameters(Immutable):
     """What a body is like.
 
     Attributes:
@@ -71,7 +71,7 @@ class OmniParameters:
 
 
 @dataclass(slots=True)
-class OmniBody(NonCopyable):
+class OmniBody(Copyable):
     """Three wheels that follow their commands with a time constant, without slip.
 
     Not emulated: rollers, slip, mass, encoders, the driver.

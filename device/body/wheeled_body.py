@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.body.contact import Contact
 from tickrig.device.body.pose import Pose
-from tickrig.device.core import NonCopyable
+from tickrig.device.twin import Copyable, Immutable
 
 STEP_S: Final = 1e-3
 """Length of a step; drives tick as often."""
@@ -21,7 +21,7 @@ SIDES: Final = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BodyParameters:
+class BodyParameters(Immutable):
     """What a body is like.
 
     Attributes:
@@ -59,7 +59,7 @@ class BodyParameters:
         return (*left, *right)
 
 
-class WheeledBody(NonCopyable):
+class WheeledBody(Copyable):
     """A differential drive, or a skid steer whose sides move as the mean of their wheels.
 
     It goes as far as its wheels have turned since the step before, on an exact

@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.device.twin import Immutable
 from tickrig.wire.modbus.requests import ExceptionCode, Refusal
 
 WORD: Final = 0x1_0000
 
 
 @dataclass(frozen=True, slots=True)
-class Register:
+class Register(Immutable):
     """A number that a master sees.
 
     Attributes:

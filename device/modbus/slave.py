@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from tickrig.device.core import NonCopyable
 from tickrig.device.modbus.registers import Registers
+from tickrig.device.twin import Copyable
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.requests import (
@@ -23,7 +23,7 @@ from tickrig.wire.modbus.rtu import (
 )
 
 
-class ModbusSlave(NonCopyable):
+class ModbusSlave(Copyable):
     """Answers a master on an RTU line.
 
     A frame ends with silence; it is served then, and the answer leaves at once. What is

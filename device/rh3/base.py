@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.device.core import NonCopyable
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import Output, QuantityBank
 from tickrig.device.rh3.driver import Driver
@@ -13,6 +12,7 @@ from tickrig.device.rh3.ground import Ground
 from tickrig.device.rh3.look import READ, Look
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.rh3.terminals import INPUTS, OUTPUTS
+from tickrig.device.twin import Copyable
 
 TICK_US: Final = 1_000
 
@@ -20,7 +20,7 @@ LOOK_US: Final = 10_000
 """How often the world looks at it."""
 
 
-class Rh3Base(NonCopyable):
+class Rh3Base(Copyable):
     """The base of Reference Hardware 3 as a Modbus RTU slave; a `Device[bytes]`.
 
     The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its

@@ -44,7 +44,7 @@ class Driver:
     def __init__(self, parameters: BaseParameters, inputs: QuantityBank) -> None:
         self._inputs, self._delay_us = inputs, parameters.delay_ms * 1_000
         self.now_us = self._start_us = 0
-        measured = {"status": lambda: self.status, "sample": lambda: self._sample}
+        measured = {"status": self._status, "sample": self._sample}
         self.registers = Registers(TABLE, measured)
         self.sides = tuple(
             Side(name, bit, parameters, self.registers) for bit, name in enumerate(SIDES)
@@ -121,7 +121,9 @@ class Driver:
         for side in self.sides:
             side.coast(shorted=True)
 
-    @property
+    def _status(self) -> int:
+        return self.status
+
     def _sample(self) -> int:
         return (self.now_us - self._start_us) // 1_000 & 0xFFFF
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import tau
 from typing import Final
 
+from tickrig.device.twin import Immutable
 from tickrig.wire.modbus.rtu import ADDRESSES
 
 GEAR_RATIO: Final = 74.91
@@ -21,7 +22,7 @@ PER_MILLE: Final = 1_000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BaseParameters:
+class BaseParameters(Immutable):
     """A base and the ground it stands on.
 
     Attributes:

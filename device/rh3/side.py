@@ -87,11 +87,23 @@ class Side:
     def measured(self) -> dict[str, Callable[[], int]]:
         """What a master reads of it."""
         return {
-            f"fault_{self.name}": lambda: int(self.fault),
-            f"position_{self.name}": lambda: self._signed(self.wheel.counts - self._zero),
-            f"speed_{self.name}": lambda: self._signed(round(self.wheel.speed * 1_000)),
-            f"current_{self.name}": lambda: self._signed(self._milliamperes),
+            f"fault_{self.name}": self._fault_bits,
+            f"position_{self.name}": self._position,
+            f"speed_{self.name}": self._speed_now,
+            f"current_{self.name}": self._current_ma,
         }
+
+    def _fault_bits(self) -> int:
+        return int(self.fault)
+
+    def _position(self) -> int:
+        return self._signed(self.wheel.counts - self._zero)
+
+    def _speed_now(self) -> int:
+        return self._signed(round(self.wheel.speed * 1_000))
+
+    def _current_ma(self) -> int:
+        return self._signed(round(self.torque * self._rated_ma / PER_MILLE))
 
     @property
     def torque(self) -> float:
@@ -154,10 +166,6 @@ class Side:
             self.wheel.brake()
         else:
             self.wheel.step(0.0)
-
-    @property
-    def _milliamperes(self) -> int:
-        return round(self.torque * self._rated_ma / PER_MILLE)
 
     def _signed(self, value: int) -> int:
         """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from tickrig.device.twin import Immutable
 from tickrig.wire.rrc.replies import POWER_ON_TRIGGER, EventKind
 
 
@@ -16,7 +17,7 @@ class FailTarget(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class RrcConfig:
+class RrcConfig(Immutable):
     """Configuration of an emulated RRC. Times are in ticks of 10 ms.
 
     Attributes:

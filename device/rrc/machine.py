@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NonCopyable
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
@@ -18,6 +17,7 @@ from tickrig.device.rrc.receive_buffer import ReceiveBuffer
 from tickrig.device.rrc.settings import Settings
 from tickrig.device.rrc.states import NEXT_STATE, POWERED_ON, Move, RrcState
 from tickrig.device.rrc.terminals import OUTPUTS, new_inputs
+from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, EventKind, Ok, Refusal, Text
@@ -37,7 +37,7 @@ MOVES: Final[dict[type[cmd.Command], Move]] = {
 
 
 @dataclass(slots=True)
-class Rrc(NonCopyable):
+class Rrc(Copyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
     Not emulated: the traffic on the VR2 bus itself, how fast the vehicle drives

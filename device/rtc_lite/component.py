@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from copy import copy
 from typing import Any, ClassVar, Final
 
-from tickrig.device.core import NonCopyable
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, InputBank
 from tickrig.device.rtc_lite.ports import InPort, OutPort, Port
+from tickrig.device.twin import Copyable
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import Status
 from tickrig.wire.rtc_lite.values import encode_name
@@ -25,7 +25,7 @@ MAX_PORTS: Final = 8
 """In-ports, and out-ports, that a small device has room for (RTno has as many)."""
 
 
-class Component(NonCopyable):
+class Component(Copyable):
     """A component on a small device; a subclass says what it is and does.
 
     Ports are declared as attributes of the class; each component has its own.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.device.twin import Immutable
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
@@ -14,7 +15,7 @@ DEFAULT_RATE_HZ: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
-class NodeConfig:
+class NodeConfig(Immutable):
     """Configuration of an emulated node.
 
     Attributes:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.core import NonCopyable
 from tickrig.device.physical import InputBank, Output
 from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
@@ -15,6 +14,7 @@ from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
 from tickrig.device.rtc_lite.server import Server
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
 from tickrig.device.timer import Timer
+from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
@@ -30,7 +30,7 @@ TIMED: Final = (State.ACTIVE, State.ERROR)
 
 
 @dataclass(slots=True)
-class RtcLiteNode(NonCopyable):
+class RtcLiteNode(Copyable):
     """A PIC with an RTC-Lite component (Suzuki et al., RSJ 2007); a `Device[bytes]`.
 
     In each tick: bytes from the line, time-outs, requests in order, timer. A

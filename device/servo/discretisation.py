@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tickrig.device.servo.parameters import MotorParameters
+from tickrig.device.twin import Immutable
 
 STEP_S = 0.001
 
@@ -23,7 +24,7 @@ Matrix = list[list[float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Discretisation:
+class Discretisation(Immutable):
     """One control step of winding and shaft as rows of numbers.
 
     The rows of a led current multiply (current before, speed before, current

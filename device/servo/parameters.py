@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tickrig.device.twin import Immutable
+
 
 @dataclass(frozen=True, slots=True)
-class MotorParameters:
+class MotorParameters(Immutable):
     """A permanent-magnet motor, brushed or brushless, seen as one winding.
 
     Attributes:
@@ -43,7 +45,7 @@ class MotorParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class PowerStage:
+class PowerStage(Immutable):
     """A four-quadrant stage of ideal switches.
 
     Attributes:
@@ -71,7 +73,7 @@ class PowerStage:
 
 
 @dataclass(frozen=True, slots=True)
-class GearParameters:
+class GearParameters(Immutable):
     """A gear without play, and what is always on its output shaft.
 
     Attributes:
@@ -93,7 +95,7 @@ class GearParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class Encoders:
+class Encoders(Immutable):
     """The incremental encoder of the motor, and an absolute one of the output shaft.
 
     Attributes:
@@ -109,7 +111,7 @@ class Encoders:
 
 
 @dataclass(frozen=True, slots=True)
-class LoopGains:
+class LoopGains(Immutable):
     """What the loops are tuned to, for the inertia without `load_kg_m2`.
 
     Attributes:
@@ -127,7 +129,7 @@ class LoopGains:
 
 
 @dataclass(frozen=True, slots=True)
-class ServoParameters:
+class ServoParameters(Immutable):
     """All that makes a servo."""
 
     motor: MotorParameters

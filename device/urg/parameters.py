@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.device.twin import Immutable
 from tickrig.wire.scip.description import Specification
 
 URG_04LX: Final = Specification(
@@ -24,7 +25,7 @@ PROTOCOLS: Final = ("1.1", "2.0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UrgParameters:
+class UrgParameters(Immutable):
     """A sensor.
 
     Attributes:

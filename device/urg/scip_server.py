@@ -62,12 +62,12 @@ class ScipServer:
             "QT": self._quit,
             "RS": self._reset,
             "TM": self._time,
-            "SS": lambda now_us, command: (self.settings.set_rate(command.parameters), ()),
+            "SS": self._rate,
             "CR": self._speed,
-            "HS": lambda now_us, command: (self.settings.set_sensitivity(command.parameters), ()),
-            "VV": lambda now_us, command: _told(version(self.parameters.serial)),
-            "PP": lambda now_us, command: (status.OK, URG_04LX.lines),
-            "II": lambda now_us, command: _told(self._state(now_us)),
+            "HS": self._sensitivity,
+            "VV": self._version,
+            "PP": self._specification,
+            "II": self._state,
         }
         self.power_up(0)
 
@@ -222,11 +222,23 @@ class ScipServer:
             self.due_us = self.rotation.whole_end_us(now_us)
         return status.OK, ()
 
+    def _rate(self, now_us: int, command: Command) -> Answer:
+        return self.settings.set_rate(command.parameters), ()
+
+    def _sensitivity(self, now_us: int, command: Command) -> Answer:
+        return self.settings.set_sensitivity(command.parameters), ()
+
+    def _version(self, now_us: int, command: Command) -> Answer:
+        return status.OK, encode_lines(version(self.serial))
+
+    def _specification(self, now_us: int, command: Command) -> Answer:
+        return status.OK, URG_04LX.lines
+
     def _timer(self, at_us: int) -> int:
         return (at_us - self._zero_us) // 1_000 % TIMER
 
-    def _state(self, now_us: int) -> Mapping[str, str]:
-        return {
+    def _state(self, now_us: int, command: Command) -> Answer:
+        texts = {
             "MODL": URG_04LX.model,
             "LASR": "ON" if self.laser else "OFF",
             "SCSP": self.rotation.text,
@@ -235,6 +247,7 @@ class ScipServer:
             "TIME": f"{self._timer(now_us):06X}",
             "STAT": CONDITION[self.trouble],
         }
+        return status.OK, encode_lines(texts)
 
     @property
     def _mode(self) -> str:
@@ -242,7 +255,3 @@ class ScipServer:
         if not self.laser:
             return "IDLE"
         return "CLASSIC" if self._classic else self.settings.mode
-
-
-def _told(values: Mapping[str, str]) -> Answer:
-    return status.OK, encode_lines(values)

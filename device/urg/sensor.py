@@ -7,8 +7,8 @@ from math import inf
 from typing import Final
 
 from tickrig.device.body.pose import Pose
-from tickrig.device.core import NonCopyable
 from tickrig.device.physical import Output, QuantityBank
+from tickrig.device.twin import Copyable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.scip_server import ScipServer
 from tickrig.device.urg.terminals import GROUPS, INPUTS, OUTPUTS
@@ -19,7 +19,7 @@ from tickrig.wire.scip import status
 TICK_US: Final = 1_000
 
 
-class Urg(NonCopyable):
+class Urg(Copyable):
     """A URG-04LX on USB; a `Device[bytes]`.
 
     In each tick: what the world does to it, the end of a scan, commands. A scan is seen

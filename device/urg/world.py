@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, inf, isfinite, sin, sqrt
 
+from tickrig.device.twin import Immutable
+
 Rays = Sequence[tuple[float, float]]
 """Directions, each a vector of length 1."""
 
@@ -66,7 +68,7 @@ class Post:
 
 
 @dataclass(frozen=True, slots=True)
-class World:
+class World(Immutable):
     """All that a ray can meet. Not there: glass, mirrors, slopes, anything with a height."""
 
     walls: tuple[Wall, ...] = ()

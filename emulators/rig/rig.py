@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final, Generic, Protocol
 
-from tickrig.device.core import Device, NonCopyable, W
+from tickrig.device.core import Device, W
+from tickrig.device.twin import NonCopyable
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue

@@ -13,7 +13,7 @@ whole when it has that many.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from functools import partial
 from typing import Final
 
 from tickrig.wire.rtc_lite.codes import Command, Status
@@ -28,8 +28,8 @@ WITH_FIELDS: Final = (Status.OK, Status.ERROR, Status.WRONG_STATE)
 """After any other status the reply ends."""
 
 
-def _fixed(size: int) -> Layout:
-    return lambda data: size
+def _fixed(size: int, data: bytes | bytearray) -> int:
+    return size
 
 
 def _counted(data: bytes | bytearray) -> int:
@@ -40,9 +40,9 @@ def _port_data(data: bytes | bytearray) -> int:
     return 2 + data[0] + data[1] if len(data) >= 2 else 2
 
 
-def _reply(size: int) -> Layout:
+def _reply(size: int, data: bytes | bytearray) -> int:
     """A status, and fields of a fixed size where the status lets them follow."""
-    return lambda data: 1 + size if data and data[0] in WITH_FIELDS else 1
+    return 1 + size if data and data[0] in WITH_FIELDS else 1
 
 
 def _component(data: bytes | bytearray) -> int:
@@ -64,28 +64,27 @@ WITH_STATE: Final = (
 )
 """Commands of the life cycle: no arguments, and the state in the reply."""
 
-REQUESTS: Final[Mapping[Command, Layout]] = MappingProxyType(
-    {
-        **dict.fromkeys((*WITH_STATE, Command.PROFILE, Command.CONTEXT), _fixed(0)),
-        Command.PING: _fixed(1),
-        Command.RATE: _fixed(2),
-        Command.WRITE: _port_data,
-        Command.POLL: _counted,
-    }
-)
+FAULTS: Final = (Command.CHECKSUM_FAULT, Command.TIMEOUT_FAULT, Command.UNKNOWN_FAULT)
+"""What a device says of bytes that are no frame for it."""
+
+REQUESTS: Final[Mapping[Command, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, Command.PROFILE, Command.CONTEXT), partial(_fixed, 0)),
+    Command.PING: partial(_fixed, 1),
+    Command.RATE: partial(_fixed, 2),
+    Command.WRITE: _port_data,
+    Command.POLL: _counted,
+}
 """What a proxy sends."""
 
-REPLIES: Final[Mapping[Command, Layout]] = MappingProxyType(
-    {
-        **dict.fromkeys((*WITH_STATE, Command.PING, Command.CONTEXT), _reply(1)),
-        **dict.fromkeys((Command.RATE, Command.WRITE), _fixed(1)),
-        **dict.fromkeys((Command.IN_PROFILE, Command.OUT_PROFILE), _counted),
-        **dict.fromkeys(
-            (Command.CHECKSUM_FAULT, Command.TIMEOUT_FAULT, Command.UNKNOWN_FAULT), _fixed(1)
-        ),
-        Command.PROFILE: _component,
-        Command.DATA: _port_data,
-        Command.POLL: _polled,
-    }
-)
+REPLIES: Final[Mapping[Command, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, Command.PING, Command.CONTEXT), partial(_reply, 1)),
+    **dict.fromkeys((Command.RATE, Command.WRITE), partial(_fixed, 1)),
+    **dict.fromkeys((Command.IN_PROFILE, Command.OUT_PROFILE), _counted),
+    **dict.fromkeys(
+        (Command.CHECKSUM_FAULT, Command.TIMEOUT_FAULT, Command.UNKNOWN_FAULT), partial(_fixed, 1)
+    ),
+    Command.PROFILE: _component,
+    Command.DATA: _port_data,
+    Command.POLL: _polled,
+}
 """What a device sends."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self
 
-from tickrig.device.core import NonCopyable
+from tickrig.device.twin import NonCopyable
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState

@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
-from tickrig.device.core import NonCopyable
+from tickrig.device.twin import NonCopyable
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister

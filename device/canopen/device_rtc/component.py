@@ -7,9 +7,9 @@ from enum import IntEnum
 from typing import Any, ClassVar, Final
 
 from tickrig.device.canopen.device_rtc.ports import Port
-from tickrig.device.core import NonCopyable
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
+from tickrig.device.twin import NonCopyable
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
 

@@ -7,8 +7,8 @@ from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import NonCopyable
 from tickrig.device.physical import Output
+from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch

@@ -1,0 +1,131 @@
+"""Twins of machines: what they share, what they have for themselves, what is refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from enum import Enum
+
+import pytest
+
+from tickrig.device.twin import Copyable, Immutable, Listeners, NonCopyable, twin
+
+
+class Colour(Enum):
+    RED = object()
+
+
+class Plan(Immutable):
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+
+class Part:
+    def __init__(self, count: int = 0) -> None:
+        self.count = count
+
+    def bump(self) -> None:
+        self.count += 1
+
+
+class Machine(Copyable):
+    __slots__ = ("colour", "event", "listeners", "part", "plan")
+
+    def __init__(self, part: Part) -> None:
+        self.part, self.plan, self.colour = part, Plan(3), Colour.RED
+        self.event: Callable[[], None] = part.bump
+        self.listeners: Listeners[Callable[[], None]] = Listeners()
+
+
+class Socket(NonCopyable):
+    why_not_copied = "it is open"
+
+
+COPIES: dict[str, Callable[[Machine], Machine]] = {
+    "twin": twin,
+    "deepcopy": copy.deepcopy,
+    "within": lambda machine: copy.deepcopy({"rig": (machine,)})["rig"][0],
+}
+
+
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+def test_a_bound_method_acts_on_the_twin(copied: Callable[[Machine], Machine]) -> None:
+    machine = Machine(Part())
+    other = copied(machine)
+    other.event()
+    assert (machine.part.count, other.part.count) == (0, 1)
+    machine.event()
+    assert (machine.part.count, other.part.count) == (1, 1)
+
+
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+def test_twins_share_what_never_changes(copied: Callable[[Machine], Machine]) -> None:
+    machine = Machine(Part())
+    other = copied(machine)
+    assert other.plan is machine.plan
+    assert other.colour is Colour.RED
+
+
+def test_a_pickle_has_everything_by_value() -> None:
+    machine = Machine(Part(7))
+    machine.colour = Colour  # type: ignore[assignment] # a value that another process knows
+    other = pickle.loads(pickle.dumps(machine))
+    assert (other.plan.size, other.part.count) == (3, 7)
+    assert other.plan is not machine.plan
+
+
+def test_a_description_is_its_own_copy() -> None:
+    plan = Plan(1)
+    assert copy.copy(plan) is plan
+    assert copy.deepcopy([plan])[0] is plan
+
+
+def test_nobody_listens_to_a_twin() -> None:
+    machine = Machine(Part())
+    machine.listeners.append(lambda: None)
+    assert twin(machine).listeners == []
+    assert type(twin(machine).listeners) is Listeners
+    assert len(machine.listeners) == 1
+
+
+def test_machines_that_share_a_part_are_copied_with_one_part() -> None:
+    part = Part()
+    pair = (Machine(part), Machine(part), part)
+    first, second, alone = copy.deepcopy(pair)
+    assert first.part is second.part is alone
+    assert alone is not part
+    third, again = copy.deepcopy([pair[0], pair[0]])
+    assert third is again
+
+
+def test_the_class_of_a_twin_may_be_local() -> None:
+    class Local(Copyable):
+        pass
+
+    assert type(twin(Local())) is Local
+
+
+def test_a_shallow_copy_is_refused() -> None:
+    with pytest.raises(TypeError, match=r"^Machine cannot be copied by copy\.copy: use"):
+        copy.copy(Machine(Part()))
+
+
+def test_what_belongs_to_its_process_says_why() -> None:
+    for copied in (copy.copy, copy.deepcopy, twin, pickle.dumps):
+        with pytest.raises(TypeError, match=r"^Socket cannot be copied or pickled: it is open$"):
+            copied(Socket())
+
+
+def test_a_closure_that_is_kept_as_state_is_refused() -> None:
+    machine = Machine(Part())
+    machine.event = lambda: None
+    with pytest.raises(TypeError, match=r"^Machine cannot be copied: .*<lambda>"):
+        twin(machine)
+
+
+def test_an_item_that_was_shared_is_found_only_by_its_process() -> None:
+    from tickrig.device import twin as module  # noqa: PLC0415 - a private name
+
+    with pytest.raises(TypeError, match="item 3 of a twin was shared within its process"):
+        module._shared(3)
