@@ -15,7 +15,7 @@ COMMANDS: Final = {
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
     "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
     "rtc": (
-        "tickrig.emulators.rtc.cli:rtc",
+        "tickrig.host.rtc.commands.cli:rtc",
         "Run RT components, and work with them while they run.",
     ),
 }

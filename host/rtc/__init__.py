@@ -1,32 +1,13 @@
-"""RT components after OMG RTC 1.0 and OpenRTM-aist 1.x, in one process, told the time."""
+"""RT components after OMG RTC 1.0 and OpenRTM-aist 1.x, in one process, which is given the time."""
 
-from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
-from tickrig.host.rtc.configuration.parameter import Parameter
-from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import ExecutionKind, LifeCycleState, ReturnCode
-from tickrig.host.rtc.ports.connect import connect
-from tickrig.host.rtc.ports.data_port import InPort, OutPort
-from tickrig.host.rtc.ports.port_status import PortStatus
-from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServicePort
-from tickrig.host.rtc.system.manager import Manager
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "ComponentProfile",
-    "Consumer",
-    "ExecutionContext",
-    "ExecutionKind",
-    "InPort",
-    "LifeCycleState",
-    "Manager",
-    "ModuleSpec",
-    "OutPort",
-    "Parameter",
-    "PortStatus",
-    "Provider",
-    "ReturnCode",
-    "RtComponent",
-    "RtcRefused",
-    "ServicePort",
-    "connect",
-]
+if TYPE_CHECKING:
+    from tickrig.host.rtc.model import *  # noqa: F403 - what `__all__` lists there
+
+
+def __getattr__(name: str) -> object:
+    """Return a name of the model: the commands here start without it."""
+    found: object = getattr(import_module(f"{__name__}.model"), name)
+    return found

@@ -1,15 +1,52 @@
-"""The verbs of `tickrig rtc` that look at a system as a whole."""
+"""The verbs of `tickrig rtc` about a system as a whole."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any, Final
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, components
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading
+from tickrig.host.rtc.commands.ask import ask_system, at, components
+from tickrig.host.rtc.commands.verbs import as_json
+
+
+@click.command()
+@click.argument("file", type=PATH, required=False)
+@at
+def save(at: Path, file: Path | None) -> None:
+    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
+    with loading():
+        from tickrig.host.rtc.commands.system_file import file_format, write_system  # noqa: PLC0415
+
+    text = ask_system(at, "save", format="toml" if file is None else file_format(file))["text"]
+    if file is None:
+        click.echo(text)
+    else:
+        write_system(text, file)
+
+
+@click.command()
+@as_json
+@at
+def status(at: Path, as_json: bool) -> None:
+    """Show how the run is going: time, late ticks."""
+    answer = {key: value for key, value in ask_system(at, "status").items() if key != "ok"}
+    if as_json:
+        click.echo(json.dumps(answer))
+        return
+    for key in ("components", "now_us", "late_ticks", "late_us"):
+        click.echo(f"{key} {answer[key]}")
+
+
+@click.command()
+@at
+def stop(at: Path) -> None:
+    """End the system."""
+    ask_system(at, "stop")
 
 
 @click.command()
@@ -22,7 +59,7 @@ def check(at: Path, file: Path) -> None:
     beside it does not matter.
     """
     with loading():
-        from tickrig.emulators.rtc.system_file import file_format, read_system  # noqa: PLC0415
+        from tickrig.host.rtc.commands.system_file import file_format, read_system  # noqa: PLC0415
         from tickrig.host.rtc.system.compare import differences  # noqa: PLC0415
         from tickrig.host.rtc.system.rts_profile import parse_rts_profile  # noqa: PLC0415
         from tickrig.host.rtc.system.system_toml import parse_toml  # noqa: PLC0415
@@ -68,4 +105,4 @@ def _box(component: Any) -> Any:
     return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
 
 
-WHOLE: Final = (check, dot)
+SYSTEM_VERBS: Final = (save, status, stop, check, dot)

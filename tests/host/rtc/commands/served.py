@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from tests.host.rtc.chain import Chain
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.rtc.control import SystemControl
 from tickrig.host.control.server import ControlServer
+from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.execution.real_time import RealTime
 
 ROUND_US = 500

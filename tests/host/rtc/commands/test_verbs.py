@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.emulators.rtc.served import Served
+from tests.host.rtc.commands.served import Served
 from tests.host.rtc.spy import ERROR
 from tickrig.emulators.commands.cli import main
 from tickrig.host.rtc import Provider, ServicePort

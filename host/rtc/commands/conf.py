@@ -7,10 +7,9 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, components
-from tickrig.emulators.rtc.completion import complete_component
-from tickrig.emulators.rtc.texts import configuration_lines
 from tickrig.host.cli.refused import Refused
+from tickrig.host.rtc.commands.ask import ask_system, at, complete_component, components
+from tickrig.host.rtc.commands.texts import configuration_lines
 
 component_name = click.argument("name", shell_complete=complete_component)
 

@@ -17,11 +17,11 @@ from click.testing import CliRunner
 
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.rtc.at import default_path
 from tickrig.host.control.client import ControlClient
+from tickrig.host.rtc.commands.ask import default_path
 from tickrig.host.rtc.system.system_toml import parse_toml
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "rtc_chain.toml"
+EXAMPLE = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
 
 CHAIN = """
 [[component]]

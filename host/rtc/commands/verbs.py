@@ -1,31 +1,37 @@
-"""The verbs of `tickrig rtc` that ask once."""
+"""The verbs of `tickrig rtc` about components and their ports."""
 
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
-from tickrig.emulators.rtc.at import ask_system, at, components
-from tickrig.emulators.rtc.completion import complete_component, complete_port, complete_type
-from tickrig.emulators.rtc.settle import settle
-from tickrig.emulators.rtc.texts import component_lines, component_row, port_line
-from tickrig.host.cli.options import PATH, NumberRange, add_options, time_us
+from tickrig.host.cli.control import refused_by
+from tickrig.host.cli.options import NumberRange, time_us
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.start import loading
+from tickrig.host.control.client import ControlClient
+from tickrig.host.rtc.commands.ask import (
+    SYSTEM,
+    ask_system,
+    at,
+    complete_component,
+    complete_port,
+    complete_type,
+    components,
+    settle,
+)
+from tickrig.host.rtc.commands.texts import component_lines, component_row, port_line, value_line
 
 DATAPORT: Final = "dataport."
+POLL_S: Final = 0.02
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 some_names = click.argument("names", nargs=-1, shell_complete=complete_component)
 names_needed = click.argument("names", nargs=-1, required=True, shell_complete=complete_component)
-moving = add_options(
-    names_needed,
-    click.option("--wait", default="2s", help="How long to wait for it; 0 asks only.  [2s]"),
-    at,
-)
 
 
 @click.command()
@@ -103,27 +109,6 @@ def dis(at: Path, ports: tuple[str, ...]) -> None:
     ask_system(at, "disconnect", ports=list(ports))
 
 
-@click.command()
-@moving
-def act(at: Path, names: tuple[str, ...], wait: str) -> None:
-    """Activate the components NAMES, and wait until they are Active."""
-    _move(at, "activate", names, "ACTIVE", wait)
-
-
-@click.command()
-@moving
-def deact(at: Path, names: tuple[str, ...], wait: str) -> None:
-    """Deactivate the components NAMES, and wait until they are Inactive."""
-    _move(at, "deactivate", names, "INACTIVE", wait)
-
-
-@click.command()
-@moving
-def reset(at: Path, names: tuple[str, ...], wait: str) -> None:
-    """Reset the components NAMES from Error, and wait until they are Inactive."""
-    _move(at, "reset", names, "INACTIVE", wait)
-
-
 @click.command("exit")
 @names_needed
 @at
@@ -156,47 +141,51 @@ def inject(at: Path, port: str, value: str) -> None:
     ask_system(at, "inject", port=port, value=given)
 
 
-@click.command()
-@click.argument("file", type=PATH, required=False)
+@click.command("print")
+@click.argument("port", shell_complete=complete_port)
+@click.option("-n", "count", type=click.IntRange(1), help="End after so many values.")
+@click.option("--for", "duration", metavar="TIME", help="End after this time, as 2s.")
+@click.option("--json", "as_json", is_flag=True, help="Print each value as a JSON object.")
 @at
-def save(at: Path, file: Path | None) -> None:
-    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
-    with loading():
-        from tickrig.emulators.rtc.system_file import file_format, write_system  # noqa: PLC0415
+def print_(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
+    """Print what the OutPort PORT writes from now on, a line a value; Ctrl-C ends.
 
-    text = ask_system(at, "save", format="toml" if file is None else file_format(file))["text"]
-    if file is None:
-        click.echo(text)
-    else:
-        write_system(text, file)
+    A line is the value's time in seconds and its data as JSON.
 
-
-@click.command()
-@as_json
-@at
-def status(at: Path, as_json: bool) -> None:
-    """Show how the run is going: time, late ticks."""
-    answer = {key: value for key, value in ask_system(at, "status").items() if key != "ok"}
-    if as_json:
-        click.echo(json.dumps(answer))
+    \b
+    tickrig rtc print ConsoleIn0.out
+    tickrig rtc print SeqOut0.Long -n 10 --json
+    """  # noqa: D301 - click wants the backspace
+    until_s = time.monotonic() + time_us("--for", duration) / 1e6 if duration else None
+    try:
+        for value in _values(at, port, count, until_s):
+            click.echo(json.dumps(value) if as_json else value_line(value))
+    except KeyboardInterrupt:
         return
-    for key in ("components", "now_us", "late_ticks", "late_us"):
-        click.echo(f"{key} {answer[key]}")
 
 
-@click.command()
-@at
-def stop(at: Path) -> None:
-    """End the system."""
-    ask_system(at, "stop")
+def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
+    """Return a command that asks components for a state, and waits until they are there."""
+
+    @click.command(name, help=f"{text}, and wait until they are {wanted.capitalize()}.")
+    @names_needed
+    @click.option("--wait", default="2s", help="How long to wait for it; 0 asks only.  [2s]")
+    @at
+    def move(at: Path, names: tuple[str, ...], wait: str) -> None:
+        wait_us = time_us("--wait", wait)
+        for component in names:
+            ask_system(at, verb, name=component)
+        for component in names:
+            settle(at, component, wanted, wait_us)
+
+    return move
 
 
-def _move(socket: Path, verb: str, names: tuple[str, ...], wanted: str, wait: str) -> None:
-    wait_us = time_us("--wait", wait)
-    for name in names:
-        ask_system(socket, verb, name=name)
-    for name in names:
-        settle(socket, name, wanted, wait_us)
+MOVES: Final = (
+    _moving("act", "activate", "ACTIVE", "Activate the components NAMES"),
+    _moving("deact", "deactivate", "INACTIVE", "Deactivate the components NAMES"),
+    _moving("reset", "reset", "INACTIVE", "Reset the components NAMES from Error"),
+)
 
 
 def _property(word: str) -> tuple[str, str]:
@@ -206,4 +195,26 @@ def _property(word: str) -> tuple[str, str]:
     return (key if key.startswith(DATAPORT) else DATAPORT + key), value
 
 
-VERBS: Final = (ls, cat, create, con, dis, act, deact, reset, exit_, inject, save, status, stop)
+def _values(socket: Path, port: str, count: int | None, until_s: float | None) -> Iterator[Any]:
+    """Yield values until there were enough of them, or it is time."""
+    with refused_by(socket, SYSTEM), ControlClient(socket) as client:
+        latest = client.ask("seen", port=port)["latest"]
+        given = 0
+        while until_s is None or time.monotonic() < until_s:
+            answer: Any = client.ask("seen", port=port, since=latest)
+            _report_lost(answer, latest)
+            latest = answer["latest"]
+            for seen in answer["values"]:
+                yield seen["value"]
+                given += 1
+                if given == count:
+                    return
+            time.sleep(POLL_S)
+
+
+def _report_lost(answer: Any, latest: Any) -> None:
+    if lost := answer["latest"] - latest - len(answer["values"]):
+        click.echo(f"{lost} values lost: they came faster than they were taken", err=True)
+
+
+VERBS: Final = (ls, cat, create, con, dis, *MOVES, exit_, inject, print_)

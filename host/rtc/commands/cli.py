@@ -6,13 +6,12 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.rtc.at import VARIABLE, default_path
-from tickrig.emulators.rtc.conf_cli import conf
-from tickrig.emulators.rtc.print_cli import print_
-from tickrig.emulators.rtc.verbs_cli import VERBS
-from tickrig.emulators.rtc.whole_cli import WHOLE
 from tickrig.host.cli.options import PATH, NumberRange, time_us
 from tickrig.host.cli.start import loading
+from tickrig.host.rtc.commands.ask import VARIABLE, default_path
+from tickrig.host.rtc.commands.conf import conf
+from tickrig.host.rtc.commands.system_verbs import SYSTEM_VERBS
+from tickrig.host.rtc.commands.verbs import VERBS
 
 
 @click.group()
@@ -82,10 +81,10 @@ def run(lite_boot: str, **options: Any) -> None:
     tickrig rtc run lite.toml --lite LiteA=/dev/ttyUSB0@57600 --lite LiteB=/tmp/lite-b
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.rtc.run import SystemOptions, run_system  # noqa: PLC0415 - slow
+        from tickrig.host.rtc.commands.run import SystemOptions, run_system  # noqa: PLC0415 - slow
 
     run_system(SystemOptions(lite_boot_us=time_us("--lite-boot", lite_boot), **options))
 
 
-for _command in (*VERBS, *WHOLE, conf, print_):
+for _command in (*VERBS, *SYSTEM_VERBS, conf):
     rtc.add_command(_command)

@@ -1,4 +1,4 @@
-"""Devices of RTC-Lite as a command line names them: `NAME=URL[@BAUD]`."""
+"""`--lite NAME=URL[@BAUD]`: devices of RTC-Lite as the command line of `tickrig rtc` names them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.reopening_link import ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
-from tickrig.host.rtc_lite.attachment import RATE_HZ
+from tickrig.host.rtc_lite.attachment import RATE_HZ, attach
+from tickrig.host.rtc_lite.events import ProxyEvent
+from tickrig.host.rtc_lite.settings import Settings
 
 BAUD: Final = 57_600
 
@@ -39,7 +40,7 @@ def attach_lite(
     settings = Settings(boot_us=boot_us, rediscover=True)
     try:
         link = stack.enter_context(closing(ReopeningLink(lambda: SerialLink(url, baud))))
-        attach(manager, link, name, settings, listener=_tell, rate_hz=rate_hz or RATE_HZ)
+        attach(manager, link, name, settings, listener=_report, rate_hz=rate_hz or RATE_HZ)
     except (LinkClosed, ValueError) as error:
         raise Refused(f"--lite {word}: {error}") from None
 
@@ -56,5 +57,5 @@ def parse_lite(word: str) -> tuple[str, str, int]:
     return match[1], match[2], int(match[3] or BAUD)
 
 
-def _tell(event: ProxyEvent) -> None:
+def _report(event: ProxyEvent) -> None:
     say(str(event))

@@ -6,23 +6,27 @@ import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import click
 
-from tickrig.emulators.rtc.console import Console
-from tickrig.emulators.rtc.control import SystemControl
-from tickrig.emulators.rtc.lite import attach_lite
-from tickrig.emulators.rtc.system_file import file_format, read_system, write_system
 from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
+from tickrig.host.rtc.commands.console import Console
+from tickrig.host.rtc.commands.system_control import SystemControl
+from tickrig.host.rtc.commands.system_file import file_format, read_system, write_system
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.system import System, restore
 from tickrig.host.text.user_file import explain_error, find_class
+
+ATTACH_LITE: Final = "tickrig.host.rtc_lite.lite_option:attach_lite"
+"""Named by its path, as a command is: that room is made of this one's components."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +57,7 @@ def run_system(options: SystemOptions) -> None:
         manager.register(kind)
     with warnings_shown(), ExitStack() as stack:
         for word in options.lites:
-            attach_lite(manager, word, stack, options.lite_boot_us, options.rate_hz)
+            load(ATTACH_LITE)(manager, word, stack, options.lite_boot_us, options.rate_hz)
         _restore(manager, system, options)
         stack.callback(_close, manager)
         _serve(stack, manager, options)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.host.rtc.chain import PERIOD_US, Chain
-from tickrig.emulators.rtc.console import Console
+from tickrig.host.rtc.commands.console import Console
 
 
 class Bench(Chain):

@@ -1,1 +1,0 @@
-"""A system of RT components that runs: the commands `tickrig rtc`."""

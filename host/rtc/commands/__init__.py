@@ -1,0 +1,1 @@
+"""The command `tickrig rtc`, and what can be asked of a running system; the model is beside it."""

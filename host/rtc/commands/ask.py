@@ -1,0 +1,112 @@
+"""Ask a running system: its control socket, names to complete, waiting for a state."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.host.cli.control import ask
+from tickrig.host.cli.options import PATH, Decorator
+from tickrig.host.cli.refused import Refused
+from tickrig.host.control.requests import Object
+
+SYSTEM: Final = "system"
+VARIABLE: Final = "TICKRIG_RTC"
+POLL_S: Final = 0.01
+ERROR: Final = "ERROR"
+
+
+def default_path() -> Path:
+    """Return where a system is if nobody says: `tickrig-rtc`, in a folder of this user."""
+    folder = os.environ.get("XDG_RUNTIME_DIR")
+    if folder:
+        return Path(folder, "tickrig-rtc")
+    import tempfile  # noqa: PLC0415 - slow
+
+    return Path(tempfile.gettempdir(), f"tickrig-rtc-{os.getuid()}")
+
+
+at: Final[Decorator] = click.option(
+    "--at",
+    type=PATH,
+    envvar=VARIABLE,
+    default=default_path,
+    metavar="PATH",
+    help=f"Control socket of the system; also from {VARIABLE}.",
+)
+"""Add `--at`, which all verbs have."""
+
+
+def ask_system(socket: Path, do: str, /, **fields: object) -> Any:
+    """Ask a running system and return its answer; Refused if it gives none, or an error."""
+    return ask(socket, SYSTEM, do, **fields)
+
+
+def components(socket: Path, *names: str) -> list[Any]:
+    """Return the descriptions of components, of all if none is named."""
+    fields: Object = {"names": list(names)} if names else {}
+    described: list[Any] = ask_system(socket, "describe", **fields)["components"]
+    return described
+
+
+def complete_component(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Complete the name of a component."""
+    return _begun(context, begun, lambda system: [each["name"] for each in system["components"]])
+
+
+def complete_port(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Complete the full name of a port."""
+    return _begun(
+        context,
+        begun,
+        lambda system: [port["name"] for each in system["components"] for port in each["ports"]],
+    )
+
+
+def complete_type(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Complete the name of a type of components."""
+    return _begun(context, begun, lambda system: system["types"])
+
+
+def _begun(context: click.Context, begun: str, names: Callable[[Any], list[str]]) -> list[str]:
+    socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
+    try:
+        known = names(ask_system(Path(socket), "describe"))
+    except Refused:
+        return []
+    return [name for name in known if name.startswith(begun)]
+
+
+def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
+    """Return when a component is in the wanted state.
+
+    Args:
+        socket: control socket of its system.
+        name: the component.
+        wanted: name of a life-cycle state.
+        wait_us: how long to wait; with 0 not at all.
+
+    Raises:
+        Refused: the component or its system is gone.
+        click.ClickException: it went to Error instead, or needs longer.
+    """
+    start_s = time.monotonic()
+    while wait_us:
+        (component,) = components(socket, name)
+        if (state := component["state"]) == wanted:
+            return
+        waited_us = (time.monotonic() - start_s) * 1e6
+        if waited_us > wait_us or (state == ERROR and waited_us > _periods_us(component)):
+            raise click.ClickException(f"{name} is {state}, not {wanted}")
+        time.sleep(POLL_S)
+
+
+def _periods_us(component: Any) -> float:
+    """Return how long a move takes at most: two periods, and a moment for the way there."""
+    rate_hz: float = component["contexts"][0]["rate_hz"]
+    return 2e6 / rate_hz + 100_000
