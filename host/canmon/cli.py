@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import version_option
 

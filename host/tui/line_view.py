@@ -1,6 +1,9 @@
 """Lines of text that are painted one by one: the live tables of all panels.
 
 A table of Textual takes eight times as long to paint.
+
+>>> line_text((("185", "bold"), (" 37", "")))
+'185 37'
 """
 
 from __future__ import annotations
@@ -16,7 +19,24 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from tickrig.host.tui.line import Line, line_text, line_width, plain
+Line = tuple[tuple[str, str], ...]
+"""Pieces of text, each with a style as `bold red`; empty for none."""
+
+
+def plain(text: str, style: str = "") -> Line:
+    """Return a line of one piece."""
+    return ((text, style),)
+
+
+def line_text(line: Line) -> str:
+    """Return a line without its styles."""
+    return "".join(text for text, _ in line)
+
+
+def line_width(line: Line) -> int:
+    """Return how many characters it has."""
+    return sum(len(text) for text, _ in line)
+
 
 __all__ = ["Line", "LineView", "line_text", "plain"]
 

@@ -15,9 +15,9 @@ from canopen.pdo.base import PdoMap
 
 from benchmarks.table import RUNS, rates, row
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.filter.filter import parse_filter
-from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.filter import parse_filter
+from tickrig.host.monitor.decode.node_board import NodeBoard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 

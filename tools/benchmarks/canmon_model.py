@@ -21,10 +21,10 @@ from tickrig.host.canmon.sources.source import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.check.column_check import check_columns
-from tickrig.host.monitor.check.words import parse_rules
+from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.columns.column_traffic import snapshot_of
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.traffic import Traffic
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.top_table import View, render

@@ -12,16 +12,15 @@ from functools import partial
 import can
 
 from benchmarks.table import percentiles, row
-from tickrig.host.canmon.output.pace import Pace
+from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.graph.drawing.plot import render
-from tickrig.host.monitor.graph.drawing.svg import svg
-from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.view import View
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.graph.plot import render
+from tickrig.host.monitor.graph.series import Series, View
+from tickrig.host.monitor.graph.svg import svg
 from tickrig.host.monitor.replay.replay_plan import ReplayPlan
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
 from tickrig.host.monitor.sequence.sequence_run import SequenceRun
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.wire.can import CanFrame
 
 FRAMES_S = 2_600

@@ -9,19 +9,18 @@ from pathlib import Path
 from benchmarks.table import RUNS, percentiles, row
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, read_eds
-from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
-from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
+from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary, render_dictionary
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, Sight
 from tickrig.host.monitor.graph.signal_word import parse_signal
-from tickrig.host.monitor.transmit.transmit_words import parse_words
+from tickrig.host.monitor.transmit.row_text import parse_words
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[2] / "examples/eds/epos.eds"

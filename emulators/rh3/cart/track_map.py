@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tickrig.host.monitor.graph.drawing.canvas import DOTS_X, DOTS_Y, Canvas
+from tickrig.host.monitor.graph.plot import DOTS_X, DOTS_Y, Canvas
 from tickrig.host.motion.geometry import Pose
 
 WIDTH: Final = 60

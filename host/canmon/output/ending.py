@@ -10,7 +10,7 @@ from typing import Final, NoReturn
 
 import click
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import AnySource
 
 ENDING: Final = (signal.SIGTERM, signal.SIGHUP)

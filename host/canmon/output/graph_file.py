@@ -7,10 +7,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.view import View
+from tickrig.host.monitor.graph.series import Series, View
 
 KINDS: Final = (".svg", ".html", ".png", ".csv")
 
@@ -45,20 +44,20 @@ def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[in
 def _write(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
     match path.suffix.lower():
         case ".svg":
-            from tickrig.host.monitor.graph.drawing.svg import svg  # noqa: PLC0415 - one kind is wanted
+            from tickrig.host.monitor.graph.svg import svg  # noqa: PLC0415 - one kind is wanted
 
             path.write_text(svg(series, view, *size), "utf-8")
         case ".html":
-            from tickrig.host.monitor.graph.drawing.html_page import html_page  # noqa: PLC0415
+            from tickrig.host.monitor.graph.svg import html_page  # noqa: PLC0415
 
             path.write_text(html_page(series, view, *size, title=path.stem), "utf-8")
         case ".csv":
-            from tickrig.host.monitor.graph.drawing.csv_text import write_csv  # noqa: PLC0415
+            from tickrig.host.monitor.graph.csv_text import write_csv  # noqa: PLC0415
 
             with path.open("w", encoding="utf-8", newline="") as file:
                 write_csv(file, series, view)
         case _:
-            from tickrig.host.monitor.graph.drawing.png import write_png  # noqa: PLC0415
+            from tickrig.host.monitor.graph.png import write_png  # noqa: PLC0415
 
             picture = BytesIO()
             write_png(picture, series, view, *size)

@@ -1,19 +1,24 @@
-"""Taking what comes from a source, without a screen."""
+"""Taking what comes from a source, with or without a screen."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import click
 
+from tickrig.host.canmon.output.clocks import Stopwatch
+from tickrig.host.canmon.output.screen import Screen
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_word import BusWord, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.values import parse_time_us
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.frames.record import Heard, HeardLine
 
 Item = TypeVar("Item")
 
@@ -59,3 +64,43 @@ def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
 def is_over(begin_s: float, span_us: int | None) -> bool:
     """Say whether a time has passed by the clock of this machine."""
     return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6
+
+
+PAINT_S: Final = 0.1
+QUIT: Final = "q"
+
+Shown = TypeVar("Shown", bound="Heard | HeardLine")
+Lines = Callable[[int, int, int], list[str]]
+"""Returns what is shown at a time on a screen with so many columns and lines."""
+
+
+def paint(
+    source: AnySource[Shown],
+    take: Callable[[Sequence[Shown]], None],
+    lines: Lines,
+    span_us: int | None,
+    press: Callable[[str], None] = lambda key: None,
+) -> None:
+    """Paint until q is pressed, the source ends or the time is over.
+
+    Args:
+        source: where frames come from; it is live.
+        take: takes what comes.
+        lines: what is shown.
+        span_us: for how long; None for no end.
+        press: acts on other keys, and what it does is shown at once.
+    """
+    watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
+    with Screen() as screen:
+        while not (source.ended or is_over(begin_s, span_us)):
+            heards = source.poll(POLL_US)
+            take(heards)
+            watch.take(heards)
+            keys = screen.keys()
+            if QUIT in keys:
+                break
+            for key in keys:
+                press(key)
+            if keys or time.monotonic() >= due_s:
+                due_s = time.monotonic() + PAINT_S
+                screen.paint(lines(watch.now_us, *screen.size()))

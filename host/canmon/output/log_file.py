@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.output.meaning import Meant
 from tickrig.host.canmon.sources.source_word import FileWord, parse_source
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.log_format import LogFormatError
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.log_file import LogFormatError
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.logs.writing.log_writer import write_log
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, assert_never
 
+from tickrig.host.canmon.output.meaning import Meant
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.json_line import json_line
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line
 from tickrig.host.monitor.logs.writing.log_writer import log_line
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.decode.serial.heard_line import Listened
+    from tickrig.host.monitor.frames.record import Listened
 
 Printer = Callable[["Listened", "Decoded | None"], str]
 """Writes a frame, or a line of a serial port, and what it means, where that is known."""
@@ -67,7 +69,7 @@ def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
 def _error_meaning(heard: Listened) -> Decoded | None:
     if not isinstance(heard.frame, ErrorFrame):
         return None
-    from tickrig.host.monitor.decode.error_frame_text import (  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.monitor.decode.services import (  # noqa: PLC0415 - seldom wanted
         decode_error,
     )
 
@@ -81,7 +83,7 @@ def text_printer(lines: DumpLines) -> Printer:
         text = decoded_text(decoded)
         if isinstance(heard, Heard):
             return lines.line(heard, text)
-        from tickrig.host.monitor.frames.serial_text import line_text  # noqa: PLC0415 - seldom wanted
+        from tickrig.host.monitor.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
 
         return f"{lines.stamp(heard.at_us)}  {line_text(heard, text)}"
 
@@ -99,7 +101,7 @@ def json_printer(heard: Listened, decoded: Decoded | None) -> str:
     more = "" if decoded is None else _meaning_json(decoded)
     if isinstance(heard, Heard):
         return json_line(heard, more)
-    from tickrig.host.monitor.frames.serial_text import line_json  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.monitor.frames.dump_line import line_json  # noqa: PLC0415 - seldom wanted
 
     return line_json(heard, more)
 
@@ -152,3 +154,22 @@ def _cell(text: str) -> str:
     """Quote a cell that needs it (RFC 4180)."""
     quoted = text.replace('"', '""')
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
+
+
+class Printed:
+    """Lines on standard output; in JSON, losses among them."""
+
+    def __init__(self, printer: Printer, output: Output) -> None:
+        self._printer, self._output, self._lost = printer, output, 0
+        self._header = output is Output.CSV
+
+    def take(self, meant: Sequence[Meant], lost: int) -> None:
+        """Print frames, at once."""
+        lines = [DUMP_HEADER] if self._header else []
+        lines += [self._printer(*one) for one in meant]
+        if lost != self._lost and self._output is Output.JSONL:
+            lines.append(drop_line(lost - self._lost))
+        self._header, self._lost = False, lost
+        if lines:
+            sys.stdout.write("\n".join(lines) + "\n")
+            sys.stdout.flush()

@@ -8,14 +8,13 @@ from typing import Final
 
 import can
 
-from tickrig.host.canmon.output.failure import SourceFailed
-from tickrig.host.canmon.sources.bus_reader import open_bus
-from tickrig.host.canmon.sources.bus_source import BusSource, merged, reader_of
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.bus_source import BusSource, merged, open_bus, reader_of
 from tickrig.host.canmon.sources.source_word import BusWord, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 SEND_TIMEOUT_S: Final = 1

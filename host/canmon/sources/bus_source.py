@@ -3,16 +3,99 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from typing import Final
 
 import can
+from can.util import load_config
 
-from tickrig.host.canmon.sources.bus_reader import BusReader, open_bus
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.socket_reader import SocketReader
 from tickrig.host.canmon.sources.source_word import INTERFACES, BusWord
-from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
+from tickrig.host.cli.refused import BusUnavailable
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.can_record import to_heard
+from tickrig.host.monitor.logs.reading.can_log import channel_name
+from tickrig.host.monitor.logs.tally import Tally
+
+BATCH: Final = 1_024
+"""So that a bus that never falls silent cannot keep its reader."""
+
+DEFAULT: Final = "socketcan"
+"""The interface where neither the command line nor a configuration names one."""
+
+STEPPED: Final = ("tickrig",)
+"""Interfaces whose time passes while they are read."""
+
+
+def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
+    """Open a bus of the interface that the options, the configuration or the default name.
+
+    Returns:
+        The bus, its interface, and what its channel is called.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: the bus cannot be opened.
+    """
+    try:
+        bus, interface, channel = open_raw(_with_interface(options))
+    except BusUnavailable as error:
+        raise SourceFailed(error.message) from None
+    return bus, interface, channel_name(interface if channel is None else channel)
+
+
+def _with_interface(options: BusOptions) -> BusOptions:
+    if options.interface is None:
+        try:
+            load_config()
+        except can.CanInterfaceNotImplementedError as error:
+            if UNNAMED in str(error):
+                return replace(options, interface=DEFAULT)
+    return options
+
+
+class BusReader:
+    """Any bus of python-can.
+
+    Args:
+        bus: an open bus; nobody else reads from it.
+        interface: its interface.
+        name: what it is called in what is heard.
+
+    Attributes:
+        lost: 0, for python-can does not tell.
+        tally: what was no frame.
+        stepped: its time passes while it is read.
+    """
+
+    def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:
+        self._bus, self.name, self.stepped = bus, name, interface in STEPPED
+        self.lost, self.tally = 0, Tally()
+
+    def read(self, timeout_us: int, /) -> list[Heard]:
+        """Wait for a first frame; LinkClosed if the bus is gone."""
+        heard: list[Heard] = []
+        try:
+            message = self._bus.recv(timeout_us / 1e6)
+            while message is not None:
+                one = to_heard(message, self.name, self.tally)
+                heard += (one,) if one else ()
+                message = self._bus.recv(0) if len(heard) < BATCH else None
+        except (can.CanError, OSError, ValueError, TypeError) as error:
+            if not heard:
+                raise LinkClosed(f"{self.name}: {' '.join(str(error).split())}") from error
+        return heard
+
+    def close(self) -> None:
+        """Close the bus; one that is gone cannot be told."""
+        with suppress(can.CanError, OSError, ValueError):
+            self._bus.shutdown()
+
 
 BusSource = LiveSource[Heard]
 """One or more buses: all that comes are frames."""

@@ -12,16 +12,16 @@ from functools import partial
 from pathlib import PurePath
 from typing import Final
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.source_word import BusWord, LineWord
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.monitor.decode.serial.heard_line import HeardLine, Listened
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
-from tickrig.host.monitor.decode.serial.serial_rtc_lite import RtcLiteLine
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
+from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.host.monitor.frames.record import HeardLine, Listened
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.rtc_lite.frame import Checksum
 
@@ -101,7 +101,10 @@ def open_port(word: LineWord) -> LineReader:
 
 
 def _open_bus(word: BusWord, options: BusOptions) -> Reader[Listened]:
-    from tickrig.host.canmon.sources.bus_reader import open_bus  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.canmon.sources.bus_source import merged, reader_of  # noqa: PLC0415
+    from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
+        merged,
+        open_bus,
+        reader_of,
+    )
 
     return reader_of(*open_bus(merged(word, options)))

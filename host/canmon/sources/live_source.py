@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.serial.heard_line import HeardLine
+    from tickrig.host.monitor.frames.record import HeardLine
 
 QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""

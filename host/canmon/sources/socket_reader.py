@@ -15,7 +15,7 @@ from select import select
 from typing import Any, Final
 
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import click
 
-from tickrig.host.canmon.sources.file_source import FileSource
+from tickrig.host.canmon.sources.file_source import FileSource, StdinSource
 from tickrig.host.canmon.sources.source_word import BusWord, FileWord, LineWord, parse_source
-from tickrig.host.canmon.sources.stdin_source import StdinSource
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.serial.heard_line import Listened
+    from tickrig.host.monitor.frames.record import Listened
 
 SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names

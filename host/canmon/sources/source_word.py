@@ -19,7 +19,7 @@ from typing import Final
 
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter
-from tickrig.host.monitor.logs.log_format import COMPRESSED, SUFFIXES, LogFormatError, log_format
+from tickrig.host.monitor.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
 
 INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}
 """Short names of python-can's interfaces."""

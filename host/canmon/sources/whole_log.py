@@ -7,9 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source_word import FileWord, parse_source
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.traffic.traffic import Snapshot
 

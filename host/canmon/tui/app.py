@@ -11,18 +11,49 @@ from typing import ClassVar, Final
 import click
 from textual.app import ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
-from textual.screen import Screen
-from textual.widgets import TabbedContent, TabPane
+from textual.screen import ModalScreen, Screen
+from textual.widgets import Input, TabbedContent, TabPane
 
-from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import Bench, BenchSetup
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.bench import Bench
+from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.export_screen import ExportScreen
-from tickrig.host.canmon.tui.widgets.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter
+
+
+class ExportScreen(ModalScreen[str]):
+    """A field for the name of a file; Escape leaves without one.
+
+    Args:
+        name: what stands in the field.
+    """
+
+    DEFAULT_CSS = """
+    ExportScreen { align: center middle; }
+    ExportScreen Input { width: 60; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._text = name
+
+    def compose(self) -> ComposeResult:
+        """Lay out the field."""
+        field = Input(self._text, placeholder="bench.toml")
+        field.border_title = "keep all settings in"
+        yield field
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Take the name."""
+        self.dismiss(event.value.strip())
+
+    def action_leave(self) -> None:
+        """Take none."""
+        self.dismiss("")
+
 
 PAINT_S: Final = 0.1
 SAVE_S: Final = 2.0

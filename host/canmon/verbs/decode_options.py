@@ -19,8 +19,8 @@ from tickrig.host.cli.refused import Refused, refuse_path
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoder import Decoder
-    from tickrig.host.monitor.decode.filter.filter import Filter
-    from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+    from tickrig.host.monitor.decode.filter import Filter
+    from tickrig.host.monitor.decode.node_memory import EdsObjects
 
 _EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
 
@@ -74,7 +74,7 @@ def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
 @contextmanager
 def refusing_dbc() -> Iterator[None]:
     """Refuse, as `--dbc` does, files that are no DBC."""
-    from tickrig.host.monitor.decode.pdo.dbc_file import DbcError  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
 
     try:
         yield
@@ -93,8 +93,7 @@ def read_filter(text: str | None) -> Filter | None:
     """Read what `-F` says; Refused with the column if it is no filter."""
     if text is None:
         return None
-    from tickrig.host.monitor.decode.filter.filter import parse_filter  # noqa: PLC0415 - slow
-    from tickrig.host.monitor.decode.filter.filter_error import FilterError  # noqa: PLC0415
+    from tickrig.host.monitor.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
 
     try:
         return parse_filter(text)
@@ -110,7 +109,7 @@ def _split(word: str) -> tuple[int, Path]:
 
 
 def _read(node: int, path: Path) -> EdsObjects:
-    from tickrig.host.monitor.decode.objects.eds_objects import read_eds  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.node_memory import read_eds  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_finding import EdsError  # noqa: PLC0415
 
     try:

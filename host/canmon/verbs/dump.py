@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.meaning import Meaning, Meant
-from tickrig.host.canmon.output.printer import Output, printer_of
-from tickrig.host.canmon.output.stdout import Printed
-from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.output.printer import Output, Printed, printer_of
 from tickrig.host.canmon.sources.source import AnySource, explain_sources, open_any
 from tickrig.host.canmon.sources.source_word import LineWord, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
@@ -31,7 +30,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.dump_line import Stamp
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.serial.heard_line import Listened
+    from tickrig.host.monitor.frames.record import Listened
 
 POLL_US: Final = 100_000
 

@@ -8,19 +8,18 @@ from typing import Any, Final
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import report, until_interrupted
-from tickrig.host.canmon.output.listening import listen, patience_us, span_option
-from tickrig.host.canmon.output.painting import paint
-from tickrig.host.canmon.output.stopwatch import Stopwatch
-from tickrig.host.canmon.output.unread import until_unread
+from tickrig.host.canmon.output.listening import listen, paint, patience_us, span_option
 from tickrig.host.canmon.sources.source import explain_sources, open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.nodes.board_text import board_json, render_board
-from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_board import NodeBoard
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.frames.record import Heard
 
 MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.errors import SourceFailed, until_unread
+from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.ending import until_interrupted
-from tickrig.host.canmon.output.failure import SourceFailed
-from tickrig.host.canmon.output.pace import Pace
-from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.canmon.sources.source import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.reading.log_reader import LogError, LogReader, read_log
-from tickrig.host.monitor.replay.lateness import Lateness
-from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, ReplayPlan
+from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, Lateness, ReplayPlan
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import FieldError, WireError

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.ending import until_interrupted
-from tickrig.host.canmon.output.pace import Pace
-from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import (
     FrameFields,
     parse_checksum,
     parse_counter,
 )
-from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.transmit_list import Cyclic
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine

@@ -3,32 +3,54 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.ending import until_interrupted
-from tickrig.host.canmon.output.pace import Pace
-from tickrig.host.canmon.output.unread import until_unread
-from tickrig.host.canmon.output.watch import Watch
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.decoder import Decoder
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.sequence import steps
-from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
-from tickrig.host.monitor.sequence.note_text import note_line
-from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
+from tickrig.host.monitor.sequence.conditions import HeardCondition
+from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
+from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun, note_line
+from tickrig.host.monitor.sequence.steps import Condition
 from tickrig.host.monitor.sequence.variables import parse_variable
-from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.output.transmitter import Transmitter
+
+
+class Watch:
+    """Decodes all that is heard, for conditions on it.
+
+    Attributes:
+        eds: what files say, by node-ID.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
+        self.eds = eds
+        self._decoder, self._latest = Decoder(eds), HeardCondition()
+
+    def take(self, heard: Heard) -> None:
+        """Decode a frame; conditions are asked about it next."""
+        self._latest.take(heard, self._decoder.take(heard))
+
+    def condition(self, text: str) -> Condition:
+        """Return the condition of a filter expression; ValueError if it is none."""
+        return self._latest.condition(text)
+
 
 POLL_US: Final = 100_000
 FAILED: Final = 1

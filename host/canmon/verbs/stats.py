@@ -7,16 +7,23 @@ from typing import Any
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
-from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.canmon.sources.source import explain_sources, open_source
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
-from tickrig.host.monitor.views.stats_json import bus_json, id_json, node_json
-from tickrig.host.monitor.views.stats_table import bus_lines, by_id, by_node, node_rows
+from tickrig.host.monitor.views.statistics import (
+    bus_json,
+    bus_lines,
+    by_id,
+    by_node,
+    id_json,
+    node_json,
+    node_rows,
+)
 
 
 @click.command(cls=BusCommand)

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import (
     bit_rate_of,
     listen,
+    paint,
     patience_us,
     span_option,
 )
 from tickrig.host.canmon.output.meaning import Meaning
-from tickrig.host.canmon.output.painting import paint
-from tickrig.host.canmon.output.unread import until_unread
 from tickrig.host.canmon.sources.source import explain_sources, open_any
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (
@@ -31,7 +31,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.views.top_model import TopModel
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.serial.heard_line import Listened
+    from tickrig.host.monitor.frames.record import Listened
 
 Take = Callable[["Sequence[Listened]"], None]
 

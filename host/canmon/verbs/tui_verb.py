@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import BenchSetup
 from tickrig.host.canmon.output.ending import report
 from tickrig.host.canmon.sources.source import explain_sources
 from tickrig.host.canmon.verbs.decode_options import (
@@ -84,7 +84,7 @@ def _monitor(path: Path | None, said: BenchSetup) -> Monitor:
             from tickrig.host.canmon.tui.panels.panels import PANELS  # noqa: PLC0415
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.canmon.tui.settings.bench import Bench  # noqa: PLC0415 - an extra
+    from tickrig.host.canmon.monitor_setup import Bench  # noqa: PLC0415 - an extra
     from tickrig.host.canmon.tui.tasks.model import Model  # noqa: PLC0415 - slow
     from tickrig.host.canmon.tui.tasks.opening import open_session  # noqa: PLC0415
 

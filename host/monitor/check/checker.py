@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tickrig.host.monitor.check.finding import Finding
-from tickrig.host.monitor.check.rule import Rule
+from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
-from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.frames.ident import ERROR, ident_of
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.load import Load, Window
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits

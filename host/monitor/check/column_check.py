@@ -6,16 +6,102 @@ from collections.abc import Iterable
 from itertools import zip_longest
 
 import numpy as np
+import numpy.typing as npt
 
 from tickrig.host.monitor.check.checker import ended
-from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.rule import NO_GAP_US, Finding, Rule, Suspects
 from tickrig.host.monitor.check.rules import Rules
-from tickrig.host.monitor.check.sorted_log import SortedLog
 from tickrig.host.monitor.columns.column_bits import column_bits
 from tickrig.host.monitor.columns.column_traffic import windows_of
-from tickrig.host.monitor.columns.columns import Columns
-from tickrig.host.monitor.columns.runs import Ints
+from tickrig.host.monitor.columns.columns import Columns, Ints, Runs, heards
 from tickrig.host.monitor.frames.ident import ERROR
+
+
+class SortedLog:
+    """A log by bus and identifier, with the gap before each frame."""
+
+    def __init__(self, columns: Columns) -> None:
+        self._columns = columns
+        errors = columns.ident & ERROR != 0
+        self._errors = np.flatnonzero(errors)
+        self._plain = np.flatnonzero(~errors)
+        self._runs: Runs | None = None
+        if len(self._plain):
+            self._runs = Runs.of(_keys(columns, self._plain))
+            self._gaps_us = self._runs.gaps_us(columns.at_us[self._plain])
+
+    def latest_us(self) -> dict[int, int]:
+        """Return when each identifier was heard last."""
+        latest: dict[int, int] = {}
+        for ident, _, end in self._idents():
+            at_us = int(self._columns.at_us[self._row(end - 1)])
+            latest[ident] = max(at_us, latest.get(ident, at_us))
+        return latest
+
+    def judged(self, rule: Rule) -> list[tuple[int, Finding]]:
+        """Let a rule see what it suspects; return rows and findings."""
+        rows, gaps_us = self._suspects(rule)
+        found = []
+        for row, gap_us, heard in zip(
+            rows.tolist(), gaps_us.tolist(), heards(self._columns, rows), strict=True
+        ):
+            text = rule.judge(heard, None if gap_us == NO_GAP_US else gap_us)
+            if text:
+                found.append((row, Finding(heard.at_us, rule.name, text, heard)))
+        return found
+
+    def _suspects(self, rule: Rule) -> tuple[Ints, Ints]:
+        """Return rows and gaps in the order of the log."""
+        errors = self._errors if rule.wants(ERROR) else self._errors[:0]
+        rows, gaps_us = [errors], [np.full(len(errors), NO_GAP_US)]
+        for ident, begin, end in self._idents():
+            if rule.wants(ident):
+                suspected = self._suspected(rule.suspects(ident), begin, end)
+                places = begin + np.flatnonzero(suspected)
+                rows.append(self._row(places))
+                gaps_us.append(np.where(places == begin, NO_GAP_US, self._gaps_us[places]))
+        every = np.concatenate(rows)
+        order = np.argsort(every, kind="stable")
+        return every[order], np.concatenate(gaps_us)[order]
+
+    def _suspected(self, suspects: Suspects, begin: int, end: int) -> npt.NDArray[np.bool_]:
+        below_us, above_us, first_bytes, firsts = suspects
+        if suspects == Suspects():
+            return np.ones(end - begin, np.bool_)
+        gaps_us = self._gaps_us[begin:end]
+        suspected = np.zeros(end - begin, np.bool_)
+        suspected[0] = firsts
+        if below_us is not None:
+            suspected |= gaps_us < below_us
+        if above_us is not None:
+            suspected |= gaps_us > above_us
+        if first_bytes:
+            low = self._columns.payload[self._row(slice(begin, end))] & np.uint64(0xFF)
+            suspected |= np.isin(low, np.array(sorted(first_bytes), np.uint64))
+        return suspected
+
+    def _idents(self) -> Iterable[tuple[int, int, int]]:
+        """Give each identifier with begin and end of its run."""
+        if self._runs is not None:
+            idents = (self._runs.idents & 0xFFFF_FFFF).tolist()
+            yield from zip(
+                idents, self._runs.begins.tolist(), self._runs.ends.tolist(), strict=True
+            )
+
+    def _row(self, places: Ints | slice | int) -> Ints:
+        """Return the rows at places of the runs."""
+        assert self._runs is not None
+        rows: Ints = self._plain[self._runs.order[places]]
+        return rows
+
+
+def _keys(columns: Columns, rows: Ints) -> npt.NDArray[np.uint32] | npt.NDArray[np.uint64]:
+    """Return the identifiers of some rows, with the bus above them where there are several."""
+    ident = columns.ident[rows]
+    if len(columns.channels) == 1:
+        return ident
+    return columns.channel[rows].astype(np.uint64) << np.uint64(32) | ident
+
 
 Placed = tuple[int, int, Finding]
 """A finding with its row, and its place among those of the row: the order of `Checker`."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.rule import Finding
 
 CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
 """Characters that XML does not have."""

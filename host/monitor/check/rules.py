@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.monitor.check.frame_rules import Known, NoEmcy, NoErrorFrames, NoSdoAbort
-from tickrig.host.monitor.check.load_rule import MaxLoad
-from tickrig.host.monitor.check.node_rules import NodesPresent, NoReboot
+from tickrig.host.monitor.check.frame_rules import (
+    Known,
+    NodesPresent,
+    NoEmcy,
+    NoErrorFrames,
+    NoReboot,
+    NoSdoAbort,
+)
 from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.monitor.check.time_rules import (
     Heartbeat,
     HeartbeatTimes,
     MaxGap,
+    MaxLoad,
 )
 
 NO_LOSS: Final = "no-loss"

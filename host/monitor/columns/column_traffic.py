@@ -2,24 +2,122 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
+import numpy.typing as npt
 
 from tickrig.host.monitor.columns.column_bits import column_bits
-from tickrig.host.monitor.columns.column_changes import column_changes
-from tickrig.host.monitor.columns.column_gaps import column_gaps
-from tickrig.host.monitor.columns.column_rows import by_channel, frames_of, heards, select
-from tickrig.host.monitor.columns.columns import Columns
-from tickrig.host.monitor.columns.runs import Ints, Runs
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.columns.columns import (
+    Columns,
+    Ints,
+    Runs,
+    by_channel,
+    frames_of,
+    heards,
+    select,
+)
 from tickrig.host.monitor.frames.ident import ERROR
-from tickrig.host.monitor.traffic.bits import BitRow
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.controller import Controller
-from tickrig.host.monitor.traffic.gaps import Gaps
+from tickrig.host.monitor.traffic.gaps import EXACT_US, SUB_BITS, Gaps
 from tickrig.host.monitor.traffic.load import WINDOW_US, Load, Window
-from tickrig.host.monitor.traffic.tally import IdRow
+from tickrig.host.monitor.traffic.tally import BitRow, IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+
+BYTES: Final = 8
+_BITS: Final = np.unpackbits(
+    np.arange(256, dtype=np.uint8)[:, np.newaxis], axis=1, bitorder="little"
+).astype(np.int64)
+"""The bits of each byte."""
+
+
+def column_changes(runs: Runs, payload: npt.NDArray[np.uint64]) -> list[BitRow]:
+    """Return what changed in each run.
+
+    Args:
+        runs: frames by identifier.
+        payload: of each row of the log.
+    """
+    ordered = payload[runs.order]
+    changes = ordered ^ np.roll(ordered, 1)
+    changes[runs.begins] = 0
+    planes = _planes(_counts(runs, changes))
+    latest = changes[runs.ends - 1].tolist()
+    return [BitRow(one, planes[run]) for run, one in enumerate(latest)]
+
+
+def _counts(runs: Runs, changes: npt.NDArray[np.uint64]) -> Ints:
+    """Return how often each bit changed in each run: count the values of each byte first."""
+    counts = np.zeros((len(runs.begins), 8 * BYTES), np.int64)
+    run = np.repeat(np.arange(len(runs.begins)) << 8, runs.ends - runs.begins)
+    octets = changes.astype("<u8").view(np.uint8).reshape(-1, BYTES)
+    for place in range(BYTES):
+        column = octets[:, place]
+        if column.any():
+            values = np.bincount(run + column, minlength=counts.shape[0] << 8)
+            counts[:, 8 * place : 8 * place + 8] = values.reshape(-1, 256) @ _BITS
+    return counts
+
+
+def _planes(counts: Ints) -> list[tuple[int, ...]]:
+    most = [int(row).bit_length() for row in counts.max(axis=1)]
+    stacked = [
+        np.packbits((counts >> place & 1).astype(np.uint8), axis=1, bitorder="little")
+        .view("<u8")[:, 0]
+        .tolist()
+        for place in range(max(most))
+    ]
+    return [tuple(plane[run] for plane in stacked[:depth]) for run, depth in enumerate(most)]
+
+
+MANTISSA_BITS: Final = 52
+EXPONENT_BIAS: Final = 1023
+COARSE: Final = -1 << 12
+"""Leaves as many bits of the longest times as the mantissa has."""
+
+
+def column_gaps(runs: Runs, gaps_us: Ints) -> list[Gaps]:
+    """Return the gaps of each run.
+
+    Args:
+        runs: frames by identifier.
+        gaps_us: the gap before each row of `runs.order`.
+    """
+    wander_us = np.abs(np.diff(gaps_us, prepend=0))
+    buckets = column_buckets(gaps_us)
+    return [
+        _of_run(gaps_us[begin + 1 : end], wander_us[begin + 2 : end], buckets[begin + 1 : end])
+        for begin, end in zip(runs.begins.tolist(), runs.ends.tolist(), strict=True)
+    ]
+
+
+def _of_run(gaps_us: Ints, wander_us: Ints, buckets: npt.NDArray[np.int16]) -> Gaps:
+    gaps = Gaps()
+    if len(gaps_us):
+        gaps.count, gaps.total_us = len(gaps_us), int(gaps_us.sum())
+        gaps.min_us, gaps.max_us = int(gaps_us.min()), int(gaps_us.max())
+        gaps.wander_us = int(wander_us.sum())
+        lowest = int(buckets.min())
+        counts = np.bincount(buckets - lowest)
+        filled = np.flatnonzero(counts)
+        gaps.buckets = dict(zip((filled + lowest).tolist(), counts[filled].tolist(), strict=True))
+    return gaps
+
+
+def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
+    """Return the bucket of each time, as `bucket_of` does.
+
+    A bucket is the exponent and the first bits of the mantissa of a floating-point number: both
+    are read off its bits. Longer times than it is exact for lose low bits first, so that none is
+    rounded up.
+    """
+    exact = np.where(times_us >> MANTISSA_BITS, times_us & COARSE, times_us)
+    bits = exact.astype(np.float64).view(np.int64) >> MANTISSA_BITS - SUB_BITS
+    wide = bits - (EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)
+    return np.where(times_us < EXACT_US, times_us, wide).astype(np.int16)
 
 
 def snapshot_of(columns: Columns) -> Snapshot:

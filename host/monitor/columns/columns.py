@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.monitor.frames.candump_filter import flagged_id
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.logs.tally import BadLines, Tally
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import EXTENDED_MAX, CanFrame
+from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 
 MOST_CHANNELS: Final = 256
 
@@ -138,3 +140,99 @@ def joined(parts: Iterable[Rows], channels: ChannelNames, tally: Tally) -> Colum
         channels.names,
         tally,
     )
+
+
+def select(columns: Columns, rows: npt.NDArray[np.int64]) -> Columns:
+    """Return some rows."""
+    return Columns(
+        columns.at_us[rows],
+        columns.ident[rows],
+        columns.dlc[rows],
+        columns.payload[rows],
+        columns.channel[rows],
+        columns.channels,
+    )
+
+
+def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
+    """Return the frames of each bus that has any, in the order of their names."""
+    present = np.flatnonzero(np.bincount(columns.channel)).tolist()
+    if len(present) == 1:
+        return [(columns.channels[present[0]], columns)]
+    parts = [
+        (columns.channels[place], select(columns, np.flatnonzero(columns.channel == place)))
+        for place in present
+    ]
+    return sorted(parts, key=lambda part: part[0])
+
+
+def heards(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Heard]:
+    """Return rows as they were heard; who sent them is not in them."""
+    names = columns.channels
+    parts = zip(
+        columns.at_us[rows].tolist(),
+        columns.channel[rows].tolist(),
+        columns.ident[rows].tolist(),
+        columns.dlc[rows].tolist(),
+        columns.payload[rows].tolist(),
+        strict=True,
+    )
+    return [Heard(at_us, names[channel], _frame(*frame)) for at_us, channel, *frame in parts]
+
+
+def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[CanFrame | ErrorFrame]:
+    """Return the frames of rows."""
+    return [heard.frame for heard in heards(columns, rows)]
+
+
+def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
+    data = payload.to_bytes(8, "little")
+    if ident & ERROR:
+        return ErrorFrame(ident & ERROR_CLASS_MASK, data)
+    extended = bool(ident & EXTENDED)
+    if ident & REMOTE:
+        return CanFrame(ident & EXTENDED_MAX, b"", True, extended, dlc)
+    return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, extended)
+
+
+Ints = npt.NDArray[np.int64]
+
+RADIX_MAX: Final = 0xFFFF
+"""numpy sorts 16 bits three times as fast as 32."""
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Rows sorted by identifier, those of one identifier in their order: a run for each.
+
+    Attributes:
+        order: the rows.
+        begins: where in `order` each run begins.
+        ends: where each ends, one behind its last.
+        idents: of each run, ascending.
+    """
+
+    order: Ints
+    begins: Ints
+    ends: Ints
+    idents: Ints
+
+    @classmethod
+    def of(cls, ident: npt.NDArray[np.uint32] | npt.NDArray[np.uint64]) -> Runs:
+        """Sort the rows of a column of identifiers, one row at least."""
+        keys: npt.NDArray[Any] = ident.astype(np.uint16) if ident.max() <= RADIX_MAX else ident
+        order = np.argsort(keys, kind="stable")
+        ordered = ident[order]
+        begins = np.flatnonzero(np.diff(ordered, prepend=~ordered[0]))
+        ends = np.append(begins[1:], len(ordered))
+        return cls(order, begins, ends, ordered[begins].astype(np.int64))
+
+    def gaps_us(self, at_us: Ints) -> Ints:
+        """Return the gap before each row of `order`; 0 where a run begins or time goes back."""
+        gaps = np.diff(at_us[self.order], prepend=0)
+        gaps[self.begins] = 0
+        return np.maximum(gaps, 0, out=gaps)
+
+    def sums(self, values: Ints) -> Ints:
+        """Add up values, in the order of `order`, run by run."""
+        return np.add.reduceat(values, self.begins)

@@ -8,18 +8,22 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
-from tickrig.host.monitor.decode.network_services import (
+from tickrig.host.monitor.decode.node_memory import (
+    DEVICE_TYPE,
+    HEARTBEAT_TIME,
+    EdsObjects,
+    NodeMemory,
+)
+from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.decode.pdos import PDO_OBJECTS, Pdo, PdoTable, pdos_of
+from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer, write_entry
+from tickrig.host.monitor.decode.services import (
     decode_emcy,
     decode_error_control,
     decode_nmt,
     decode_sync,
     decode_time,
 )
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.objects.memory import DEVICE_TYPE, HEARTBEAT_TIME, NodeMemory
-from tickrig.host.monitor.decode.objects.object_text import ObjectText
-from tickrig.host.monitor.decode.pdo.pdo_table import PDO_OBJECTS, Pdo, PdoTable, pdos_of
-from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer, write_entry
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID

@@ -8,13 +8,12 @@ from types import MappingProxyType
 from typing import Final
 
 from tickrig.host.monitor.decode.bus_decoder import BusDecoder
+from tickrig.host.monitor.decode.dbc_file import DbcFile
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.error_frame_text import decode_error
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, read_eds
-from tickrig.host.monitor.decode.objects.memory import NodeMemory
-from tickrig.host.monitor.decode.pdo.dbc_file import DbcFile
+from tickrig.host.monitor.decode.node_memory import EdsObjects, NodeMemory, read_eds
 from tickrig.host.monitor.decode.sdo.transfer import Transfer
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.services import decode_error
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can_error import ErrorFrame
 
 NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})

@@ -2,14 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from enum import StrEnum
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.objects.memory import Entry, NodeMemory
+from tickrig.host.monitor.decode.node_memory import Entry, NodeMemory
+from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer, write_entry
-from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
+from tickrig.host.monitor.frames.quantity import s_text
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 from tickrig.wire.canopen.sdo.abort import describe_abort
+
+
+class Origin(StrEnum):
+    """Where a value was seen last."""
+
+    NONE = ""
+    EDS = "eds"  # its power-on value
+    SDO = "sdo"
+    PDO = "pdo"
+
+
+class ObjectRow(NamedTuple):
+    """An object and its latest value.
+
+    Attributes:
+        entry: index and sub-index.
+        text: its name, type and unit.
+        value: for people; empty where none is known.
+        origin: where that was seen.
+        at_us: when; None for that of the EDS.
+        trouble: why the latest transfer failed, empty if it did not.
+    """
+
+    entry: tuple[int, int]
+    text: ObjectText
+    value: str = ""
+    origin: Origin = Origin.NONE
+    at_us: int | None = None
+    trouble: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Its data type, empty where nobody said it."""
+        return "" if self.text.kind is None else self.text.kind.name
+
+    def is_meant(self, wanted: str) -> bool:
+        """Say whether a part of its name, or the begin of its index, is wanted.
+
+        >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
+        >>> [row.is_meant(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
+        [True, True, True, True, False, False]
+        """
+        wanted = wanted.lower()
+        return write_entry(self.entry).lower().startswith(wanted) or wanted in self.text.name
+
 
 FIRST_OBJECT: Final = 0x1000
 """Below it are data types (CiA 301, structure of the object dictionary)."""
@@ -97,3 +145,34 @@ class NodeDictionary:
             return ObjectRow(entry, text, trouble=trouble)
         value = f"{text.read(power_on)[1]}{text.unit}"
         return ObjectRow(entry, text, value, Origin.EDS, trouble=trouble)
+
+
+LEAST_NAME: Final = 12
+MOST_NAME: Final = 36
+VALUE: Final = 20
+
+
+def render_dictionary(rows: Sequence[ObjectRow], now_us: int) -> list[str]:
+    """Return a head, and a line for each object; what went wrong stands in the place of its type.
+
+    Args:
+        rows: the objects.
+        now_us: the time for which ages are told.
+    """
+    longest = max((len(row.text.name) for row in rows), default=0)
+    name = min(MOST_NAME, max(LEAST_NAME, longest))
+    head = f"{'OBJECT':<9} {'NAME':<{name}} {'VALUE':<{VALUE}} {'FROM':<4} {'AGE':>7}  TYPE"
+    return [head, *(_line(row, name, now_us) for row in rows)]
+
+
+def _line(row: ObjectRow, name: int, now_us: int) -> str:
+    age = "" if row.at_us is None else f"{s_text(now_us - row.at_us)} s"
+    cells = [
+        f"{write_entry(row.entry):<9}",
+        f"{row.text.name[:name]:<{name}}",
+        f"{row.value:<{VALUE}}",
+        f"{row.origin:<4}",
+        f"{age:>7}",
+        f" {row.trouble or row.kind}",
+    ]
+    return " ".join(cells).rstrip()

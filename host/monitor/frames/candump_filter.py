@@ -11,8 +11,8 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.frames.ident import EXTENDED, ident_of
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 
 _RULE: Final = re.compile(r"([0-9A-Fa-f]{1,8})([:~])([0-9A-Fa-f]{1,8})")

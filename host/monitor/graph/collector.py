@@ -7,10 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.graph.frame_slice import EXTENDED, FrameSlice
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.signal_word import ObjectName, SignalWord
+from tickrig.host.monitor.graph.signal_word import EXTENDED, FrameSlice, ObjectName, SignalWord
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:

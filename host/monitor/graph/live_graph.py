@@ -8,13 +8,12 @@ from enum import StrEnum
 from typing import Final, assert_never
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.graph.chart import chart
 from tickrig.host.monitor.graph.collector import Collector
-from tickrig.host.monitor.graph.drawing.chart import chart
-from tickrig.host.monitor.graph.drawing.plot import render
-from tickrig.host.monitor.graph.series import Series
+from tickrig.host.monitor.graph.plot import render
+from tickrig.host.monitor.graph.series import LEAST_US, Series, View
 from tickrig.host.monitor.graph.signal_word import SignalWord
-from tickrig.host.monitor.graph.view import LEAST_US, View
 
 MOST: Final = 200_000
 """Samples of a signal that are kept."""

@@ -1,10 +1,15 @@
-"""The samples of one signal."""
+"""The samples of one signal.
+
+>>> View(0, 1_000_000).zoomed(2, 250_000)
+View(from_us=125000, to_us=625000, ranges={}, cursor_us=None, origin_us=0)
+"""
 
 from __future__ import annotations
 
 from array import array
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from math import isfinite
 from operator import le
@@ -71,3 +76,63 @@ class Series:
         """Return the index of the latest sample at or before a time, None if there is none."""
         index = bisect_right(self.at_us, at_us) - 1
         return index if index >= 0 else None
+
+
+LEAST_US = 10
+"""No view is shorter."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A span of time, and where wanted the ranges of vertical axes.
+
+    Attributes:
+        from_us: its beginning,
+        to_us: its end, later.
+        ranges: least and greatest value by axis; other axes fit what is seen.
+        cursor_us: a moment that is marked.
+        origin_us: the moment that is written as 0.
+    """
+
+    from_us: int
+    to_us: int
+    ranges: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    cursor_us: int | None = None
+    origin_us: int = 0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError unless the span and the ranges are not empty."""
+        if self.to_us <= self.from_us:
+            raise ValueError(f"a view from {self.from_us} us to {self.to_us} us shows nothing")
+        for axis, (low, high) in self.ranges.items():
+            if not low < high:
+                raise ValueError(f"axis {axis} from {low:g} to {high:g} shows nothing")
+
+    @classmethod
+    def of(cls, series: Iterable[Series]) -> View:
+        """Return the view in which all samples are seen; the first is its origin."""
+        spans = [(one.at_us[0], one.at_us[-1]) for one in series if one.at_us]
+        from_us = min((span[0] for span in spans), default=0)
+        to_us = max([from_us + 1, *(span[1] for span in spans)])
+        return cls(from_us, to_us, origin_us=from_us)
+
+    @property
+    def span_us(self) -> int:
+        """How long it is."""
+        return self.to_us - self.from_us
+
+    def seconds(self, at_us: int) -> float:
+        """Return a moment as it is written: in seconds since the origin."""
+        return (at_us - self.origin_us) / 1e6
+
+    def zoomed(self, factor: float, at_us: int | None = None) -> View:
+        """Return it `factor` times closer; `at_us`, else the middle, stays where it is."""
+        at_us = (self.from_us + self.to_us) // 2 if at_us is None else at_us
+        span_us = max(LEAST_US, round(self.span_us / factor))
+        from_us = at_us - (at_us - self.from_us) * span_us // self.span_us
+        return replace(self, from_us=from_us, to_us=from_us + span_us)
+
+    def moved(self, fraction: float) -> View:
+        """Return it moved by a fraction of its span, later for a positive one."""
+        by_us = round(self.span_us * fraction)
+        return replace(self, from_us=self.from_us + by_us, to_us=self.to_us + by_us)

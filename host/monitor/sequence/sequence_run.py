@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterable
 from enum import StrEnum
 from typing import NamedTuple, assert_never
 
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.sequence.steps import (
     FOREVER,
     Condition,
@@ -17,6 +17,7 @@ from tickrig.host.monitor.sequence.steps import (
     Step,
     Wait,
 )
+from tickrig.host.text.values import format_time
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
@@ -158,3 +159,13 @@ class SequenceRun:
 
     def _note(self, mark: Mark, text: str) -> None:
         self.notes.append(Note(self._at_us, mark, text))
+
+
+def note_line(note: Note) -> str:
+    """Write a note: seconds, mark, and what happened.
+
+    >>> from tickrig.host.monitor.sequence.sequence_run import Mark
+    >>> note_line(Note(4_718, Mark.MET, "703#05"))
+    '0.004718 ok 703#05'
+    """
+    return f"{format_time(note.at_us)} {note.mark} {note.text}"

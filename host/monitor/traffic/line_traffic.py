@@ -8,7 +8,7 @@ from tickrig.host.monitor.frames.quantity import ms_text, rate_text, s_text
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.decode.serial.heard_line import HeardLine
+    from tickrig.host.monitor.frames.record import HeardLine
 
 ANSWERS: Final = ("ok", "refused", "event")
 """Signals that name a kind of answer."""

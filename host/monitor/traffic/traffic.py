@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.frames.ident import ident_of
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.controller import Controller, ErrorRow
 from tickrig.host.monitor.traffic.load import Load, LoadRow
 from tickrig.host.monitor.traffic.tally import IdRow, Tally

@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.monitor.frames.heard import Heard
 from tickrig.host.monitor.frames.ident import ident_of
-from tickrig.host.monitor.frames.payload_text import data_text
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.line_traffic import LineRow, LineTraffic, line_table
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
+from tickrig.host.monitor.views.top_columns import data_text
 from tickrig.host.monitor.views.top_table import UNBOUNDED, Order, View, render
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.decode.serial.heard_line import Listened
+    from tickrig.host.monitor.frames.record import Listened
 
 PAGE: Final = 10
 """Rows that a key for a page goes."""

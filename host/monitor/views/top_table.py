@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.frames.payload_text import data_text, heat_text
 from tickrig.host.monitor.frames.quantity import load_text
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot
-from tickrig.host.monitor.views.top_columns import Column, IdText, fitting
+from tickrig.host.monitor.views.top_columns import Column, IdText, data_text, fitting, heat_text
 
 DATA_WIDTH: Final = 23
 HEAT_WIDTH: Final = 71

@@ -11,8 +11,7 @@ from textual.events import Blur, Click, Focus
 from textual.message import Message
 
 from tickrig.host.rtc_canopen.editor.row import Row
-from tickrig.host.tui.line import line_width
-from tickrig.host.tui.line_view import Line, LineView
+from tickrig.host.tui.line_view import Line, LineView, line_width
 
 T = TypeVar("T")
 

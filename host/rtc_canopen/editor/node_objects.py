@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Final
 
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, Entry
-from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.monitor.decode.node_memory import EdsObjects, Entry
+from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.rtc_canopen.editor.row import Row
 from tickrig.host.rtc_canopen.view import ServerView, Transfer

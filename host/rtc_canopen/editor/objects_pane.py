@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, Entry, read_eds
+from tickrig.host.monitor.decode.node_memory import EdsObjects, Entry, read_eds
 from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.node_objects import NodeObjects
 from tickrig.host.rtc_canopen.node.served_node import Phase

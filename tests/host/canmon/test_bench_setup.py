@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import BenchSetup
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 

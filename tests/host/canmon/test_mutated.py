@@ -14,8 +14,8 @@ import pytest
 from click.testing import CliRunner
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
-from tickrig.host.canmon.bench_setup import BenchSetup
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.monitor_setup import BenchSetup
 from tickrig.host.canmon.sources import whole_log
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.refused import Refused

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows, joined
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.tally import Tally
 
 

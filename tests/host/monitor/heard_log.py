@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.wire.candump import parse_line
 

@@ -8,21 +8,17 @@ from typing import Any, ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.tui.controls import AskLine, ChoiceView, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.settings import text_of
+from tickrig.host.canmon.tui.settings import next_bus, text_of
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
 from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.sending_bus import next_bus
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.ask_line import AskLine
-from tickrig.host.canmon.tui.widgets.choice_view import ChoiceView
-from tickrig.host.canmon.tui.widgets.title_line import TitleLine
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
-from tickrig.host.monitor.dictionary.object_row import ObjectRow
-from tickrig.host.monitor.dictionary.object_words import encode_words
-from tickrig.host.tui.line import Line, plain
+from tickrig.host.monitor.dictionary.encode_value import encode_words
+from tickrig.host.monitor.dictionary.node_dictionary import ObjectRow, render_dictionary
+from tickrig.host.tui.line_view import Line, plain
 
 
 class DictionaryPanel(Panel):

@@ -1,8 +1,13 @@
-"""The tab of the graph: curves of signals, live or of a log."""
+r"""The tab of the graph: curves of signals, live or of a log.
+
+>>> colour_line("━ \x1b[36mspeed\x1b[0m 3")
+(('━ ', ''), ('speed', 'cyan'), (' 3', ''))
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -12,23 +17,63 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
+from tickrig.host.canmon.tui.controls import AskLine, PictureView, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.nested_settings import below, texts_of
-from tickrig.host.canmon.tui.settings.settings import text_of
-from tickrig.host.canmon.tui.tasks.graph_task import GraphTask
-from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.settings import below, text_of, texts_of
+from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.ansi_colour import colour_line
-from tickrig.host.canmon.tui.widgets.ask_line import AskLine
-from tickrig.host.canmon.tui.widgets.picture_view import PictureView
-from tickrig.host.canmon.tui.widgets.title_line import TitleLine
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.graph.drawing.plot import LABEL_WIDTH
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
+from tickrig.host.monitor.graph.plot import LABEL_WIDTH
+from tickrig.host.monitor.graph.series import LEAST_US
 from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
-from tickrig.host.monitor.graph.view import LEAST_US
 from tickrig.host.text.values import parse_time_us
-from tickrig.host.tui.line import Line
+from tickrig.host.tui.line_view import Line
+from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
+
+COLOURS: Final = {
+    "31": "red",
+    "32": "green",
+    "33": "yellow",
+    "34": "blue",
+    "35": "magenta",
+    "36": "cyan",
+}
+_CODE: Final = re.compile("\x1b\\[([0-9]*)m")
+
+
+def colour_line(text: str) -> Line:
+    """Return the line; a colour lasts until the next code."""
+    pieces = _CODE.split(text)
+    codes = ("", *pieces[1::2])
+    found = zip(pieces[::2], codes, strict=True)
+    return tuple((part, COLOURS.get(code, "")) for part, code in found if part)
+
+
+class GraphTask:
+    """Takes the values of signals; it sends nothing.
+
+    Args:
+        graph: the curves.
+    """
+
+    channel = ""
+    due_us = NEVER
+
+    def __init__(self, graph: LiveGraph) -> None:
+        self._graph = graph
+
+    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        """Take what was heard."""
+        if self._graph.words:
+            for one, decoded in heard:
+                self._graph.take(one, decoded)
+        return ()
+
+    def stop(self) -> None:
+        """Do nothing: it sends nothing."""
+
 
 PICTURE: Final = (960, 400)
 QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"

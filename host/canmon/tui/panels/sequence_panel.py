@@ -12,25 +12,22 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
+from tickrig.host.canmon.tui.controls import AskLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.settings import checked_bus, next_bus
 from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.sending_bus import checked_bus, next_bus
-from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
-from tickrig.host.canmon.tui.tasks.sequence_texts import (
+from tickrig.host.canmon.tui.tasks.sequence_task import (
     NEW,
+    SequenceTask,
     read_texts,
     sequence_name,
     texts_settings,
 )
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.ask_line import AskLine
-from tickrig.host.canmon.tui.widgets.title_line import TitleLine
-from tickrig.host.monitor.sequence.line_sequence import SequenceError
-from tickrig.host.monitor.sequence.note_text import note_line
-from tickrig.host.monitor.sequence.sequence_run import Mark, Note
+from tickrig.host.monitor.sequence.parse_sequence import SequenceError
+from tickrig.host.monitor.sequence.sequence_run import Mark, Note, note_line
 from tickrig.host.monitor.sequence.steps import Sequence, outline
-from tickrig.host.tui.line import Line, plain
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui.line_view import Line, LineView, plain
 
 STYLES: Final = {Mark.MET: "green", Mark.MISSED: "bold red", Mark.END: "bold"}
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")

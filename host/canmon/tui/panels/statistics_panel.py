@@ -1,4 +1,8 @@
-"""The tab of the statistics: all identifiers, their rates, gaps, jitter, missed cycles, bits."""
+r"""The tab of the statistics: all identifiers, their rates, gaps, jitter, missed cycles, bits.
+
+>>> ansi_line("01 \x1b[7mFF\x1b[0m")
+(('01 ', ''), ('FF', 'bold yellow'))
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,23 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.settings import choice, truth
+from tickrig.host.canmon.tui.settings import choice, truth
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.ansi_line import ansi_line
+from tickrig.host.canmon.tui.trace_line import CHANGED
+from tickrig.host.monitor.views.top_columns import PLAIN, REVERSE
 from tickrig.host.monitor.views.top_table import UNBOUNDED, Order
-from tickrig.host.tui.line import Line, plain
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui.line_view import Line, LineView, plain
+
+
+def ansi_line(text: str) -> Line:
+    """Return the line; what is reversed there has changed."""
+    pieces = []
+    for part in text.split(REVERSE):
+        marked, found, rest = part.partition(PLAIN)
+        pieces += [(marked, CHANGED), (rest, "")] if found else [(part, "")]
+    return tuple(piece for piece in pieces if piece[0])
+
 
 TITLE: Final = "CAN-ID"
 """Is in the last line above the rows."""

@@ -11,16 +11,14 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Input, Static
 
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.settings import choice, text_of, truth
+from tickrig.host.canmon.tui.settings import choice, text_of, truth
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.widgets.trace_line import TraceLines
+from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.decode.filter.filter import Filter, parse_filter
-from tickrig.host.monitor.decode.filter.filter_error import FilterError
+from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter
 from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.views.sieve import Latest, Sieve
-from tickrig.host.monitor.views.trace import Ring
+from tickrig.host.monitor.views.trace import Latest, Ring, Sieve
 from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER

@@ -1,26 +1,118 @@
-"""The tab of the transmit list: frames that are sent cyclically or by hand."""
+"""The tab of the transmit list: frames that are sent cyclically or by hand.
+
+>>> read_row({"send": "080#", "every": "10ms"}).every
+'10ms'
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.tui.controls import AskLine, ChoiceView, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings.nested_settings import below, tables
-from tickrig.host.canmon.tui.settings.transmit_settings import read_row, row_settings
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.sending_bus import checked_bus, next_bus
+from tickrig.host.canmon.tui.settings import below, checked_bus, next_bus, tables, text_of, texts_of
+from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
-from tickrig.host.canmon.tui.widgets.ask_line import AskLine
-from tickrig.host.canmon.tui.widgets.choice_view import ChoiceView
-from tickrig.host.canmon.tui.widgets.title_line import TitleLine
-from tickrig.host.monitor.transmit.transmit_text import ON, render_transmit
-from tickrig.host.monitor.transmit.transmit_words import TransmitWords, parse_words
-from tickrig.host.tui.line import plain
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.row_text import TransmitWords, parse_words
+from tickrig.host.monitor.transmit.transmit_list import ON, TransmitList, render_transmit
+from tickrig.host.tui.line_view import plain
+from tickrig.wire.can import CanFrame, Frames
+
+
+def read_row(settings: Mapping[str, Any]) -> TransmitWords:
+    """Return what a row says; SettingError if a setting is none."""
+    return TransmitWords(
+        text_of(settings, "send", ""),
+        text_of(settings, "every", ""),
+        texts_of(settings, "counter"),
+        texts_of(settings, "checksum"),
+        text_of(settings, "name", ""),
+    )
+
+
+def row_settings(words: TransmitWords) -> dict[str, Any]:
+    """Return it as settings; what is empty is None, so that a workspace leaves it out."""
+    return {
+        "send": words.frame,
+        "every": words.every or None,
+        "counter": list(words.counters) or None,
+        "checksum": list(words.checksums) or None,
+        "name": words.name or None,
+    }
+
+
+NOW: Final = 0
+"""When frames are due that somebody sends by hand."""
+
+
+class TransmitTask:
+    """Sends rows of a list: cyclically, or by hand.
+
+    Args:
+        eds: what files say, by node-ID.
+        channel: the bus it sends on; empty for the first.
+
+    Attributes:
+        words: what each row says.
+        list: the rows.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
+        self.channel = channel
+        self.words: list[TransmitWords] = []
+        self.list = TransmitList()
+        self._pdos = PdoWords(eds)
+        self._out: list[CanFrame] = []
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called."""
+        return NOW if self._out else self.list.due_us
+
+    def add(self, words: TransmitWords) -> None:
+        """Add a row at the end; ValueError if it cannot be sent."""
+        self.list.rows.append(words.row(self._pdos))
+        self.words.append(words)
+
+    def change(self, number: int, words: TransmitWords) -> None:
+        """Put another row in the place of one, which sends no more; ValueError as `add`."""
+        self.list.rows[number] = words.row(self._pdos)
+        self.words[number] = words
+
+    def remove(self, number: int) -> None:
+        """Take out a row."""
+        del self.list.rows[number], self.words[number]
+
+    def enable(self, number: int, now_us: int, *, armed: bool) -> None:
+        """Send a row in each period, or no more if it does; ValueError if that must not be."""
+        row = self.list.rows[number]
+        if row.enabled:
+            row.disable()
+            return
+        self.list.armed = armed
+        self.list.enable(number, now_us)
+
+    def once(self, number: int, *, armed: bool) -> None:
+        """Send a row now; ValueError if it is not armed."""
+        self.list.armed = armed
+        self._out += self.list.once(number)
+
+    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        """Return what is due."""
+        out, self._out = self._out, []
+        return (*out, *self.list.tick(now_us))
+
+    def stop(self) -> None:
+        """Disable all rows."""
+        self.list.stop()
+        self._out.clear()
+
 
 QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
 

@@ -10,7 +10,7 @@ from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.memory import Entry
+from tickrig.host.monitor.decode.node_memory import Entry
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.wire.can import CanFrame, Frames

@@ -7,10 +7,9 @@ from pathlib import Path
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.serial.heard_line import Listened
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_board import NodeBoard
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.frames.record import Heard, Listened
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.trace import Trace
 

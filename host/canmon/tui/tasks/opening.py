@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.source import open_any
 from tickrig.host.canmon.sources.source_word import BusWord, LineWord, parse_source
-from tickrig.host.canmon.sources.stdin_source import STDIN, StdinSource
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Send, Session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.serial.heard_line import Listened
+from tickrig.host.monitor.frames.record import Listened
 
 TERMINAL: Final = "/dev/tty"
 
@@ -43,8 +43,11 @@ def _open_live(
     buses: Sequence[BusWord], lines: Sequence[LineWord], options: BusOptions, model: Model
 ) -> tuple[LiveSource[Listened], Model, dict[str, Send]]:
     from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415
-    from tickrig.host.canmon.sources.bus_reader import open_bus  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.canmon.sources.bus_source import merged, reader_of  # noqa: PLC0415
+    from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
+        merged,
+        open_bus,
+        reader_of,
+    )
     from tickrig.host.canmon.sources.line_source import open_port  # noqa: PLC0415 - pyserial
 
     sends: dict[str, Send] = {}

@@ -8,12 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Final, Protocol
 
-from tickrig.host.canmon.output.failure import SourceFailed
-from tickrig.host.canmon.output.stopwatch import Stopwatch
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.monitor.decode.serial.heard_line import Listened
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard, Listened
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

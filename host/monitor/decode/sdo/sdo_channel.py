@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tickrig.host.monitor.decode.sdo.sdo_blocks import (
+from tickrig.host.monitor.decode.sdo.sdo_open import OpenTransfer, Phase
+from tickrig.host.monitor.decode.sdo.sdo_steps import (
     ORPHAN,
-    is_block_segment,
-    take_block_frame,
-    take_block_segment,
-)
-from tickrig.host.monitor.decode.sdo.sdo_initiate import (
     Answer,
     Initiate,
     answers,
-    begin,
-    take_answer,
-    unheard,
-)
-from tickrig.host.monitor.decode.sdo.sdo_open import OpenTransfer, Phase
-from tickrig.host.monitor.decode.sdo.sdo_segments import (
     ask_segment,
+    begin,
     confirm_segment,
+    is_block_segment,
     send_segment,
+    take_answer,
+    take_block_frame,
+    take_block_segment,
     take_segment,
+    unheard,
 )
 from tickrig.host.monitor.decode.sdo.transfer import Direction, Mode, Outcome, Transfer, write_entry
 from tickrig.wire.canopen.sdo.sdo import (

@@ -1,16 +1,116 @@
-"""Lines of a log as they come in, in pieces of any size."""
+r"""Lines of a log as they come in, in pieces of any size.
+
+>>> lines = WholeLines()
+>>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
+(b'one\n', b'', b'two\n', b'')
+
+>>> tally = Tally()
+>>> heard = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
+>>> heard.at_us, heard.channel, str(heard.frame), heard.sent
+(10000, 'vcan0', '705#7F', True)
+>>> parse_log_line("(0000000000.020000) vcan0 123##1AABB", 2, tally), tally.passed_over
+(None, Counter({'CAN FD frames': 1}))
+"""
 
 from __future__ import annotations
 
 import re
 from typing import Final
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.log_line import parse_log_line
-from tickrig.host.monitor.logs.reading.screen_line import ScreenClock
-from tickrig.host.monitor.logs.reading.whole_lines import WholeLines
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
+from tickrig.host.monitor.logs.reading.screen_line import ScreenClock, parse_screen_line
+from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
 from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import WireError
+
+LONGEST: Final = 1 << 20
+"""Bytes; of a longer line the beginning is kept, and no line of a log is so long."""
+
+
+class WholeLines:
+    """Holds back a line that has begun, in time and memory that do not grow with its pieces."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._held = 0
+
+    def push(self, data: bytes, /) -> bytes:
+        """Return the lines that end in these bytes, each with its LF."""
+        lines, end, rest = data.rpartition(b"\n")
+        if not end:
+            self._hold(rest)
+            return b""
+        whole = b"".join((*self._pieces, lines, end))
+        self._pieces, self._held = [], 0
+        self._hold(rest)
+        return whole
+
+    def finish(self) -> bytes:
+        """Return a last line without LF."""
+        rest = b"".join(self._pieces)
+        self._pieces, self._held = [], 0
+        return rest
+
+    def _hold(self, rest: bytes) -> None:
+        if self._held < LONGEST:
+            self._pieces.append(rest)
+            self._held += len(rest)
+
+
+COMMENTS: Final = ("#", ";", "//")
+
+_LINE: Final = re.compile(
+    r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
+)
+_FD: Final = re.compile(r"(?:[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})##[0-9A-Fa-f](?:[0-9A-Fa-f]{2}){0,64}")
+_XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
+
+
+def parse_log_line(
+    line: str, number: int, tally: Tally, clock: ScreenClock | None = None
+) -> Heard | None:
+    """Read a line; None if it holds no frame, and then the tally says why.
+
+    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault.
+
+    Args:
+        line: without its LF.
+        number: of the line, from 1.
+        tally: takes what was no frame.
+        clock: of the lines of a screen.
+    """
+    text = line.strip()
+    if not text or text.startswith(COMMENTS):
+        return None
+    heard = _parsed(line, text, tally, clock or ScreenClock())
+    if heard is None:
+        tally.bad_lines.add(number, line.rstrip("\r"))
+    return heard if isinstance(heard, Heard) else None
+
+
+def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Heard | str | None:
+    """Return a frame, what was counted instead, or None for a bad line."""
+    if text.startswith("{"):
+        return parse_json_line(text, tally)
+    if match := _LINE.fullmatch(text):
+        return _logged(match, tally)
+    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally)
+
+
+def _logged(match: re.Match[str], tally: Tally) -> Heard | str | None:
+    """Return what a line of `candump -L` says."""
+    seconds, fraction, channel, notation, direction = match.groups()
+    for kind, pattern in ((CAN_FD, _FD), (CAN_XL, _XL)):
+        if pattern.fullmatch(notation):
+            tally.passed_over[kind] += 1
+            return kind
+    at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
+    try:
+        return Heard(at_us, channel, parse_frame(notation), direction == "T")
+    except WireError:
+        return None
+
 
 _USUAL: Final = re.compile(
     r"^\(([0-9]{1,12})\.([0-9]{6})\) ([!-~]{1,32}) ([0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7})"

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol, cast
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, log_format
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, log_format
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 from tickrig.host.monitor.logs.tally import BadLines, Tally
 

@@ -13,8 +13,8 @@ import re
 from itertools import pairwise
 from typing import Final
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.frame_notation import parse_frame
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.notation import parse_frame
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, SERIAL_LINES, Tally
 from tickrig.wire.errors import WireError
 

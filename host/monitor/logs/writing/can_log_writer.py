@@ -4,20 +4,112 @@ from __future__ import annotations
 
 import io
 import re
+import time
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import can
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.log_format import COMPRESSED, LogFormat
-from tickrig.host.monitor.logs.reading.can_heard import to_can
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.can_record import to_can
+from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat
 from tickrig.host.monitor.logs.reading.log_reader import LogError
-from tickrig.host.monitor.logs.writing.asc_writer import AscWriter
-from tickrig.host.monitor.logs.writing.can_writers import BlfWriter, TrcWriter
 from tickrig.host.monitor.logs.writing.log_writer import create
 from tickrig.wire.can_error import ErrorFrame
+
+_DATE: Final = "%a %b %d %H:%M:%S.{:03d} %Y"
+_END: Final = "End TriggerBlock\n"
+
+
+class AscWriter:
+    """Begins at a millisecond of local time; a frame from before begins another block.
+
+    Args:
+        file: a text file, which is closed with the log.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self._begin_us: int | None = None
+
+    def on_message_received(self, message: can.Message) -> None:
+        """Write a frame."""
+        at_us = round(message.timestamp * 1e6)
+        if self._begin_us is None or at_us < self._begin_us:
+            self._begin(at_us)
+        assert self._begin_us is not None, "it has begun"
+        seconds, micros = divmod(at_us - self._begin_us, 1_000_000)
+        self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
+
+    def stop(self) -> None:
+        """End the log."""
+        if self._begin_us is None:
+            self._begin(time.time_ns() // 1_000)
+        self._file.write(_END)
+        self._file.close()
+
+    def _begin(self, at_us: int) -> None:
+        start = datetime.fromtimestamp(at_us // 1_000 / 1e3)
+        date = start.strftime(_DATE).format(start.microsecond // 1_000)
+        if self._begin_us is None:
+            self._file.write(f"date {date}\nbase hex  timestamps absolute\n")
+            self._file.write("internal events logged\n")
+        else:
+            self._file.write(_END)
+        self._file.write(f"Begin Triggerblock {date}\n   0.000000 Start of measurement\n")
+        # of an hour that the clock of the wall shows twice the text says the first
+        self._begin_us = round(start.replace(fold=0).timestamp() * 1e6)
+
+
+def _event(message: can.Message) -> str:
+    assert isinstance(message.channel, int), "who writes numbers the buses"
+    channel = message.channel + 1
+    if message.is_error_frame:
+        return f"{channel}  ErrorFrame"
+    ident = f"{message.arbitration_id:X}{'x' * message.is_extended_id}"
+    direction = "Rx" if message.is_rx else "Tx"
+    kind = "r" if message.is_remote_frame else "d"
+    data = f" {message.data.hex(' ').upper()}" if message.data else ""
+    return f"{channel}  {ident:<15} {direction:<4} {kind} {message.dlc:x}{data}"
+
+
+FIRST_BLF_S: Final = 631_152_000
+"""1990-01-01; python-can takes a time before it for one that counts from zero."""
+
+TRC_STEP_US: Final = 10_546_875
+"""2**-13 days: a multiple of it is exact as the fraction of a day that TRC begins with."""
+
+
+class TrcWriter(can.TRCWriter):
+    """Begins at a multiple of `TRC_STEP_US`."""
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """Write a frame."""
+        if self.first_timestamp is None:
+            self.first_timestamp = int(msg.timestamp * 1e6) // TRC_STEP_US * TRC_STEP_US / 1e6
+            self.write_header(self.first_timestamp)
+        super().on_message_received(msg)
+
+
+class BlfWriter(can.BLFWriter):
+    """Begins at a second; BLF holds nothing from before.
+
+    Attributes:
+        early: frames from before, which have got the time of the beginning.
+    """
+
+    early = 0
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """Write a frame."""
+        if self.start_timestamp is None:
+            begin_s = int(msg.timestamp)
+            self.start_timestamp = float(begin_s if begin_s >= FIRST_BLF_S else 0)
+        self.early += msg.timestamp < self.start_timestamp
+        super().on_message_received(msg)
+
 
 TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: AscWriter,

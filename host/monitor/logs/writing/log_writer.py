@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol, cast
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.log_format import COMPRESSED, TEXT, LogFormat, log_format
-from tickrig.host.monitor.logs.reading.csv_line import LOG_HEADER, csv_row
-from tickrig.host.monitor.logs.reading.json_line import json_line
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, LogFormat, log_format
+from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
 from tickrig.wire.candump import LogLine
 
 BLOCK_LINES: Final = 256

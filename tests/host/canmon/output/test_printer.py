@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tickrig.host.canmon.output.printer import Output, printer_of
-from tickrig.host.monitor.decode.serial.heard_line import HeardLine
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.frames.dump_line import Stamp
+from tickrig.host.monitor.frames.record import HeardLine
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 
 

@@ -12,7 +12,7 @@ from tests.interop.buses import MULTICAST, PORT
 from tickrig.emulators.can.outside.channels import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.source import Source, open_source
 from tickrig.host.canmon.sources.source_word import BusWord
@@ -20,7 +20,7 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame

@@ -17,7 +17,7 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources.source import AnySource, open_any
 from tickrig.host.canmon.sources.source_word import LineWord, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.serial.heard_line import HeardLine, Listened
+from tickrig.host.monitor.frames.record import HeardLine, Listened
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import Checksum, Frame
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketReader
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.file_source import StdinSource
 from tickrig.host.canmon.sources.source import Source, open_source
-from tickrig.host.canmon.sources.stdin_source import StdinSource
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import parse_log
 

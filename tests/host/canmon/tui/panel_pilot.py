@@ -13,8 +13,7 @@ from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.workspace import Workspace
-from tickrig.host.tui.line import line_text
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui.line_view import LineView, line_text
 
 P = TypeVar("P", bound=Panel)
 SIZE = (90, 20)

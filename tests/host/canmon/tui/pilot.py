@@ -10,6 +10,7 @@ from typing import Any
 from textual.app import App
 
 from tests.host.canmon.wire import Wire
+from tickrig.host.canmon.monitor_setup import Bench
 from tickrig.host.canmon.sources.file_source import FileSource
 from tickrig.host.canmon.sources.source_word import FileWord
 from tickrig.host.canmon.tui.app import Monitor
@@ -17,13 +18,11 @@ from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.settings.bench import Bench
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.tui.line import line_text
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui.line_view import LineView, line_text
 
 DRIVE = Path(__file__).parents[3] / "golden/canmon/drive.log"
 OURS = (TracePanel, NodesPanel, StatisticsPanel)

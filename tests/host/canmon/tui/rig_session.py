@@ -12,8 +12,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"

@@ -20,19 +20,18 @@ from tests.host.canmon.tui.pilot import (
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.bench_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import Bench, BenchSetup
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.panels import PANELS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.settings.bench import Bench
+from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
-from tickrig.host.canmon.tui.widgets.status_line import StatusLine
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter
-from tickrig.host.tui.line import line_text
+from tickrig.host.tui.line_view import line_text
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

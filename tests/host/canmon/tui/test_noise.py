@@ -7,15 +7,15 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.decode.test_noise import CAN_IDS, ERRORS, REMOTE, SDO, WIDE
 from tests.host.monitor.strategies import data_frame
-from tickrig.host.canmon.tui.tasks.alarm_task import AlarmTask
+from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
+from tickrig.host.canmon.tui.panels.graph_panel import GraphTask
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
-from tickrig.host.canmon.tui.tasks.graph_task import GraphTask
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
-from tickrig.host.monitor.check.alarm_text import render_alarms
-from tickrig.host.monitor.check.words import parse_rules
-from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.check.alarms import render_alarms
+from tickrig.host.monitor.check.parse_rules import parse_rules
+from tickrig.host.monitor.dictionary.node_dictionary import render_dictionary
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
 from tickrig.host.monitor.graph.signal_word import parse_signal
 from tickrig.wire.can import CanFrame

@@ -8,14 +8,14 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.channels import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
-from tickrig.host.monitor.transmit.transmit_words import parse_words
+from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.transmit.row_text import parse_words
 
 STEPS = 1_000
 

@@ -7,19 +7,18 @@ from pathlib import Path
 import pytest
 
 from tests.host.canmon.wire import new_wire
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
-from tickrig.host.canmon.tui.widgets.trace_line import TraceLines
+from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.decode.filter.filter import parse_filter
-from tickrig.host.monitor.decode.serial.heard_line import HeardLine
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.views.sieve import Sieve
-from tickrig.host.tui.line import line_text
+from tickrig.host.monitor.decode.filter import parse_filter
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
+from tickrig.host.monitor.frames.record import Heard, HeardLine
+from tickrig.host.monitor.views.trace import Sieve
+from tickrig.host.tui.line_view import line_text
 from tickrig.wire.can import CanFrame
 
 STEPS = 2_000

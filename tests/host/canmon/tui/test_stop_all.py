@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 from tests.host.canmon.tui.rig_session import BUS, RigSession
-from tickrig.host.canmon.output.failure import SourceFailed
-from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
-from tickrig.host.monitor.transmit.transmit_words import parse_words
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
+from tickrig.host.monitor.transmit.row_text import parse_words
 from tickrig.wire.can import CanFrame
 
 

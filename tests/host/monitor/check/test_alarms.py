@@ -3,9 +3,15 @@ from __future__ import annotations
 import pytest
 
 from tests.host.monitor.heard_log import hear
-from tickrig.host.monitor.check.alarm_text import render_alarms
-from tickrig.host.monitor.check.alarms import GRACE_US, KEPT, RECENT_US, Alarms, State
-from tickrig.host.monitor.check.words import parse_rules
+from tickrig.host.monitor.check.alarms import (
+    GRACE_US,
+    KEPT,
+    RECENT_US,
+    Alarms,
+    State,
+    render_alarms,
+)
+from tickrig.host.monitor.check.parse_rules import parse_rules
 
 S = 1_000_000
 

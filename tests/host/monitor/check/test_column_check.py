@@ -7,10 +7,10 @@ from tests.host.monitor.column_log import columns
 from tests.host.monitor.strategies import traffic
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
-from tickrig.host.monitor.check.finding import Finding
+from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 BIT_RATE = 1_000

@@ -13,9 +13,9 @@ from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
 from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
-from tickrig.host.monitor.check.finding import Finding
-from tickrig.host.monitor.check.words import parse_rules
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.check.parse_rules import parse_rules
+from tickrig.host.monitor.check.rule import Finding
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 RULES = parse_rules(

@@ -6,8 +6,8 @@ import pytest
 
 from tests.host.monitor.heard_log import hear
 from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rules import Rules
-from tickrig.host.monitor.check.words import parse_rules
 
 
 def broken(

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
+from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
-from tickrig.host.monitor.check.words import parse_rules
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 from tests.host.monitor.column_log import columns
 from tests.host.monitor.heard_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
-from tickrig.host.monitor.columns.column_gaps import column_buckets
-from tickrig.host.monitor.columns.column_rows import heards as rows_of
-from tickrig.host.monitor.columns.column_traffic import snapshot_of
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.traffic.buckets import bucket_of
+from tickrig.host.monitor.columns.column_traffic import column_buckets, snapshot_of
+from tickrig.host.monitor.columns.columns import heards as rows_of
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.traffic.gaps import bucket_of
 
 
 @given(traffic())

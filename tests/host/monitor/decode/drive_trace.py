@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.candump import parse_log
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "canmon"

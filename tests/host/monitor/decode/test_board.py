@@ -4,12 +4,11 @@ import json
 
 from tests.host.monitor.decode import drive_trace
 from tests.host.monitor.decode.traces import STEP_US, trace
+from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.nodes.board_text import board_json, render_board
-from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
-from tickrig.host.monitor.decode.nodes.node_status import NodeStatus
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_board import NodeBoard, NodeStatus
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 WIDE = 300

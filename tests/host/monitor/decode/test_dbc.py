@@ -7,10 +7,10 @@ import pytest
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tests.host.monitor.decode.traces import trace
+from tickrig.host.monitor.decode.dbc_file import DbcError
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.filter.filter import parse_filter
-from tickrig.host.monitor.decode.pdo.dbc_file import DbcError
+from tickrig.host.monitor.decode.filter import parse_filter
 
 DBC = GOLDEN / "engine.dbc"
 

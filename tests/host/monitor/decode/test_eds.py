@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.host.monitor.decode.traces import last
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_finding import EdsError
 

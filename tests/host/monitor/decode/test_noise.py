@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.decode.drive_trace import heard
+from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.nodes.board_text import board_json, render_board
-from tickrig.host.monitor.decode.nodes.node_board import NodeBoard
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
-from tickrig.host.monitor.decode.serial.serial_rtc_lite import RtcLiteLine
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_board import NodeBoard
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
+from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

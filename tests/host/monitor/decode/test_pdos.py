@@ -4,8 +4,8 @@ import pytest
 
 from tests.host.monitor.decode.traces import decode, last, trace
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.decode.objects.object_text import ObjectText
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.wire.canopen.datatypes import DataType
 
 WRITTEN = " ".join(

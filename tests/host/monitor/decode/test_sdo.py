@@ -9,7 +9,7 @@ from tests.emulators.sim_bench import SimBench
 from tests.host.monitor.decode.traces import decode, last, transfers
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.sdo.transfer import Direction, Mode, Outcome, Transfer
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.monitor.decode.filter.filter import parse_filter
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
-from tickrig.host.monitor.decode.serial.serial_rtc_lite import RtcLiteLine
+from tickrig.host.monitor.decode.filter import parse_filter
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
+from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import Checksum, Frame
 from tickrig.wire.rtc_lite.messages import (

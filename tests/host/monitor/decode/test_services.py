@@ -4,8 +4,8 @@ import pytest
 
 from tests.host.monitor.decode.traces import decode, last
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame
 
 

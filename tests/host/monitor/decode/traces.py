@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects
+from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.decode.sdo.transfer import Transfer
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 STEP_US = 1_000

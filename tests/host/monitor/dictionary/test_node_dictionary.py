@@ -5,10 +5,13 @@ from pathlib import Path
 
 from tests.host.monitor.heard_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
-from tickrig.host.monitor.dictionary.dictionary_text import render_dictionary
-from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
-from tickrig.host.monitor.dictionary.object_row import ObjectRow, Origin
+from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.dictionary.node_dictionary import (
+    NodeDictionary,
+    ObjectRow,
+    Origin,
+    render_dictionary,
+)
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 STATUSWORD = (0x6041, 0)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.decode.objects.object_text import ObjectText
-from tickrig.host.monitor.dictionary.object_words import encode_words
+from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.dictionary.encode_value import encode_words
 from tickrig.wire.canopen.datatypes import DataType
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.monitor.logs.reading.test_log_lines import read
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.wire.can import CanFrame
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.signal_word import parse_signal
 from tickrig.host.monitor.logs.reading.log_reader import read_log

@@ -9,12 +9,10 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.graph.drawing.csv_text import write_csv
-from tickrig.host.monitor.graph.drawing.html_page import html_page
-from tickrig.host.monitor.graph.drawing.png import write_png
-from tickrig.host.monitor.graph.drawing.svg import svg
-from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.view import View
+from tickrig.host.monitor.graph.csv_text import write_csv
+from tickrig.host.monitor.graph.png import write_png
+from tickrig.host.monitor.graph.series import Series, View
+from tickrig.host.monitor.graph.svg import html_page, svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

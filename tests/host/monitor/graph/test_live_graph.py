@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tests.host.monitor.heard_log import hear
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
 from tickrig.host.monitor.graph.signal_word import parse_signal
 from tickrig.wire.can import CanFrame

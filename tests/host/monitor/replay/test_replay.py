@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.replay.lateness import Lateness
-from tickrig.host.monitor.replay.replay_plan import ReplayPlan
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.replay.replay_plan import Lateness, ReplayPlan
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
-from tickrig.host.monitor.sequence.pattern import parse_pattern
+from tickrig.host.monitor.sequence.conditions import parse_pattern
+from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
 from tickrig.host.monitor.sequence.steps import outline
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.host.monitor.sequence.variables import evaluate, fill_in, parse_variable
 from tickrig.wire.can import CanFrame
 

@@ -9,10 +9,9 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.sequence.line_sequence import SequenceError, parse_lines
+from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
 from tickrig.host.monitor.sequence.sequence_run import SequenceRun
 from tickrig.host.monitor.sequence.steps import outline
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 
 WORDS = ["080#", "{id}", "705#{id:9}", "stop", "go-on", "forever", "10ms", "0s", "", "5.rpdo1 a=1"]
 KEYS = ["send", "wait", "expect", "within", "on-fail", "repeat", "steps", "id", "vars"]

@@ -7,12 +7,12 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.canmon.output.watch import Watch
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.canmon.verbs.seq import Watch
+from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
 from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
-from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
 from tickrig.wire.can import Frames
 
 EXAMPLES = Path(__file__).parents[4] / "examples"

@@ -3,10 +3,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.sequence.line_sequence import parse_lines
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
 from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
-from tickrig.host.monitor.sequence.toml_sequence import TomlSequence
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

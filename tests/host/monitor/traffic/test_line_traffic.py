@@ -1,8 +1,7 @@
 from __future__ import annotations
 
-from tickrig.host.monitor.decode.serial.heard_line import HeardLine
-from tickrig.host.monitor.decode.serial.serial_rrc import RrcLines
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
+from tickrig.host.monitor.frames.record import Heard, HeardLine
 from tickrig.host.monitor.traffic.line_traffic import LineTraffic, line_table
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.wire.can import CanFrame

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.transmit.cyclic import Cyclic
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_counter
+from tickrig.host.monitor.transmit.transmit_list import Cyclic
 from tickrig.wire.can import CanFrame
 from tickrig.wire.instant import NEVER
 

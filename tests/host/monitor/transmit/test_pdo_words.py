@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.objects.eds_objects import EdsObjects, read_eds
-from tickrig.host.monitor.decode.objects.object_text import ObjectText
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.transmit.pdo_words import PdoWords
+from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
+from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
 from tickrig.wire.canopen.datatypes import DataType
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"

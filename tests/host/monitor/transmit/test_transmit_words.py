@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.decode.objects.eds_objects import read_eds
-from tickrig.host.monitor.transmit.pdo_words import PdoWords
-from tickrig.host.monitor.transmit.transmit_list import TransmitRow
-from tickrig.host.monitor.transmit.transmit_text import render_transmit
-from tickrig.host.monitor.transmit.transmit_words import TransmitWords, parse_words
+from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.row_text import TransmitWords, parse_words
+from tickrig.host.monitor.transmit.transmit_list import TransmitRow, render_transmit
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 ROWS = (

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 from tests.host.monitor.heard_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.filter.filter import parse_filter
-from tickrig.host.monitor.views.sieve import Sieve
-from tickrig.host.monitor.views.trace import Trace
+from tickrig.host.monitor.decode.filter import parse_filter
+from tickrig.host.monitor.views.trace import Sieve, Trace
 
 TEXT = "1 181#01\n2 705#7F\n3 181#02\n4 20000020#0000000000000000\n5 705#05"
 

@@ -3,8 +3,15 @@ from __future__ import annotations
 import json
 
 from tests.host.monitor.heard_log import hear, snapshot
-from tickrig.host.monitor.views.stats_json import bus_json, id_json, node_json
-from tickrig.host.monitor.views.stats_table import bus_lines, by_id, by_node, node_rows
+from tickrig.host.monitor.views.statistics import (
+    bus_json,
+    bus_lines,
+    by_id,
+    by_node,
+    id_json,
+    node_json,
+    node_rows,
+)
 
 LOG = hear(
     "\n".join(f"{0.01 * n:.2f} 181#{n:02X}" for n in range(50) if n not in (20, 21))

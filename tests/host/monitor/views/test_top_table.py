@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.heard_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.views.top_table import Order, View, render
 
 LOG = hear(

@@ -9,7 +9,7 @@ from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.frames.heard import Heard
+from tickrig.host.monitor.frames.record import Heard
 from tickrig.host.monitor.graph.live_graph import Sight
 from tickrig.wire.can import CanFrame
 

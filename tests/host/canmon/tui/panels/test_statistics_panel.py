@@ -9,7 +9,7 @@ from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, shown, 
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
-from tickrig.host.canmon.tui.widgets.trace_line import CHANGED
+from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.tui.line_view import LineView
 

@@ -17,7 +17,7 @@ from tests.host.canmon.tui.pilot import (
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.widgets.trace_line import CHANGED
+from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.tui.line_view import LineView
 

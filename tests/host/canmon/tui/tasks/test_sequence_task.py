@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
-from tickrig.host.monitor.sequence.line_sequence import SequenceError
+from tickrig.host.monitor.sequence.parse_sequence import SequenceError
 
 START = Path(__file__).parents[5] / "examples/sequences/start_drive.toml"
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.host.canmon.tui.pilot import PATIENCE_US, drive_session, hear, wire_session
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.output.failure import SourceFailed
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session

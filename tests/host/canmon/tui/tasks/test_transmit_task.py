@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.tui.tasks.transmit_task import TransmitTask
-from tickrig.host.monitor.transmit.transmit_words import parse_words
+from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
+from tickrig.host.monitor.transmit.row_text import parse_words
 
 
 class Sender:

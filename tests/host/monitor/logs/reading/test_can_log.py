@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.logs.reading.test_log_lines import FRAMES
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.log_format import LogFormatError, log_format
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.log_file import LogFormatError, log_format
 from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
 from tickrig.host.monitor.logs.writing.log_writer import write_log
 from tickrig.wire.can import CanFrame

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.logs.reading.test_log_lines import FRAMES
 from tickrig.host.canmon.output.printer import csv_printer
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.can_heard import to_heard
-from tickrig.host.monitor.logs.reading.csv_line import DUMP_HEADER
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.can_record import to_heard
+from tickrig.host.monitor.logs.notation import DUMP_HEADER
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally

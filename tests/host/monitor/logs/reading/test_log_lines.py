@@ -4,11 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.json_line import json_line
-from tickrig.host.monitor.logs.reading.log_line import parse_log_line
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.reading.whole_lines import LONGEST, WholeLines
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.notation import json_line
+from tickrig.host.monitor.logs.reading.log_lines import (
+    LONGEST,
+    LogLines,
+    WholeLines,
+    parse_log_line,
+)
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.host.monitor.logs.writing.log_writer import log_line
 from tickrig.wire.can import CanFrame

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.columns.test_column_reader import rows_by_line, rows_of
 from tests.host.monitor.logs.reading.test_log_lines import FRAMES
+from tickrig.host.canmon.verbs.info import read_head
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.heard import Heard
-from tickrig.host.monitor.logs.reading.log_head import read_head
-from tickrig.host.monitor.logs.reading.log_line import parse_log_line
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.reading.log_lines import LogLines, parse_log_line
 from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame

@@ -1,0 +1,149 @@
+"""Rows of the trace as lines with styles.
+
+>>> from tickrig.host.monitor.frames.record import Heard
+>>> from tickrig.wire.can import CanFrame
+>>> row = TraceRow(7, Heard(1_250_000, "can0", CanFrame.parse("185#3702")), 50_000, 100_000, 0xFF)
+>>> line = TraceLines(origin_us=1_000_000).line(row)
+>>> line_text(line)
+'     0.250000  100.000 185       [2] 37 02'
+>>> [text.strip() for text, style in line if style == CHANGED]
+['37']
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+from typing import Final
+
+from tickrig.host.monitor.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
+from tickrig.host.monitor.frames.ident import ident_of, ident_text
+from tickrig.host.monitor.frames.quantity import ms_text
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.traffic.line_traffic import ARROWS
+from tickrig.host.monitor.views.top_model import meaning_text
+from tickrig.host.monitor.views.trace import TraceRow
+from tickrig.host.tui.line_view import Line, line_text
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+__all__ = ["CHANGED", "TraceLines", "line_text"]
+
+CHANGED: Final = "bold yellow"
+SENT: Final = "bold cyan"
+ERROR: Final = "bold red"
+DIM: Final = "dim"
+HEAD: Final = "bold"
+KIND_STYLES: Final = {
+    "emcy": "red",
+    "error": "red",
+    "nmt": "magenta",
+    "boot-up": "magenta",
+    "sdo": "blue",
+    "unmapped": "dim",
+    "raw": "dim",
+}
+BYTES_WIDTH: Final = len("[8] 00 11 22 33 44 55 66 77")
+BITS_WIDTH: Final = len("[8]") + 8 * len(" 00000000")
+STAMP_WIDTHS: Final = {Stamp.ABSOLUTE: 17, Stamp.DATE: 26}
+STAMP_WIDTH: Final = 13
+
+
+@dataclass(frozen=True, slots=True)
+class TraceLines:
+    """How rows are written.
+
+    Attributes:
+        stamp: the time at the beginning of a line.
+        origin_us: the time that is 0.
+        bits: bits instead of bytes.
+        meaning: what a frame means stands behind it.
+        channel_width: characters of the bus; 0 for none.
+        counts: how often an identifier came stands before it.
+    """
+
+    stamp: Stamp = Stamp.ZERO
+    origin_us: int = 0
+    bits: bool = False
+    meaning: bool = True
+    channel_width: int = 0
+    counts: bool = False
+
+    def head(self) -> Line:
+        """Return the titles of the columns."""
+        parts = [f"{'time s':>{self._stamp_width}}", f"{'gap ms':>8}"]
+        parts += [f"{'frames':>8}"] * self.counts
+        parts += [f"{'bus':<{self.channel_width}}"] * bool(self.channel_width)
+        parts += [f"{'CAN-ID':<9}", f"{'data':<{self._data_width}}"]
+        parts += ["meaning"] * self.meaning
+        return ((" ".join(parts).rstrip(), HEAD),)
+
+    def line(self, row: TraceRow, count: int = 0) -> Line:
+        """Return the line of a row."""
+        heard = row.heard
+        channel = f"{heard.channel:<{self.channel_width}} " * bool(self.channel_width)
+        counted = f"{count:>8} " * self.counts
+        begin = f"{self._stamp(row):>{self._stamp_width}} {ms_text(row.gap_us):>8} "
+        pieces = [(begin, DIM), (counted + channel, ""), _ident(row), *self._data(row)]
+        if self.meaning and row.decoded is not None:
+            missing = self._data_width - sum(len(text) for text, _ in pieces[3:])
+            style = KIND_STYLES.get(row.decoded.kind, "")
+            pieces.append((" " * (max(0, missing) + 1) + meaning_text(row.decoded), style))
+        return tuple(piece for piece in pieces if piece[0])
+
+    @property
+    def _stamp_width(self) -> int:
+        return STAMP_WIDTHS.get(self.stamp, STAMP_WIDTH)
+
+    @property
+    def _data_width(self) -> int:
+        return BITS_WIDTH if self.bits else BYTES_WIDTH
+
+    def _stamp(self, row: TraceRow) -> str:
+        at_us = row.heard.at_us
+        match self.stamp:
+            case Stamp.DELTA:
+                return seconds_text(row.since_us or 0, 1)
+            case Stamp.ABSOLUTE:
+                return seconds_text(at_us, 1)
+            case Stamp.DATE:
+                return date_text(at_us)
+            case _:
+                return seconds_text(at_us - self.origin_us, 1)
+
+    def _data(self, row: TraceRow) -> Iterator[tuple[str, str]]:
+        heard = row.heard
+        if not isinstance(heard, Heard):
+            yield bytes_text(heard.data), ""
+            return
+        frame = heard.frame
+        if isinstance(frame, CanFrame) and frame.remote:
+            yield f"[{frame.dlc}] remote request", ""
+            return
+        yield f"[{len(frame.data)}]", ""
+        cells = _cells(frame.data, row.changed, self.bits)
+        for changed, run in groupby(cells, key=itemgetter(1)):  # few pieces are painted soon
+            yield "".join(cell for cell, _ in run), CHANGED if changed else ""
+
+
+def _cells(data: bytes, changed: int, bits: bool) -> Iterator[tuple[str, bool]]:
+    for place, byte in enumerate(data):
+        differs = changed >> 8 * place & 0xFF
+        if not bits:
+            yield f" {byte:02X}", bool(differs)
+            continue
+        for bit in reversed(range(8)):
+            yield f"{' ' * (bit == 7)}{byte >> bit & 1}", bool(differs >> bit & 1)
+
+
+def _ident(row: TraceRow) -> tuple[str, str]:
+    heard = row.heard
+    style = SENT if heard.sent else HEAD
+    if not isinstance(heard, Heard):
+        return f"{ARROWS[heard.sent]:<9} ", style
+    frame = heard.frame
+    if isinstance(frame, ErrorFrame):
+        return f"{'error':<9} ", ERROR
+    return f"{ident_text(ident_of(frame)):<9} ", style

@@ -1,1 +1,0 @@
-"""Small things on the screen that know no tab."""

@@ -1,0 +1,260 @@
+"""Filters: which frames are wanted.
+
+```
+filter = list | or              list: candump's rules, as 123:7FF,400~700,#FF
+or     = and ("or" | ",") ...
+and    = not "and" ...
+not    = "not" not | "(" or ")" | term
+term   = 181 | 181-18F | 18FF0000-18FFFFFF | 123:7FF | 400~700 | #FF
+       | nmt | sync | time | emcy | heartbeat | boot-up | guard | lss | error | unmapped | raw
+       | pdo | tpdo | rpdo | tpdo1 | sdo | sdo[6040h] | sdo[0x1018:1] | sdo.aborted | sdo.unanswered
+       | node = 3 | id < 200 | dlc = 8 | channel = can0 | kind = emcy | dir = tx | src = eds
+       | statusword.fault | position > 1000 | 3.position > 1000 | state = stopped
+```
+
+Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python.
+
+>>> from tickrig.host.monitor.decode.decoded import Decoded
+>>> from tickrig.host.monitor.frames.record import Heard
+>>> from tickrig.wire.can import CanFrame
+>>> heard = Heard(0, "can0", CanFrame.parse("085#3081110700000000"))
+>>> parse_filter("node=5 and (pdo or emcy)").matches(heard, Decoded("emcy", 5))
+True
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from tickrig.host.monitor.decode.filter_terms import (
+    COMPARISONS,
+    EQUALITIES,
+    FIELDS,
+    KINDS,
+    WORDS,
+    Test,
+    candump_test,
+    error_test,
+    field_test,
+    kind_test,
+    number,
+    object_test,
+    range_test,
+    signal_test,
+    word_test,
+)
+from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
+
+
+class FilterError(ValueError):
+    """Text that is no filter.
+
+    Attributes:
+        column: where, from 1.
+    """
+
+    def __init__(self, text: str, column: int, reason: str) -> None:
+        super().__init__(f"filter {text!r}, column {column}: {reason}")
+        self.column = column
+
+
+_TOKEN: Final = re.compile(r"\s*([()\[\],]|==|!=|<=|>=|[=<>]|[^\s()\[\],=!<>]+|!)")
+_CAN_ID: Final = re.compile(r"[0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7}")
+_RULE: Final = re.compile(r"[0-9A-Fa-f]{1,8}[:~][0-9A-Fa-f]{1,8}")
+_ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
+_OBJECT: Final = re.compile(r"(?:0x)?([0-9A-Fa-f]{1,4})h?(?::(?:0x)?([0-9A-Fa-f]{1,2})h?)?")
+_ADDRESS: Final = re.compile(r"([0-9]{1,3}\.)?[0-9A-Fa-f]{4}h:[0-9A-Fa-f]{2}")
+_NAME: Final = re.compile(r"([0-9]{1,3}\.)?[A-Za-z_][\w.]*")
+_RESERVED: Final = ("and", "or", "not")
+_ALIASES: Final = {"bootup": "boot-up", "ch": "channel"}
+
+
+class _Token(NamedTuple):
+    text: str
+    column: int
+
+
+class FilterParser:
+    """Recursive descent over the grammar in `filter`, one method a rule.
+
+    Args:
+        text: the filter.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._signals: set[str] = set()
+        self._tokens: list[_Token] = []
+        at, end = 0, len(text.rstrip())
+        while at < end:
+            match = _TOKEN.match(text, at)
+            assert match is not None  # a token is any character
+            self._tokens.append(_Token(match[1], match.start(1) + 1))
+            at = match.end()
+        self._tokens.append(_Token("", end + 1))
+
+    def parse(self) -> tuple[Test, frozenset[str]]:
+        """Return the test and the signals it asks for; FilterError if it is no filter."""
+        test = self._or()
+        if self._next.text:
+            raise self._error(f"{self._next.text!r} after the end; join terms by 'and' or 'or'")
+        return test, frozenset(self._signals)
+
+    @property
+    def _next(self) -> _Token:
+        return self._tokens[0]
+
+    def _take(self, *words: str) -> bool:
+        """Take the next token if it is one of these."""
+        if self._next.text not in words:
+            return False
+        del self._tokens[0]
+        return True
+
+    def _error(self, reason: str) -> FilterError:
+        return FilterError(self._text, self._next.column, reason)
+
+    def _or(self) -> Test:
+        tests = [self._and()]
+        while self._take("or", ","):
+            tests.append(self._and())
+        if len(tests) == 1:
+            return tests[0]
+        return lambda heard, decoded: any(test(heard, decoded) for test in tests)
+
+    def _and(self) -> Test:
+        tests = [self._not()]
+        while self._take("and"):
+            tests.append(self._not())
+        if len(tests) == 1:
+            return tests[0]
+        return lambda heard, decoded: all(test(heard, decoded) for test in tests)
+
+    def _not(self) -> Test:
+        if self._take("not", "!"):
+            test = self._not()
+            return lambda heard, decoded: not test(heard, decoded)
+        if self._take("("):
+            test = self._or()
+            self._expect(")")
+            return test
+        return self._term()
+
+    def _expect(self, word: str) -> None:
+        if not self._take(word):
+            raise self._error(f"{word!r} is missing")
+
+    def _term(self) -> Test:
+        word = self._next.text
+        word = _ALIASES.get(word, word)
+        if not word or word in _RESERVED or not re.match(r"[\w#]", word):
+            raise self._error("a term is missing, as emcy, node=3, 181-18F or statusword.fault")
+        if word in FIELDS or word in WORDS:
+            del self._tokens[0]
+            return self._field(word)
+        test = self._id_test(word) or kind_test(word)
+        if test is None:
+            return self._signal(word)
+        del self._tokens[0]
+        if word == "sdo" and self._take("["):
+            test = self._object()
+            self._expect("]")
+        return test
+
+    def _id_test(self, word: str) -> Test | None:
+        """Return the test of CAN-IDs; None for other words."""
+        if _RULE.fullmatch(word):
+            return candump_test(CandumpFilter.parse(word))
+        if errors := _ERRORS.fullmatch(word):
+            return error_test(int(errors[1], 16))
+        low, dash, high = word.partition("-")
+        if not _CAN_ID.fullmatch(low) or (dash and not _CAN_ID.fullmatch(high)):
+            return None
+        high = high or low
+        extended = len(low) == 8
+        numbers = int(low, 16), int(high, 16)
+        most = EXTENDED_MAX if extended else STANDARD_MAX
+        if len(low) != len(high) or not numbers[0] <= numbers[1] <= most:
+            raise self._error(f"{word} is no range of CAN-IDs like 181-18F")
+        return range_test(*numbers, extended=extended)
+
+    def _object(self) -> Test:
+        match = _OBJECT.fullmatch(self._next.text)
+        if match is None:
+            raise self._error(f"{self._next.text!r} is no object like 6040h or 0x1018:1")
+        del self._tokens[0]
+        return object_test(int(match[1], 16), int(match[2], 16) if match[2] else None)
+
+    def _field(self, name: str) -> Test:
+        sign, value = self._comparison(name)
+        if name in WORDS:
+            if sign not in EQUALITIES:
+                raise self._error(f"{name} can be compared by = and != alone")
+            del self._tokens[0]
+            return word_test(name, sign, _ALIASES.get(value, value))
+        wanted = _hexadecimal(value) if name == "id" else number(value)
+        if wanted is None:
+            raise self._error(f"{value!r} is no number")
+        del self._tokens[0]
+        return field_test(name, COMPARISONS[sign], wanted)
+
+    def _comparison(self, name: str) -> tuple[str, str]:
+        """Take the sign; return it and the value behind it, which is not taken yet."""
+        sign = self._next.text
+        if sign not in COMPARISONS:
+            raise self._error(f"{name} is compared by one of {' '.join(COMPARISONS)}")
+        del self._tokens[0]
+        if not self._next.text or not re.match(r"[\w.+-]", self._next.text):
+            raise self._error("a value is missing")
+        return sign, self._next.text
+
+    def _signal(self, word: str) -> Test:
+        if not _ADDRESS.fullmatch(word) and not _NAME.fullmatch(word):
+            raise self._error(f"{word!r} is neither a kind ({', '.join(KINDS)}) nor a signal")
+        del self._tokens[0]
+        self._signals.add(word)
+        if self._next.text not in COMPARISONS:
+            return signal_test(word)
+        sign, value = self._comparison(word)
+        if number(value) is None and sign not in EQUALITIES:
+            raise self._error(f"{value!r} is no number")
+        del self._tokens[0]
+        return signal_test(word, sign, value)
+
+
+def _hexadecimal(text: str) -> int | None:
+    try:
+        return int(text, 16)
+    except ValueError:
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """A filter that was read.
+
+    Attributes:
+        text: as it was written.
+        matches: says whether a frame is wanted.
+        signals: names of the signals it asks for, to tell when none of them ever comes.
+    """
+
+    text: str
+    matches: Test
+    signals: frozenset[str] = frozenset()
+
+
+def parse_filter(text: str) -> Filter:
+    """Read a filter.
+
+    Raises:
+        FilterError: it is none; says the column.
+    """
+    try:
+        chosen = CandumpFilter.parse(text)
+    except ValueError:
+        return Filter(text, *FilterParser(text).parse())
+    return Filter(text, candump_test(chosen))

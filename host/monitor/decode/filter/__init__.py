@@ -1,1 +1,0 @@
-"""Filters: their text, and what they ask of a frame."""

@@ -1,0 +1,223 @@
+"""The signals that a filter asks for and that have not come: a name may be misspelt."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from tickrig.host.monitor.decode.decoded import Decoded, Signal
+from tickrig.host.monitor.decode.object_text import BITS
+from tickrig.host.monitor.decode.sdo.transfer import Outcome
+from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
+from tickrig.host.monitor.frames.record import Heard, Listened
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+Test = Callable[[Listened, Decoded], bool]
+Compare = Callable[[float, float], bool]
+
+COMPARISONS: Final[dict[str, Compare]] = {
+    "=": operator.eq,
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+EQUALITIES: Final = ("=", "==", "!=")
+KINDS: Final = (
+    *("nmt", "sync", "time", "emcy", "heartbeat", "boot-up", "guard", "sdo", "lss", "dbc"),
+    *("unmapped", "raw", "error", "rrc", "rtc-lite"),
+)
+OUTCOMES: Final = {
+    "sdo.aborted": Outcome.ABORTED,
+    "sdo.unanswered": Outcome.UNANSWERED,
+    "sdo.broken": Outcome.BROKEN,
+}
+FIELDS: Final[dict[str, Callable[[Listened, Decoded], int | None]]] = {
+    "node": lambda heard, decoded: decoded.node,
+    "id": lambda heard, decoded: _can_id(heard),
+    "dlc": lambda heard, decoded: getattr(heard.frame, "dlc", None),
+}
+WORDS: Final[dict[str, Callable[[Listened, Decoded], str]]] = {
+    "channel": lambda heard, decoded: heard.channel,
+    "kind": lambda heard, decoded: decoded.kind,
+    "dir": lambda heard, decoded: "tx" if heard.sent else "rx",
+    "src": lambda heard, decoded: decoded.source,
+}
+
+_PDO: Final = re.compile(r"([tr]?)pdo([0-9]{0,3})")
+_NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
+
+
+def kind_test(word: str) -> Test | None:
+    """Return the test for a kind of frame, or for how an SDO transfer ended."""
+    if word in KINDS:
+        return lambda heard, decoded: decoded.kind == word
+    if word in OUTCOMES:
+        outcome = OUTCOMES[word]
+        return lambda heard, decoded: any(t.outcome is outcome for t in decoded.transfers)
+    match = _PDO.fullmatch(word)
+    if match is None:
+        return None
+    directions = (match[1],) if match[1] else ("t", "r")
+    unmapped = ("unmapped",) if word == "pdo" else ()
+    if match[2]:
+        kinds = tuple(f"{direction}pdo{match[2]}" for direction in directions)
+        return lambda heard, decoded: decoded.kind in kinds
+    begins = (*(f"{direction}pdo" for direction in directions), *unmapped)
+    return lambda heard, decoded: decoded.kind.startswith(begins)
+
+
+def object_test(index: int, sub: int | None) -> Test:
+    """Return the test for SDO frames about an object."""
+
+    def test(heard: Listened, decoded: Decoded) -> bool:
+        entries = (decoded.entry, *(transfer.entry for transfer in decoded.transfers))
+        return any(entry and entry[0] == index and sub in (None, entry[1]) for entry in entries)
+
+    return test
+
+
+def range_test(low: int, high: int, *, extended: bool) -> Test:
+    """Return the test for CAN-IDs, both ends included."""
+
+    def test(heard: Listened, decoded: Decoded) -> bool:
+        frame = heard.frame
+        if not isinstance(frame, CanFrame) or frame.extended != extended:
+            return False
+        return low <= frame.can_id <= high
+
+    return test
+
+
+def error_test(mask: int) -> Test:
+    """Return the test for error frames of some classes."""
+    return lambda heard, decoded: (
+        isinstance(heard.frame, ErrorFrame) and bool(heard.frame.error_class & mask)
+    )
+
+
+def candump_test(chosen: CandumpFilter) -> Test:
+    """Return the test of candump's rules."""
+    return lambda heard, decoded: isinstance(heard, Heard) and chosen.passes(flagged_id(heard))
+
+
+def field_test(name: str, compare: Compare, value: float) -> Test:
+    """Return the test for a number that every frame of some kind has."""
+    field = FIELDS[name]
+
+    def test(heard: Listened, decoded: Decoded) -> bool:
+        found = field(heard, decoded)
+        return found is not None and compare(found, value)
+
+    return test
+
+
+def word_test(name: str, sign: str, value: str) -> Test:
+    """Return the test for a word."""
+    word, wanted = WORDS[name], sign != "!="
+    return lambda heard, decoded: (word(heard, decoded) == value) == wanted
+
+
+def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
+    """Return the test for a signal, or one bit of it; without a comparison: it is not 0.
+
+    Args:
+        path: name, with `.bit` behind it and `node.` before it if need be.
+        sign: one of `COMPARISONS`.
+        text: what it is compared with.
+    """
+    node, whole, shift = signal_place(path)
+    compare = _comparison(sign, text)
+
+    def test(heard: Listened, decoded: Decoded) -> bool:
+        if node is not None and decoded.node != node:
+            return False
+        for signal in decoded.signals:
+            if signal.name == whole:
+                return compare(signal if shift is None else _bit(signal, shift))
+        return False
+
+    return test
+
+
+def signal_place(path: str) -> tuple[int | None, str, int | None]:
+    """Return node, name, and bit of a signal that a filter asks for; None where it names none.
+
+    >>> signal_place("3.statusword.fault"), signal_place("position")
+    ((3, 'statusword', 3), (None, 'position', None))
+    """
+    match = _NODE.fullmatch(path)
+    node, name = (int(match[1]), match[2]) if match else (None, path)
+    base, _, bit = name.rpartition(".")
+    shift = BITS.get(base, {}).get(bit)
+    return node, name if shift is None else base, shift
+
+
+def number(text: str) -> float | None:
+    """Read a number as people write it; None if it is none."""
+    for kind in (_whole, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return None
+
+
+def _whole(text: str) -> int:
+    return int(text, 0)
+
+
+def _comparison(sign: str, text: str) -> Callable[[Signal], bool]:
+    wanted, compare = number(text), COMPARISONS[sign]
+    if wanted is None:
+        words, equal = text.lower(), sign != "!="
+        return lambda signal: (words in (signal.text.lower(), str(signal.value).lower())) == equal
+
+    def holds(signal: Signal) -> bool:
+        value = signal.value
+        return isinstance(value, int | float) and compare(value, wanted)
+
+    return holds
+
+
+def _bit(signal: Signal, shift: int) -> Signal:
+    """Return one bit of a signal; nothing comparable where it is no number."""
+    value = signal.value
+    return Signal(signal.name, value >> shift & 1 if isinstance(value, int) else "")
+
+
+def _can_id(heard: Listened) -> int | None:
+    return heard.frame.can_id if isinstance(heard.frame, CanFrame) else None
+
+
+class MissingSignals:
+    """Waits for signals by name.
+
+    Args:
+        paths: as filters write them: `position`, `3.position`, `statusword.fault`.
+    """
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        self._left = {path: signal_place(path)[:2] for path in sorted(paths)}
+
+    def __bool__(self) -> bool:
+        """Say whether any is missing."""
+        return bool(self._left)
+
+    def take(self, decoded: Decoded) -> None:
+        """Take what a frame says."""
+        names = {signal.name for signal in decoded.signals}
+        self._left = {
+            path: (node, name)
+            for path, (node, name) in self._left.items()
+            if name not in names or node not in (None, decoded.node)
+        }
+
+    def words(self) -> list[str]:
+        """Say what never came, one line each."""
+        return [f"the filter asks for {path!r}: no such signal came" for path in self._left]

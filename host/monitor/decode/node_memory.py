@@ -1,0 +1,187 @@
+"""What SDO traffic and an EDS have told of the objects of one node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canopen.eds import read_sound
+from tickrig.host.monitor.decode.decoded import EDS, SEEN
+from tickrig.host.monitor.decode.object_text import (
+    ObjectText,
+    describe_drive,
+    describe_standard,
+    slug,
+)
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_entry import EdsEntry
+from tickrig.wire.canopen.eds.eds_finding import Finding
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
+
+
+@dataclass(frozen=True, slots=True)
+class EdsObjects:
+    """What a file says of a node.
+
+    Attributes:
+        texts: name, type and unit by index and sub-index.
+        values: power-on values, as bytes on the wire, likewise.
+        name: of the device, empty where the file has none.
+        findings: what is wrong in the file, whose objects are then not used.
+    """
+
+    texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
+    values: Mapping[Entry, bytes] = field(default_factory=dict)
+    name: str = ""
+    findings: tuple[Finding, ...] = ()
+
+
+def read_eds(path: Path, node_id: int) -> EdsObjects:
+    """Read an EDS or DCF for a node.
+
+    Raises:
+        OSError: the file cannot be read.
+        EdsError: it has no object that can be used.
+    """
+    device, findings = read_sound(path)
+    return EdsObjects(
+        {(row.index, row.sub): _text(device, row) for row in device.entries},
+        {
+            (row.index, row.sub): data
+            for row in device.entries
+            if (data := _power_on(row, node_id)) is not None
+        },
+        device.info.product_name or path.stem,
+        findings,
+    )
+
+
+def _text(device: EdsDevice, row: EdsEntry) -> ObjectText:
+    name = slug(row.name)
+    info = device.objects[row.index]
+    if info.code not in VARIABLES:
+        name = f"{slug(info.name)}.{name or row.sub}"
+    return ObjectText(name, row.data_type, row.unit, row.factor, EDS)
+
+
+def _power_on(row: EdsEntry, node_id: int) -> bytes | None:
+    """Return the bytes of a number; None where there is none."""
+    if row.default is None or not row.data_type.is_integer:
+        return None
+    if not row.relative:
+        return row.default
+    number = int.from_bytes(row.default, "little") + node_id
+    size = row.data_type.size
+    return (number % (1 << 8 * size)).to_bytes(size, "little")
+
+
+STORE: Final = 0x1010
+SAVE: Final = b"save"
+DEVICE_TYPE: Final = (0x1000, 0)
+HEARTBEAT_TIME: Final = (0x1017, 0)
+STATUSWORD: Final = (0x6041, 0)
+STATUSWORD_BYTES: Final = 2
+DRIVE_PROFILE: Final = 402
+SEVERAL_PROFILES: Final = 0xFFFF
+DRIVE_WORDS: Final = (0x6040, 0x6041)
+COMMUNICATION: Final = range(0x1000, 0x2000)
+"""Objects that say how the others travel."""
+
+Entry = tuple[int, int]
+
+
+class NodeMemory:
+    """The values of a node's objects, as far as they are known.
+
+    A value that was written lasts until the node boots; then those count that it had
+    before, unless it has stored them (1010h).
+
+    Args:
+        eds: what its file says; power-on values count until traffic says otherwise.
+    """
+
+    def __init__(self, eds: EdsObjects | None = None) -> None:
+        self.eds = eds or EdsObjects()
+        self._power_on: dict[Entry, bytes] = {}
+        self._now: dict[Entry, bytes] = {}
+        self._written: set[Entry] = set()
+        self._has_statusword = False
+
+    def read(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was uploaded."""
+        self._keep(entry, data)
+        if entry not in self._written:
+            self._power_on[entry] = data
+
+    def written(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was downloaded and confirmed."""
+        if entry[0] == STORE:
+            if data == SAVE:
+                self._power_on, self._written = dict(self._now), set()
+            return
+        self._keep(entry, data)
+        self._written.add(entry)
+
+    def _keep(self, entry: Entry, data: bytes) -> None:
+        if entry[0] in COMMUNICATION:
+            self._now[entry] = data
+        elif entry == STATUSWORD and len(data) == STATUSWORD_BYTES:
+            self._has_statusword = True
+
+    def boot(self) -> bool:
+        """Go back to power-on values; return whether that changes any."""
+        changed = self._now != self._power_on
+        self._now, self._written = dict(self._power_on), set()
+        return changed
+
+    @property
+    def indices(self) -> set[int]:
+        """The objects of which a value is known."""
+        return {index for values in (self._now, self.eds.values) for index, _ in values}
+
+    def number(self, index: int, sub: int) -> int | None:
+        """Return a value; None where nobody told it."""
+        data = self._now.get((index, sub), self.eds.values.get((index, sub)))
+        return None if data is None else int.from_bytes(data, "little")
+
+    def was_heard(self, entry: Entry) -> bool:
+        """Say whether traffic told a value."""
+        return entry in self._now
+
+    def source(self, index: int) -> str:
+        """Say where the values of an object come from: traffic, where it told any."""
+        entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
+        if any(entry in self._now for entry in entries):
+            return SEEN
+        return EDS if any(entry in self.eds.values for entry in entries) else ""
+
+    def maps_statusword(self) -> None:
+        """Learn that a PDO carries 16 bits of 6041h."""
+        self._has_statusword = True
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a drive of CiA 402.
+
+        Its device type says so; where that is not known or has several profiles, 6041h:00 with
+        16 bits does.
+        """
+        device_type = self.number(*DEVICE_TYPE)
+        if device_type is None or device_type >> 16 == SEVERAL_PROFILES:
+            return self._has_statusword
+        return device_type & 0xFFFF == DRIVE_PROFILE
+
+    def describe(self, index: int, sub: int) -> ObjectText:
+        """Return what is known of an object; the words of a drive have the names of CiA 402."""
+        told, standard = self.eds.texts.get((index, sub)), describe_standard(index, sub)
+        if told is None:
+            told = standard
+        elif standard is not None:
+            told = told._replace(in_hex=standard.in_hex)
+        if self.is_drive and (told is None or index in DRIVE_WORDS):
+            text = describe_drive(index, sub) or ObjectText()
+            return text if told is None else text._replace(source=told.source)
+        return told or ObjectText()

@@ -1,1 +1,0 @@
-"""What was heard of each node, and the board of all."""

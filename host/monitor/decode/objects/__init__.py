@@ -1,1 +1,0 @@
-"""What is known of objects: by standard, by EDS, by what was heard."""

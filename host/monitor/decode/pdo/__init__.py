@@ -1,1 +1,0 @@
-"""PDOs decoded: by mapping, by evidence, by DBC."""

@@ -1,0 +1,52 @@
+"""What a monitor takes in: frames and lines of serial ports, with when and where."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+
+class Heard(NamedTuple):
+    """One frame or error frame, as it was on the bus.
+
+    Attributes:
+        at_us: when it had ended, microseconds; since the epoch in logs and on real buses.
+        channel: name of the bus, without blanks.
+        frame: the frame.
+        sent: this program sent it.
+    """
+
+    at_us: int
+    channel: str
+    frame: CanFrame | ErrorFrame
+    sent: bool = False
+
+
+class HeardLine(NamedTuple):
+    """A message of a serial line, beside `Heard` in one trace; filters take both.
+
+    Attributes:
+        at_us: when its last byte was heard.
+        channel: name of the line.
+        sent: the host sent it, to the device.
+        data: its bytes, without line end or header.
+        decoded: what it says.
+    """
+
+    at_us: int
+    channel: str
+    sent: bool
+    data: bytes
+    decoded: Decoded
+
+    @property
+    def frame(self) -> None:
+        """No frame of a CAN bus."""
+        return None
+
+
+Listened = Heard | HeardLine
+"""What a trace of buses and serial lines is made of."""

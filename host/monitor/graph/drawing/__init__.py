@@ -1,1 +1,0 @@
-"""Curves drawn: braille, SVG, PNG, HTML, CSV."""

@@ -1,0 +1,172 @@
+r"""Frames as lines of JSON and CSV, and in candump's compact notation.
+
+>>> csv_row(Heard(1_500_000, "can0", CanFrame(0x705, b"\x7f"), sent=True))
+'1.500000,0x705,0,0,0,1,fw==>'
+
+>>> str(parse_frame("123#0011223344556677_C")), str(parse_frame("20000080#01"))
+('123#0011223344556677', '20000080#0100000000000000')
+"""
+
+from __future__ import annotations
+
+import re
+from binascii import a2b_base64, b2a_base64
+from typing import Any, Final
+
+from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.logs.log_file import to_us
+from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
+from tickrig.wire.errors import WireError
+
+_CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
+_ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
+
+
+def parse_frame(notation: str) -> CanFrame | ErrorFrame:
+    """Read a frame; WireError if that is none.
+
+    The raw length code behind eight bytes is passed over; an error frame may have less
+    than eight bytes.
+    """
+    if error := _ERROR.fullmatch(notation):
+        data = bytes.fromhex(error[2]).ljust(8, b"\0")
+        return ErrorFrame(int(error[1], 16) & ERROR_CLASS_MASK, data)
+    coded = _CODED.fullmatch(notation)
+    return CanFrame.parse(coded[1] if coded else notation)
+
+
+VERSION: Final = 1
+LINE_EVENT: Final = "line"
+"""A line of a serial port, which no log of CAN holds."""
+
+
+def json_line(heard: Heard, more: str = "") -> str:
+    """Write a frame; `more` are further members, each with its comma in front.
+
+    >>> json_line(Heard(1_500_000, "can0", CanFrame(0x185, b"7")))
+    '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
+    """
+    at_us, channel, frame, sent = heard
+    if isinstance(frame, ErrorFrame):
+        what = f'"id":{frame.error_class},"x":0,"err":1'
+    else:
+        remote = f',"rtr":{frame.dlc}' if frame.remote else ""
+        what = f'"id":{frame.can_id},"x":{frame.extended:d}{remote}'
+    return (
+        f'{{"v":{VERSION},"t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},"ch":{_quoted(channel)},'
+        f'{what},"dir":"{"tx" if sent else "rx"}","data":"{frame.data.hex().upper()}"{more}}}'
+    )
+
+
+def drop_line(lost: int) -> str:
+    """Write that frames were lost.
+
+    >>> drop_line(12)
+    '{"v":1,"ev":"drop","n":12}'
+    """
+    return f'{{"v":{VERSION},"ev":"drop","n":{lost}}}'
+
+
+def parse_json_line(text: str, tally: Tally) -> Heard | str | None:
+    """Return a frame, the name of an event, or None for anything else."""
+    import json  # noqa: PLC0415 - candump's lines are the usual ones
+
+    try:
+        said = json.loads(text)
+        if "ev" in said:
+            return _event(said, tally)
+        return Heard(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, WireError):
+        return None
+
+
+def _event(said: dict[str, Any], tally: Tally) -> str:
+    """Take an event; one that is not known says nothing to us."""
+    if said["ev"] == "drop":
+        tally.lost += max(0, int(said["n"]))
+    elif said["ev"] == LINE_EVENT:
+        tally.passed_over[SERIAL_LINES] += 1
+    return str(said["ev"])
+
+
+def _name(channel: object) -> str:
+    name = str(channel)
+    if name.split() != [name]:
+        raise ValueError(f"channel {name!r} is not a name without blanks")
+    return name
+
+
+def _frame(said: dict[str, Any]) -> CanFrame | ErrorFrame:
+    data = bytes.fromhex(said["data"])
+    if said.get("err"):
+        return ErrorFrame(int(said["id"]) & 0x1FFF_FFFF, data[:8].ljust(8, b"\0"))
+    remote = said.get("rtr")
+    frame = CanFrame(int(said["id"]), data, remote is not None, bool(said["x"]), int(remote or 0))
+    return frame.checked()
+
+
+def _quoted(text: str) -> str:
+    """Quote a name; nearly all need no care."""
+    if text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
+        return f'"{text}"'
+    import json  # noqa: PLC0415 - slow
+
+    return json.dumps(text)
+
+
+LOG_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
+UNNAMED: Final = "can0"
+"""What a bus without a name or number is called."""
+
+SENT: Final = ">"
+_DUMPED: Final = re.compile(
+    r"([0-9]{1,12}\.[0-9]{6}),([^,\"\s]{1,32}),([0-9A-Fa-f]*),([rt]x),[0-9]+,"
+    r"(R[0-8]?|[0-9A-Fa-f]*),.*"
+)
+
+
+def csv_row(heard: Heard) -> str:
+    """Write a frame below `LOG_HEADER`."""
+    at_us, _, frame, sent = heard
+    if isinstance(frame, ErrorFrame):
+        what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
+    else:
+        what = f"{frame.can_id:#x},{frame.extended:d},{frame.remote:d},0,{frame.dlc}"
+    data = b2a_base64(frame.data, newline=False).decode("ascii")
+    return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{SENT * sent}"
+
+
+def parse_csv_line(text: str, tally: Tally) -> Heard | str | None:
+    """Return a frame, the name of a header or of what was counted instead, or None."""
+    if text.startswith((LOG_HEADER, DUMP_HEADER)):
+        return text
+    try:
+        if match := _DUMPED.fullmatch(text):
+            return _dumped(match, tally)
+        return _logged(text.split(","))
+    except (ValueError, WireError):
+        return None
+
+
+def _dumped(match: re.Match[str], tally: Tally) -> Heard | str:
+    stamp, channel, ident, direction, data = match.groups()
+    if not ident:
+        tally.passed_over[SERIAL_LINES] += 1
+        return SERIAL_LINES
+    return Heard(to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx")
+
+
+def _logged(cells: list[str]) -> Heard:
+    stamp, ident, extended, remote, error, dlc, text = cells
+    data, can_id, length = a2b_base64(text), int(ident, 16), int(dlc)
+    frame: CanFrame | ErrorFrame
+    if error == "1":
+        frame = ErrorFrame(can_id & ERROR_CLASS_MASK, data[:8].ljust(8, b"\0"))
+    elif remote == "1":
+        frame = CanFrame(can_id, b"", True, extended == "1", length).checked()
+    else:
+        frame = CanFrame(can_id, data, False, extended == "1").checked()
+    return Heard(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))

@@ -1,0 +1,44 @@
+"""Draw the monitor into an SVG file, as it shows a log.
+
+`python tools/canmon_picture.py run.log picture.svg o` presses `o`, too.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.opening import open_session
+from tickrig.host.cli.can_options import BusOptions
+
+SIZE: Final = (110, 26)
+
+
+def picture(log: str, keys: Sequence[str] = ()) -> str:
+    """Return the monitor as SVG when it has read a log and keys were pressed."""
+    return asyncio.run(_draw(log, keys))
+
+
+async def _draw(log: str, keys: Sequence[str]) -> str:
+    session = open_session([log], BusOptions(), Model())
+    while not session.model.ended:
+        session.step()
+    monitor = Monitor(session, [panel(session) for panel in PANELS])
+    async with monitor.run_test(size=SIZE) as pilot:
+        await pilot.press(*keys)
+        monitor.look()
+        await pilot.pause()
+        svg = monitor.export_screenshot(title="canmon tui")
+    session.close()
+    session.source.close()
+    return svg
+
+
+if __name__ == "__main__":
+    Path(sys.argv[2]).write_text(picture(sys.argv[1], sys.argv[3:]), "utf-8")
