@@ -34,7 +34,7 @@ MODULE_CIRCLES = [
 ROOM_CIRCLES = {
     "tickrig.device.canopen": "bus, pdo",
     "tickrig.device.canopen.ds402": "modes, motion, objects, state",
-    "tickrig.emulators": "bench, control, record, rig, scenario; commands, fig120, canopen",
+    "tickrig.emulators": "commands, fig120, canopen",
     "tickrig.emulators.urg": "cli, emulate",
     "tickrig.host.canmon": "output, sources",
     "tickrig.host.canmon.tui": "panels, settings, tasks, widgets",

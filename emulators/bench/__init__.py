@@ -1,1 +1,1 @@
-"""A running emulator and what can be done to it: operator, wire log, requests, process."""
+"""A running emulator and what can be done to it: operator, faults, requests, transcript."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.emulators.bench.emulated import look_at
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.scenario.fault_spec import parse_fault_spec
+from tickrig.emulators.rig.emulated import look_at
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER

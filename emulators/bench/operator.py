@@ -6,10 +6,10 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Final, Protocol
 
 from tickrig.device.physical import SignalType
-from tickrig.emulators.bench.emulated import Inputs
+from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.names import known
+from tickrig.emulators.rig.emulated import Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.scenario.fault_spec import FaultSpec
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from tickrig.emulators.bench.emulated import HasSignals
 from tickrig.emulators.bench.operator import Operator, WireFaults
-from tickrig.emulators.bench.wire_log import WireLog
+from tickrig.emulators.record.wire_log import WireLog
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.rig import Rig
 from tickrig.wire.instant import NEVER

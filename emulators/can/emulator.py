@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tickrig.emulators.bench.emulated import HasSignals
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.end import Accepted, CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge
@@ -14,6 +13,7 @@ from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.coupling import Coupling
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState

@@ -10,6 +10,7 @@ from typing import Final
 import click
 
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.emulators.bench.frame_transcript import FrameTranscript
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.outside_bus import open_bus
@@ -22,7 +23,6 @@ from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.candump_file import CandumpFile
-from tickrig.emulators.record.frame_transcript import FrameTranscript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser, Send
 from tickrig.host.cli.can_options import BusOptions

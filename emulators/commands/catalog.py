@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.record.trace import Config, Header
 from tickrig.emulators.rh3.build import NAME as RH3
 from tickrig.emulators.rh3.build import build_rh3
+from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rrc.build import NAME as RRC
 from tickrig.emulators.rrc.build import build_rrc
 from tickrig.emulators.rtc_lite.build import NAME as RTC_LITE

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser
 from tickrig.host.cli.messages import say, warnings_shown

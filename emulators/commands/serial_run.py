@@ -10,13 +10,13 @@ from pathlib import Path
 
 import click
 
-from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.trace import Config, Header
-from tickrig.emulators.record.transcript import Transcript
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Encoder, Line, ScenarioParser, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineSettings

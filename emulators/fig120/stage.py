@@ -11,13 +11,13 @@ import canopen
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.bench.emulated import look_at
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
+from tickrig.emulators.rig.emulated import look_at
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused

@@ -1,1 +1,1 @@
-"""Runs recorded and replayed: traces, candump logs, transcripts."""
+"""Runs recorded and replayed: wire logs, traces, candump files."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from tickrig.device.physical import Output
-from tickrig.emulators.bench.emulated import Emulated, Inputs
 from tickrig.emulators.record.trace import RESET, Header, Mark, Record
+from tickrig.emulators.rig.emulated import Emulated, Inputs
 from tickrig.host.text.log import log_of
 from tickrig.host.text.values import Setting
 

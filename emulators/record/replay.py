@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from tickrig.emulators.bench.emulated import Emulated
 from tickrig.emulators.record.trace import (
     RESET,
     Header,
@@ -17,6 +16,7 @@ from tickrig.emulators.record.trace import (
     parse_header,
     parse_records,
 )
+from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.instant import NEVER
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from tickrig.device.rh3.base import Rh3Base
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.build import NAME, config_to_trace
 from tickrig.emulators.rh3.frame_log import frame_splitter

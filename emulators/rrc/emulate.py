@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
 from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rrc.build import NAME, config_to_trace
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.wire.rrc.check import check_digit

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import Control
-from tickrig.emulators.record.transcript import Transcript
+from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.rrc.build import NAME
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario.player import Player

@@ -8,8 +8,8 @@ import click
 
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
 from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
 from tickrig.emulators.rtc_lite.faults import LINE_FAULTS

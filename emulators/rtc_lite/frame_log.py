@@ -11,8 +11,8 @@ from typing import Final
 
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, Receiver
-from tickrig.emulators.bench.wire_log import Splitter
 from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import Splitter
 from tickrig.wire.rtc_lite.codes import LinkFault
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Framing

@@ -1,1 +1,1 @@
-"""Scenario files, their player, and how a fault is written."""
+"""Scenario files and their player."""

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import assert_never
 
+from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
-from tickrig.emulators.record.transcript import Transcript
-from tickrig.emulators.scenario.fault_spec import FaultSpec
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.scenario.scenario import (
     Clear,
     End,

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.emulators.bench.emulated import HasSignals
+from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
 from tickrig.emulators.record.byte_text import unescape
-from tickrig.emulators.scenario.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.host.text.values import Setting, parse_setting, parse_time_us
 
 Encoder = Callable[[bytes], bytes]

@@ -9,9 +9,9 @@ from typing import Any, Final
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun, by_miniterm
 from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.build import (

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.scenario.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.serial.emulator import Emulator
 
 

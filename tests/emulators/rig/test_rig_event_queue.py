@@ -15,6 +15,8 @@ from tests.emulators.canopen.dimmer import Dimmer
 from tests.emulators.lamp import Lamp
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.channels import CHANNELS
 from tickrig.emulators.can.outside.host import CanHost
@@ -23,11 +25,9 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.eds.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.record.transcript import Transcript
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.rig_clock import RigClock
 from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.scenario.fault_spec import parse_fault_spec
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.record.transcript import Transcript
-from tickrig.emulators.scenario.fault_spec import FaultSpec
+from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import (
     End,

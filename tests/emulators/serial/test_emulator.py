@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.bench.wire_log import WireLog
 from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import WireLog
 from tickrig.emulators.serial.emulator import Emulator
 
 

@@ -6,12 +6,12 @@ import pytest
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.eds.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.scenario.fault_spec import parse_fault_spec
 
 EDS = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 DESCRIPTION = read_eds(EDS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.record.transcript import Transcript
+from tickrig.emulators.bench.transcript import Transcript
 
 
 class FrameTranscript(Transcript):

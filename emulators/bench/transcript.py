@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.emulators.bench.emulated import look_at
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.emulated import look_at
 from tickrig.host.text.values import Setting, format_time
 
 STATE: Final = "state"
