@@ -7,14 +7,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Final
 
 from tickrig.host.cli.refused import refuse_path
+from tickrig.host.cli.start import TERMINATING
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.control.server import ControlServer
-
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
@@ -24,7 +22,7 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
     def received(number: int, frame: FrameType | None) -> None:
         stop()
 
-    before = {number: signal.signal(number, received) for number in ENDING}
+    before = {number: signal.signal(number, received) for number in (signal.SIGINT, *TERMINATING)}
     try:
         yield
     finally:

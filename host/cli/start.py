@@ -17,6 +17,12 @@ INTERRUPTED: Final = 128 + signal.SIGINT
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What a full disk says, and a terminal that is gone."""
 
+if sys.platform == "win32":
+    TERMINATING: Final = (signal.SIGTERM,)
+else:
+    TERMINATING: Final = (signal.SIGTERM, signal.SIGHUP)
+"""Signals beside Ctrl-C that end a program, the latter when its terminal is closed."""
+
 UNWRITTEN: Final = 3
 """Exit status where standard output takes nothing more."""
 

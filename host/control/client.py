@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import socket
 from typing import TYPE_CHECKING, Final, Self
 
 from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.control.unix_socket import unix_socket
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,7 +31,7 @@ class ControlClient:
     """
 
     def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
-        self._socket = socket.socket(socket.AF_UNIX)
+        self._socket = unix_socket()
         self._socket.settimeout(timeout_s)
         self._received = b""
         try:

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import socket
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MAX_PATH_BYTES: Final = 107
 """What the kernel takes, beside the zero at the end (unix(7), sun_path)."""
+
+
+def unix_socket() -> socket.socket:
+    """Return a new Unix socket.
+
+    Raises:
+        OSError: this system has none: Python knows none on Windows.
+    """
+    if sys.platform == "win32":
+        raise OSError(errno.EAFNOSUPPORT, "there are no Unix sockets on Windows")
+    else:  # noqa: RET506 - mypy leaves out the branch of the other system
+        return socket.socket(socket.AF_UNIX)
 
 
 def listen_at(path: Path) -> socket.socket:
@@ -25,7 +39,7 @@ def listen_at(path: Path) -> socket.socket:
         FileExistsError: a live process listens there, or it is not a socket.
         OSError: no socket can be made there.
     """
-    listener = socket.socket(socket.AF_UNIX)
+    listener = unix_socket()
     try:
         with _alone_in(path.parent):
             _check(path)
@@ -44,7 +58,10 @@ def _alone_in(folder: Path) -> Iterator[None]:
     """Let two that begin at once do so one after the other."""
     held = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(held, fcntl.LOCK_EX)
+        if sys.platform != "win32":
+            import fcntl  # noqa: PLC0415 - not on Windows
+
+            fcntl.flock(held, fcntl.LOCK_EX)
         yield
     finally:
         os.close(held)
@@ -84,6 +101,6 @@ def _is_socket(path: Path) -> bool:
 
 
 def _is_live(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as probe:
+    with unix_socket() as probe:
         probe.setblocking(False)
         return probe.connect_ex(str(path)) != errno.ECONNREFUSED

@@ -74,17 +74,16 @@ def keep_to_group(bus: can.BusABC, interface: str) -> None:
     comes on that port for any group that any program of this machine has joined (ip(7),
     IP_MULTICAST_ALL). Elsewhere there is no such option, and no need.
     """
-    if interface != INTERFACE or sys.platform != "linux":
-        return
-    with socket.socket(fileno=os.dup(bus.fileno())) as sock:
-        with suppress(OSError):  # IPv6 before Linux 4.20
-            if sock.family == socket.AF_INET6:
-                sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
-            else:
-                sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
-        with suppress(BlockingIOError):
-            while True:  # what came before
-                sock.recv(1, socket.MSG_DONTWAIT)
+    if sys.platform == "linux" and interface == INTERFACE:
+        with socket.socket(fileno=os.dup(bus.fileno())) as sock:
+            with suppress(OSError):  # IPv6 before Linux 4.20
+                if sock.family == socket.AF_INET6:
+                    sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+                else:
+                    sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+            with suppress(BlockingIOError):
+                while True:  # what came before
+                    sock.recv(1, socket.MSG_DONTWAIT)
 
 
 SEND_TIMEOUT_S = 1

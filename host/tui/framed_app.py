@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from typing import ClassVar, Final
+import sys
+from typing import ClassVar
 
 from textual.app import App
 from textual.binding import Binding, BindingType
 
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from tickrig.host.cli.start import TERMINATING
 
 
 class FramedApp(App[None]):
@@ -26,10 +27,11 @@ class FramedApp(App[None]):
     ]
 
     def on_mount(self) -> None:
-        """Let signals end it."""
-        loop = asyncio.get_running_loop()
-        for number in ENDING:
-            loop.add_signal_handler(number, self.exit)
+        """Let signals end it; an event loop of Windows takes none."""
+        if sys.platform != "win32":
+            loop = asyncio.get_running_loop()
+            for number in (signal.SIGINT, *TERMINATING):
+                loop.add_signal_handler(number, self.exit)
 
     @property
     def helps(self) -> bool:

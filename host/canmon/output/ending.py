@@ -6,14 +6,13 @@ import signal
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Final, NoReturn
+from typing import NoReturn
 
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import AnySource
-
-ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
+from tickrig.host.cli.start import TERMINATING
 
 
 class FramesLost(click.ClickException):
@@ -47,7 +46,7 @@ def until_interrupted() -> Iterator[None]:
     def received(number: int, frame: FrameType | None) -> NoReturn:
         raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, received) for number in ENDING}
+    before = {number: signal.signal(number, received) for number in TERMINATING}
     try:
         yield
     except KeyboardInterrupt:

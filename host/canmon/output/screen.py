@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 import select
-import termios
-import tty
 from collections.abc import Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import Final, Self
+
+from tickrig.host.links.terminal import take_keys
 
 ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
 """Alternate screen, no cursor, no wrapping, all clear."""
@@ -22,8 +23,6 @@ ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
 
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
 TERMINAL: Final = "/dev/tty"
-CONTROL_CHARACTERS: Final = 6
-"""Their place in what `termios.tcgetattr` returns."""
 
 
 class Screen:
@@ -37,16 +36,12 @@ class Screen:
 
     def __init__(self) -> None:
         self._terminal = os.open(TERMINAL, os.O_RDWR)
-        self._before = termios.tcgetattr(self._terminal)
         self._painted: list[str] = []
         self._size = (0, 0)
 
     def __enter__(self) -> Self:
         """Take the terminal."""
-        tty.setcbreak(self._terminal)
-        modes = termios.tcgetattr(self._terminal)
-        modes[CONTROL_CHARACTERS][termios.VSUSP] = b"\0"  # Ctrl-Z would leave it half taken
-        termios.tcsetattr(self._terminal, termios.TCSANOW, modes)
+        self._give_back = take_keys(self._terminal)
         self._write(ENTER)
         return self
 
@@ -57,11 +52,9 @@ class Screen:
         trace: TracebackType | None,
     ) -> None:
         """Give it back."""
-        try:
+        with suppress(OSError):  # it is gone
             self._write(LEAVE)
-            termios.tcsetattr(self._terminal, termios.TCSAFLUSH, self._before)
-        except (OSError, termios.error):
-            pass  # it is gone
+        self._give_back()
         os.close(self._terminal)
 
     def size(self) -> tuple[int, int]:

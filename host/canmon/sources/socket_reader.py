@@ -40,7 +40,10 @@ _FLAGS_AT: Final = 4  # flags of struct canxl_frame, where others have a length 
 _XL_FLAG: Final = 0x80
 _STAMP: Final = struct.Struct("@ll")
 _COUNT: Final = struct.Struct("@I")
-_ANCILLARY: Final = socket.CMSG_SPACE(_STAMP.size) + socket.CMSG_SPACE(_COUNT.size)
+_ANCILLARY_BYTES: Final = 128
+"""Room for time and count with their heads; CMSG_SPACE would say 56, where there is one."""
+
+MSG_CONFIRM: Final = 0x800
 
 
 class SocketReader:
@@ -60,7 +63,7 @@ class SocketReader:
 
     def __init__(self, bus: Any, name: str) -> None:
         self._bus, self.name = bus, name
-        self._socket: socket.socket = bus.socket
+        self._socket: Any = bus.socket  # on Windows a socket has no recvmsg, and no such bus
         self.lost, self.tally = 0, Tally()
         self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
         for option in (CAN_RAW_FD_FRAMES, CAN_RAW_XL_FRAMES):
@@ -75,7 +78,7 @@ class SocketReader:
         select([self._socket], [], [], timeout_us / 1e6)
         try:
             while len(heard) < BATCH:
-                heard += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY))
+                heard += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
         except BlockingIOError:
             pass
         except OSError as error:
@@ -100,7 +103,7 @@ class SocketReader:
         if len(data) != _FRAME.size:
             self.tally.passed_over[CAN_XL if data[_FLAGS_AT] & _XL_FLAG else CAN_FD] += 1
             return ()
-        sent = bool(flags & socket.MSG_CONFIRM)  # by this very socket (linux, networking/can)
+        sent = bool(flags & MSG_CONFIRM)  # by this very socket (linux, networking/can)
         return (Heard(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-import termios
 from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.terminal import take_keys
 from tickrig.host.motion.options.pad import Hand
 
 KEYS: Final[Mapping[str, Hand]] = {
@@ -31,6 +31,9 @@ class KeyboardPad:
     Args:
         fd: of the terminal, standard input unless given.
 
+    Attributes:
+        close: lets the terminal be as it was.
+
     Raises:
         LinkClosed: it is no terminal.
     """
@@ -38,13 +41,9 @@ class KeyboardPad:
     def __init__(self, fd: int | None = None) -> None:
         self._fd = sys.stdin.fileno() if fd is None else fd
         try:
-            self._before = termios.tcgetattr(self._fd)
-        except termios.error as error:
-            raise LinkClosed(f"the keyboard is no terminal: {error.args[-1]}") from error
-        raw = termios.tcgetattr(self._fd)
-        raw[3] &= ~(termios.ICANON | termios.ECHO)
-        raw[6][termios.VMIN] = raw[6][termios.VTIME] = 0
-        termios.tcsetattr(self._fd, termios.TCSANOW, raw)
+            self.close = take_keys(self._fd)
+        except OSError as error:
+            raise LinkClosed(f"the keyboard is no terminal: {error.strerror}") from error
         self._hand, self._until_us = Hand(), 0
 
     def poll(self, now_us: int, /) -> Hand:
@@ -53,7 +52,3 @@ class KeyboardPad:
             if key in KEYS:
                 self._hand, self._until_us = KEYS[key], now_us + HOLD_US
         return self._hand if now_us < self._until_us else Hand()
-
-    def close(self) -> None:
-        """Let the terminal be as it was."""
-        termios.tcsetattr(self._fd, termios.TCSANOW, self._before)

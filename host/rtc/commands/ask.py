@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +29,10 @@ def default_path() -> Path:
         return Path(folder, "tickrig-rtc")
     import tempfile  # noqa: PLC0415 - slow
 
-    return Path(tempfile.gettempdir(), f"tickrig-rtc-{os.getuid()}")
+    name = "tickrig-rtc"
+    if sys.platform != "win32":
+        name += f"-{os.getuid()}"
+    return Path(tempfile.gettempdir(), name)
 
 
 at: Final[Decorator] = click.option(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import TERMINATING
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
@@ -30,8 +31,6 @@ from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.host.rtc_canopen.server import Server
-
-ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @click.command(cls=BusCommand)
@@ -119,7 +118,7 @@ def _stopped_by_signals() -> Iterator[list[int]]:
     def receive(number: int, frame: FrameType | None) -> None:
         received.append(number)
 
-    before = {number: signal.signal(number, receive) for number in ENDING}
+    before = {number: signal.signal(number, receive) for number in (signal.SIGINT, *TERMINATING)}
     try:
         yield received
     finally:
