@@ -11,7 +11,7 @@ from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.host.rtc_canopen.definition.definition import RtConnection, SystemDefinition
-from tickrig.host.rtc_canopen.definition.definition_file import read_definition
+from tickrig.host.rtc_canopen.definition.definition_reader import read_definition
 from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.server import Server
 

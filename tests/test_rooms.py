@@ -42,7 +42,6 @@ ROOM_CIRCLES = {
     "tickrig.host.monitor.logs.reading": "can_log, log_reader",
     "tickrig.host.monitor.logs.writing": "can_log_writer, log_writer",
     "tickrig.host.rtc": "component, execution, ports, errors, system",
-    "tickrig.host.rtc_canopen": "definition, node, own_objects, proxy",
 }
 
 

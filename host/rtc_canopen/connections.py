@@ -1,17 +1,24 @@
-"""Connectors that are wanted, made as soon as both ports are there."""
+"""What joins nodes: connectors of ports through the PC, and PDO links without it (Fig. 120)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+
+from tickrig.host.canopen.dialogue import Failure, Job
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_canopen.definition.definition import RtConnection
+from tickrig.host.rtc_canopen.definition.definition import PdoEntry, PdoLink, PdoName, RtConnection
+from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import EventKind, Note
+from tickrig.host.rtc_canopen.node.boot import set_pdo
+from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 
 
 class Connections:
-    """Makes connectors, and keeps in mind those that go with a component.
+    """Makes connectors as soon as both ports are there; keeps those of a component that goes.
 
     Args:
         manager: has the ports.
@@ -87,3 +94,107 @@ def are_there(manager: Manager, entry: RtConnection) -> bool:
 def _entry(profile: ConnectorProfile) -> RtConnection:
     source, target = profile.ports
     return RtConnection(source, target, dict(profile.properties))
+
+
+class Links:
+    """Makes PDO links when both nodes are ready: an RPDO receives the TPDO of another node.
+
+    Args:
+        nodes: by node-ID.
+        links: those of the System Definition.
+        note: told what became of each.
+
+    Attributes:
+        links: all that are wanted.
+    """
+
+    def __init__(
+        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], note: Note
+    ) -> None:
+        self._nodes, self._note = nodes, note
+        self.links = list(links)
+        self._made: dict[PdoLink, int] = {}  # by which CAN-ID
+
+    def add(self, now_us: int, link: PdoLink) -> None:
+        """Want a link, and make it; ServerRefused if it cannot be now."""
+        for other in self.links:
+            if other.target == link.target:
+                raise ServerRefused(f"{other.source} and {other.target} are linked")
+        self._check(link)
+        self.links.append(link)
+        self._make(now_us, link)
+
+    def remove(self, now_us: int, link: PdoLink) -> None:
+        """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
+        if link not in self.links:
+            raise ServerRefused(f"{link.source} and {link.target} are not linked")
+        own = self.layout(link.target).cob_id
+        self.links.remove(link)
+        self._made.pop(link, None)
+        self._write(now_us, link, own, linked=False)
+
+    def make(self, now_us: int, node_id: int) -> None:
+        """Make those of a node that has become ready; a target that stayed still has its own."""
+        for link in self.links:
+            if link.target.node == node_id:
+                self._made.pop(link, None)
+            ends = (link.source.node, link.target.node)
+            if node_id in ends and all(self._ready(end) for end in ends):
+                try:
+                    self._check(link)
+                except ServerRefused as error:
+                    self._note(EventKind.LINK_REFUSED, link.target.node, str(error))
+                else:
+                    self._make(now_us, link)
+
+    def layout(self, name: PdoName) -> PdoLayout:
+        """Return a PDO of a node that is ready; ServerRefused if it has none."""
+        if name.node not in self._nodes or not self._ready(name.node):
+            raise ServerRefused(f"node {name.node} is not ready")
+        return find_layout(name, self._nodes[name.node].layouts)
+
+    def _ready(self, node_id: int) -> bool:
+        return self._nodes[node_id].phase is Phase.READY
+
+    def _check(self, link: PdoLink) -> None:
+        check_lengths(link, self.layout(link.source), self.layout(link.target))
+
+    def _make(self, now_us: int, link: PdoLink) -> None:
+        """Give the RPDO the COB-ID of the TPDO."""
+        cob_id = self.layout(link.source).cob_id
+        if self._made.get(link) != cob_id:
+            self._write(now_us, link, cob_id, linked=True)
+
+    def _write(self, now_us: int, link: PdoLink, cob_id: int, *, linked: bool) -> None:
+        node, text = self._nodes[link.target.node], f"{link.source} to {link.target}"
+
+        def done(_: None) -> None:
+            for sink in node.proxy.sinks if node.proxy else ():
+                if sink.layout.index == link.target.index:
+                    sink.linked = linked
+            if linked:
+                self._made[link] = cob_id
+            kind = EventKind.PDO_LINKED if linked else EventKind.PDO_UNLINKED
+            self._note(kind, node.entry.id, f"{text}: {cob_id:03X}h")
+
+        def failed(failure: Failure) -> None:
+            self._note(EventKind.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
+
+        script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
+        node.run(now_us, Job("link", script, done, failed, moves=False))
+
+
+def find_layout(name: PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
+    """Return that of a PDO; ServerRefused if it is off."""
+    for layout in layouts:
+        if layout.index == name.index:
+            return layout
+    raise ServerRefused(f"{name} is off, or not there")
+
+
+def check_lengths(link: PdoLink, source: PdoLayout, target: PdoLayout) -> None:
+    """Raise ServerRefused if what one sends is not as long as what the other takes."""
+    if source.bits != target.bits:
+        raise ServerRefused(
+            f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
+        )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
-from tickrig.host.rtc_canopen.definition.definition_file import read_definition
+from tickrig.host.rtc_canopen.definition.definition_reader import read_definition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile, read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.host.rtc_canopen.server import Server

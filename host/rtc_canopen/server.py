@@ -10,17 +10,13 @@ from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_canopen.connections import Connections
+from tickrig.host.rtc_canopen.connections import Connections, Links
+from tickrig.host.rtc_canopen.data_flow import DataFlow
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
-from tickrig.host.rtc_canopen.definition.links import Links
 from tickrig.host.rtc_canopen.events import EventKind, EventLog
-from tickrig.host.rtc_canopen.node.beat import Beat
-from tickrig.host.rtc_canopen.node.receiver import QUIET_US, Receiver
-from tickrig.host.rtc_canopen.node.served_node import ServedNode
-from tickrig.host.rtc_canopen.node.start_order import StartOrder
-from tickrig.host.rtc_canopen.own_objects import SYNC_COB_ID
-from tickrig.host.rtc_canopen.proxy.data_flow import DataFlow
+from tickrig.host.rtc_canopen.node.receiver import QUIET_US, SYNC_COB_ID, Receiver
+from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -35,6 +31,37 @@ from tickrig.wire.rtc_types.idl import Struct
 
 LATE_US: Final = 100_000
 """A server that looks so much later than it wanted to knows nothing of the nodes meanwhile."""
+
+
+class PeriodicTimer:
+    """Says when a period is over; after a pause once, not for all that were missed.
+
+    >>> timer = PeriodicTimer(100)
+    >>> timer.start(0)
+    >>> [timer.elapsed(now_us) for now_us in (99, 100, 101, 450, 460, 500)]
+    [False, True, False, True, False, True]
+
+    Args:
+        period_us: the period, 0 for none.
+
+    Attributes:
+        due_us: when the next is over; `NEVER` before it was started, and if there is none.
+    """
+
+    def __init__(self, period_us: int) -> None:
+        self._period_us, self.due_us = period_us, NEVER
+
+    def start(self, now_us: int) -> None:
+        """Begin the first period."""
+        if self._period_us:
+            self.due_us = now_us + self._period_us
+
+    def elapsed(self, now_us: int) -> bool:
+        """Whether a period is over; the next is over where it would be without a pause."""
+        if now_us < self.due_us:
+            return False
+        self.due_us = now_us - (now_us - self.due_us) % self._period_us + self._period_us
+        return True
 
 
 class Server:
@@ -73,8 +100,8 @@ class Server:
         self.log, self._out = EventLog(), list[CanFrame]()
         self.now_us, self.due_us, self._nodes_due_us = 0, 0, NEVER
         self._started, self._quiet_us, self._late_us = False, 0, 0
-        self._heartbeat = Beat(1_000 * definition.master.heartbeat_ms)
-        self._sync = Beat(1_000 * definition.master.sync_ms)
+        self._heartbeat = PeriodicTimer(1_000 * definition.master.heartbeat_ms)
+        self._sync = PeriodicTimer(1_000 * definition.master.sync_ms)
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
@@ -82,7 +109,7 @@ class Server:
         self.connections = Connections(self.manager, definition.rt_connections, self.note)
         self._receiver = Receiver(self.nodes, definition, self)
         self._data = DataFlow(self.nodes, self.send, self.note)
-        self._start_order = StartOrder(self.nodes, definition.start_order)
+        self._start_order = tuple(self.nodes[node_id] for node_id in definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
     def tick(self, now_us: int, rx: Stamped, /) -> Frames:
@@ -104,14 +131,14 @@ class Server:
         self.manager.tick(now_us)
         if begins:
             self._carry_out()
-            self._start_order.go_on()
+            self._activate_next()
         self._data.send_values()
-        if self._sync.take(now_us):
+        if self._sync.elapsed(now_us):
             self.send(SYNC_COB_ID, b"")
-        if self._heartbeat.take(now_us):
+        if self._heartbeat.elapsed(now_us):
             self._error_control(NmtState.OPERATIONAL)
-        beats_us = min(self._heartbeat.due_us, self._sync.due_us)
-        self.due_us = min(self._nodes_due_us, self.manager.due_us, beats_us)
+        timers_us = min(self._heartbeat.due_us, self._sync.due_us)
+        self.due_us = min(self._nodes_due_us, self.manager.due_us, timers_us)
         out, self._out = tuple(self._out), []
         return out
 
@@ -142,8 +169,12 @@ class Server:
         return self._data.put(name, value)
 
     def start(self) -> None:
-        """Activate all nodes in the start order, each when those before it are Active."""
-        self._start_order.start()
+        """Activate all nodes in the start order, each when those before it are Active.
+
+        A node that does not come holds up those behind it.
+        """
+        for node in self._start_order:
+            node.to_start = True
 
     def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
         """Take an event."""
@@ -242,6 +273,15 @@ class Server:
             if node.proxy is not None:
                 node.carry_out(self.now_us)
                 self._note_state(node, node.proxy)
+
+    def _activate_next(self) -> None:
+        """Activate the next node of the start order, if it is to start and is ready."""
+        for node in self._start_order:
+            if node.proxy is None or not node.proxy.confirmed:
+                if node.to_start and node.phase is Phase.READY and node.proxy is not None:
+                    node.to_start = False
+                    node.proxy.contexts[0].activate_component(node.proxy)
+                return
 
     def _note_state(self, node: ServedNode, proxy: ProxyRtc) -> None:
         before, state = self._states.get(node.entry.id), proxy.state

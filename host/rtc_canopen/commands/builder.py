@@ -42,7 +42,7 @@ def main(
     if profile is None:
         raise Refused("give a PROFILE, or --example for one to begin with")
     project, files = _build(profile)
-    from tickrig.host.rtc_canopen.builder.summary import summary  # noqa: PLC0415 - the extra [rtc]
+    from tickrig.host.rtc_canopen.builder.build import summary  # noqa: PLC0415 - the extra [rtc]
 
     if out is not None:
         _write(out, files, force=force)

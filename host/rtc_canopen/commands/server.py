@@ -66,7 +66,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _check(file, server)
         return
     if options.pop("dot"):
-        from tickrig.host.rtc_canopen.paper.paper_dot import draw_on_paper  # noqa: PLC0415
+        from tickrig.host.rtc_canopen.offline import draw_on_paper  # noqa: PLC0415
 
         click.echo(draw_on_paper(server))
         return
@@ -84,7 +84,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
 
 
 def _check(file: Path, server: Server) -> None:
-    from tickrig.host.rtc_canopen.paper.paper_check import check_on_paper  # noqa: PLC0415
+    from tickrig.host.rtc_canopen.offline import check_on_paper  # noqa: PLC0415
 
     if mistakes := check_on_paper(server):
         raise Refused("\n".join(f"{file}: {mistake}" for mistake in mistakes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any, Final
 
 import yaml
@@ -40,6 +41,7 @@ from tickrig.host.rtc_canopen.definition.marked_yaml import (
     text,
     whole,
 )
+from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 
 LEAVE: Final = ("pre_operational", "stopped")
@@ -52,6 +54,21 @@ _NAME: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _PDO: Final = re.compile(r"[tr]pdo[1-9][0-9]{0,2}", re.ASCII)
 _NODE_PDO: Final = re.compile(r"([1-9][0-9]{0,2})\.([tr]pdo[1-9][0-9]{0,2})", re.ASCII)
 _PORT: Final = re.compile(r"[A-Za-z_]\w*\.\w+", re.ASCII)
+
+
+def read_definition(path: Path) -> SystemDefinition:
+    """Read a System Definition.
+
+    Raises:
+        OSError: the file cannot be read.
+        DefinitionError: it cannot be used; the line says where and why.
+    """
+    try:
+        return parse_definition(path.read_text("utf-8"))
+    except UnicodeDecodeError as error:
+        raise DefinitionError(f"{path}: byte {error.start} is not UTF-8") from error
+    except ValueError as error:
+        raise DefinitionError(f"{path}: {error}") from error
 
 
 def parse_definition(content: str) -> SystemDefinition:

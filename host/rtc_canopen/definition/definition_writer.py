@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -41,6 +43,27 @@ def _represent(dumper: _Dumper, value: Hex) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(Hex, _represent)
+
+
+def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
+    """Write a System Definition; the file is there whole or as it was.
+
+    Args:
+        definition: what is written.
+        folder: where its EDS files are seen from.
+        path: the file; EDS files are seen from its folder then.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    nodes = tuple(_seen_from(node, folder, path.parent) for node in definition.nodes)
+    text = write_definition(replace(definition, nodes=nodes))
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        beside.write_text(text, "utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def write_definition(definition: SystemDefinition) -> str:
@@ -120,3 +143,9 @@ def _link(link: PdoLink) -> Table:
 def _rt_connection(entry: RtConnection) -> Table:
     ends: Mapping[str, object] = {"from": entry.source, "to": entry.target}
     return {**ends, "properties": dict(entry.properties)} if entry.properties else {**ends}
+
+
+def _seen_from(node: NodeEntry, folder: Path, other: Path) -> NodeEntry:
+    if Path(node.eds).is_absolute() or folder.resolve() == other.resolve():
+        return node
+    return replace(node, eds=os.path.relpath((folder / node.eds).resolve(), other.resolve()))

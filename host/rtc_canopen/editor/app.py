@@ -13,14 +13,11 @@ from textual.containers import Container
 
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc_canopen.editor import joining
-from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.objects_pane import ObjectsPane
-from tickrig.host.rtc_canopen.editor.question import Question
 from tickrig.host.rtc_canopen.editor.session import Session
 from tickrig.host.rtc_canopen.editor.status import event_lines, status_line
-from tickrig.host.rtc_canopen.editor.system_pane import SystemPane
-from tickrig.host.rtc_canopen.editor.system_rows import Item
+from tickrig.host.rtc_canopen.editor.system_pane import Item, SystemPane, connect, link, remove
+from tickrig.host.rtc_canopen.editor.widgets import CursorView, Question
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.host.tui.framed_app import FramedApp
@@ -36,6 +33,7 @@ EVENTS_SHOWN: Final = 500
 Command = Callable[[ServerView], object]
 Join = Callable[[ServerView, Item, Item], None]
 
+JOIN: Final[dict[str, Join]] = {"connect": connect, "link": link}
 ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
     "activate": ServerView.activate,
     "deactivate": ServerView.deactivate,
@@ -177,14 +175,14 @@ class SystemEditor(FramedApp):
         marked, row = self.system.marked, self.system.row
         if marked is None or row is None:
             self._refuse("mark a port or PDO first (m)")
-        elif self._command(lambda view: getattr(joining, how)(view, marked.item, row.item)):
+        elif self._command(lambda view: JOIN[how](view, marked.item, row.item)):
             self.system.marked = None
             self.look()
 
     def action_remove(self) -> None:
         """End the link or connection under the cursor."""
         if (row := self.system.row) is not None:
-            self._command(lambda view: joining.remove(view, row.item))
+            self._command(lambda view: remove(view, row.item))
 
     def action_read(self) -> None:
         """Read the object under the cursor again."""

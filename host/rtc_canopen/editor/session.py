@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.links.link import StampedLink
-from tickrig.host.rtc_canopen.definition.definition_file import save_definition
+from tickrig.host.rtc_canopen.definition.definition_writer import save_definition
 from tickrig.host.rtc_canopen.events import Listener
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.host.rtc_canopen.server import Server

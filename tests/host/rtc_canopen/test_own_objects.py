@@ -7,7 +7,7 @@ import pytest
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.own_objects import OwnObjects
+from tickrig.host.rtc_canopen.node.receiver import OwnObjects
 
 DEFINITION = parse_definition(
     "nodes:\n- {id: 16, name: A, eds: a}\n- {id: 32, name: B, eds: a, heartbeat_ms: 30000}\n"

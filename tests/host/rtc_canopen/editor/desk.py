@@ -15,8 +15,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.cursor_view import CursorView
 from tickrig.host.rtc_canopen.editor.session import Furnish, Session
+from tickrig.host.rtc_canopen.editor.widgets import CursorView
 from tickrig.host.rtc_canopen.events import Event
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.host.tui.line_view import LineView, line_text

@@ -15,7 +15,7 @@ from tests.host.rtc_canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.question import Question
+from tickrig.host.rtc_canopen.editor.widgets import Question
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.wire.rtc_types.basic import TimedShortSeq

@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.rtc import InPort, connect
-from tickrig.host.rtc_canopen.proxy.pdo_layout import lay_out, proxy_index
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PORT_TYPES, lay_out, proxy_index
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
-from tickrig.host.rtc_canopen.proxy.port_types import PORT_TYPES
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_types import basic

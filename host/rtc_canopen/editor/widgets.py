@@ -1,19 +1,37 @@
-"""Lines of which one is under the cursor."""
+"""Widgets of the editor: rows of which one is under the cursor, and a question."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Final, Generic, TypeVar
+from typing import ClassVar, Final, Generic, NamedTuple, TypeVar
 
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import Vertical
 from textual.content import Content
 from textual.events import Blur, Click, Focus
 from textual.message import Message
+from textual.screen import ModalScreen
+from textual.widgets import Input, Label
 
-from tickrig.host.rtc_canopen.editor.row import Row
 from tickrig.host.tui.line_view import Line, LineView, line_width
 
 T = TypeVar("T")
+
+
+class Row(NamedTuple, Generic[T]):
+    """A line, and what it stands for.
+
+    Attributes:
+        key: the same as long as it stands for the same, and that of no other row.
+        line: the text.
+        item: what it stands for.
+    """
+
+    key: str
+    line: Line
+    item: T
+
 
 FOCUSED: Final = "reverse"
 ELSEWHERE: Final = "underline"
@@ -147,3 +165,40 @@ class CursorView(LineView, Generic[T]):
         style = FOCUSED if self.has_focus else ELSEWHERE
         rest = (" " * max(0, self.size.width - line_width(line)), "")
         return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)
+
+
+class Question(ModalScreen[str | None]):
+    """Asks for a line; None is no answer.
+
+    Args:
+        text: the question.
+        answer: what stands there to begin with.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
+    CSS = """
+    Question { align: center middle; }
+    Question Vertical {
+        width: 80%; max-width: 76; height: auto;
+        border: round $accent; background: $surface; padding: 0 1;
+    }
+    """
+
+    def __init__(self, text: str, answer: str) -> None:
+        super().__init__()
+        self._text, self._answer = text, answer
+
+    def compose(self) -> ComposeResult:
+        """Lay it out."""
+        with Vertical():
+            yield Label(self._text, markup=False)
+            yield Input(self._answer, select_on_focus=True, compact=True)
+            yield Label("enter: take it    escape: leave it", classes="dim")
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Take the answer."""
+        self.dismiss(event.value)
+
+    def action_leave(self) -> None:
+        """Take no answer."""
+        self.dismiss(None)

@@ -12,8 +12,7 @@ from tests.host.rtc_canopen.components import add_logger
 from tickrig.host.rtc_canopen.commands.server import main
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.paper.paper_boot import boot_on_paper
-from tickrig.host.rtc_canopen.paper.paper_check import check_on_paper
+from tickrig.host.rtc_canopen.offline import boot_on_paper, check_on_paper
 from tickrig.host.rtc_canopen.serve import open_server, read_files
 from tickrig.host.rtc_canopen.server import Server
 from tickrig.wire.rtc_types.basic import TimedOctet

@@ -1,0 +1,144 @@
+"""What can be said of a System Definition without a bus: its EDS files answer for the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.canopen.script import Ask, Step
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.ports.data_port import InPort
+from tickrig.host.rtc.system.dot import Box, Edge, write_dot
+from tickrig.host.rtc_canopen.connections import are_there, check_lengths, find_layout
+from tickrig.host.rtc_canopen.definition.definition import NodeEntry, PdoLink, PdoName, SdoEntry
+from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
+from tickrig.host.rtc_canopen.errors import ServerRefused
+from tickrig.host.rtc_canopen.node.boot import boot
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc_canopen.server import Server
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import (
+    Abort,
+    DownloadInitiateRequest,
+    DownloadInitiateResponse,
+    DownloadSegmentResponse,
+    Response,
+    Segment,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+    parse_request,
+)
+
+Layouts = tuple[PdoLayout, ...]
+
+
+def boot_on_paper(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> Layouts | None:
+    """Return the PDOs that will be on, None where the EDS does not give the values."""
+    values = dict(file.defaults)
+    script = boot(entry, file, writes)
+    try:
+        step = next(script)
+        while True:
+            step = script.send(_answer(step, values))
+    except StopIteration as end:
+        layouts: Layouts = end.value
+        return layouts
+    except SdoAborted:
+        return None
+
+
+def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None:
+    """Answer as a device that has these values, and takes any."""
+    match parse_request(step.request) if isinstance(step, Ask) else None:
+        case UploadInitiateRequest(index=index, sub=sub):
+            if (data := values.get((index, sub))) is None:
+                return Abort(index, sub, AbortCode.NO_OBJECT)
+            return UploadInitiateResponse(index, sub, data, len(data))
+        case DownloadInitiateRequest(index=index, sub=sub, data=data):
+            values[index, sub] = data or b""
+            return DownloadInitiateResponse(index, sub)
+        case Segment(toggle=toggle):
+            return DownloadSegmentResponse(toggle)
+    return None
+
+
+def check_on_paper(server: Server) -> tuple[str, ...]:
+    """Return what will be refused on the bus, where devices are as their EDS says.
+
+    A node whose EDS leaves values out is not judged, nor is a component that is not there.
+
+    Args:
+        server: it gets proxies of devices that are none, and is of no other use any more.
+    """
+    layouts = dict[int, Layouts]()
+    for node_id, node in server.nodes.items():
+        if (on := boot_on_paper(node.entry, node.file, node.writes)) is not None:
+            layouts[node_id] = on
+    return (
+        *_proxies(server, layouts),
+        *(text for link in server.definition.pdo_links for text in _link(link, layouts)),
+        *_connections(server),
+    )
+
+
+def _proxies(server: Server, layouts: dict[int, Layouts]) -> Iterator[str]:
+    for node_id, on in layouts.items():
+        try:
+            server.manager.add(ProxyRtc(server.nodes[node_id].entry, on))
+        except RtcRefused as error:
+            yield f"nodes: {error}"
+
+
+def _link(link: PdoLink, layouts: dict[int, Layouts]) -> Iterator[str]:
+    ends = [
+        (name, layouts[name.node]) for name in (link.source, link.target) if name.node in layouts
+    ]
+    try:
+        found = [find_layout(name, on) for name, on in ends]
+        if len(found) == 2:
+            check_lengths(link, *found)
+    except ServerRefused as error:
+        yield f"pdo_links: {error}"
+
+
+def _connections(server: Server) -> Iterator[str]:
+    for entry in server.definition.rt_connections:
+        try:
+            if are_there(server.manager, entry):
+                server.manager.connect(entry.source, entry.target, entry.properties)
+        except RtcRefused as error:
+            yield f"rt_connections: {error}"
+
+
+def draw_on_paper(server: Server) -> str:
+    """Return the graph: connections through the PC, and PDO links dashed.
+
+    Args:
+        server: it is of no other use any more, as after `check_on_paper`.
+    """
+    check_on_paper(server)
+    entries = {node.id: node for node in server.definition.nodes}
+
+    def port(name: PdoName) -> str:
+        entry = entries[name.node]
+        return f"{entry.name}.{entry.ports.get(name.pdo, name.pdo)}"
+
+    titles = {node.name: f"node {node.id}" for node in entries.values()}
+    return write_dot(
+        (_box(one, titles.get(one.instance_name, "")) for one in server.manager.components),
+        (
+            *(Edge(*connector.ports) for connector in server.manager.connectors),
+            *(
+                Edge(port(link.source), port(link.target), dashed=True)
+                for link in server.definition.pdo_links
+            ),
+        ),
+    )
+
+
+def _box(component: RtComponent, title: str) -> Box:
+    ins = tuple(name for name, port in component.ports.items() if isinstance(port, InPort))
+    outs = tuple(name for name in component.ports if name not in ins)
+    return Box(component.instance_name, title or component.spec.type_name, ins, outs)
