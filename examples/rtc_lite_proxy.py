@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.rtc_lite.relays import Echo
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.rig_clock import RigClock
 from tickrig.emulators.rig.sim_link import SimLink

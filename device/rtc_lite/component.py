@@ -13,7 +13,7 @@ from tickrig.device.rtc_lite.ports import InPort, OutPort, Port
 from tickrig.device.twin import Copyable
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import Status
-from tickrig.wire.rtc_lite.values import encode_name
+from tickrig.wire.rtc_lite.values import LONG, encode_name
 
 ERROR: Final = Status.ERROR
 """What a callback returns that failed."""
@@ -116,3 +116,28 @@ def _check_ports(kind: str, ports: Iterable[Port[Any]]) -> None:
 
 def _is_in(port: Port[Any]) -> bool:
     return isinstance(port, InPort)
+
+
+class Echo(Component):
+    """One in-port, one out-port, both TimedLong."""
+
+    type_name = "Echo0"
+    inlet = InPort("in", LONG)
+    outlet = OutPort("out", LONG)
+
+    def on_execute(self) -> None:
+        """Hand on what is new."""
+        if self.inlet.is_new:
+            self.outlet.write(self.inlet.read())
+
+
+class LiteA(Echo):
+    """The first RTC-Lite component of the paper's experiments (DECISION L16)."""
+
+    type_name = "LiteA"
+
+
+class LiteB(Echo):
+    """The second one."""
+
+    type_name = "LiteB"

@@ -11,7 +11,11 @@ from typing import Final
 import click
 
 from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.make import application_of, make_device_rtc, make_dictionary
+from tickrig.device.canopen.device_rtc.device import (
+    application_of,
+    make_device_rtc,
+    make_dictionary,
+)
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
 from tickrig.emulators.canopen.node.node import NODE_INPUTS
 from tickrig.host.cli.refused import Refused

@@ -1,13 +1,16 @@
-"""Build a node from the configuration that a trace carries, and the other way."""
+"""Build a node from the configuration that a trace carries, and the other way; find components."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
+from tickrig.device.rtc_lite.component import Component, Echo, LiteA, LiteB
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.record.trace import Config
-from tickrig.emulators.rtc_lite.components import find_component
+from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
@@ -58,3 +61,26 @@ def _context(name: str) -> ContextType:
         return ContextType[name.upper()]
     except KeyError:
         raise ValueError(f"context is {name!r}, proxy or timer is possible") from None
+
+
+COMPONENTS: Final[Mapping[str, type[Component]]] = MappingProxyType(
+    {"echo": Echo, "lite-a": LiteA, "lite-b": LiteB}
+)
+
+
+def find_component(spec: str) -> type[Component]:
+    """Return the component that a name or `FILE.py:Class` stands for.
+
+    Raises:
+        ValueError: there is none, its file cannot be run, or no PIC has room for it.
+    """
+    if spec in COMPONENTS:
+        return COMPONENTS[spec]
+    if f"{SUFFIX}:" not in spec:
+        raise ValueError(f"no node {spec!r}; known: {', '.join(COMPONENTS)}, or FILE.py:Class")
+    kind: type[Component] = find_class(spec, Component)
+    try:
+        kind()
+    except Exception as error:  # a user's constructor may raise anything
+        raise ValueError(f"{spec}: {explain_error(error, spec.rpartition(':')[0])}") from None
+    return kind

@@ -1,25 +1,116 @@
-"""What `rtc-lite-emu` runs."""
+"""What `rtc-lite-emu` runs: a node, the verbs of its scenarios, and the faults of its line."""
 
 from __future__ import annotations
 
+import re
+import shlex
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 import click
 
+from tickrig.device.chance import Chance, threshold_of
+from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.emulators.bench.names import known
 from tickrig.emulators.commands.serial_run import DeviceType, Options, SerialRun
+from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rtc_lite.build import NAME, config_to_trace
-from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
-from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
+from tickrig.emulators.rig.faults import Fault, FaultType
+from tickrig.emulators.rtc_lite.build import COMPONENTS, NAME, config_to_trace, find_component
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.rtc_lite.verbs import verbs
+from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.text.user_file import explain_error
+from tickrig.host.text.values import parse_setting
+from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command, ContextType
-from tickrig.wire.rtc_lite.frame import Checksum, Framing
+from tickrig.wire.rtc_lite.frame import HEADER, Checksum, Framing
+from tickrig.wire.rtc_lite.messages import PortData
+from tickrig.wire.rtc_lite.values import PortType
+
+
+def verbs(component: Component, config: NodeConfig) -> Mapping[str, Sender]:
+    """Return the verbs that send."""
+    lite = config.framing is Framing.LITE
+
+    def send(rest: str) -> Send:
+        body = unescape(rest)
+        if len(body) < (2 if lite else 1):
+            example = "CX" if lite else "X"
+            raise ValueError(f"send takes a command and its data, as {example!r}, got {rest!r}")
+        return _packed(body, config)
+
+    def write(rest: str) -> Send:
+        name, *words = shlex.split(rest) or [""]
+        port = component.in_ports.get(name.encode())
+        if port is None:
+            names = known(key.decode() for key in component.in_ports) or "none"
+            raise ValueError(f"no in-port {name!r}; known: {names}")
+        data = PortData(port.name, _value(port.port_type, words)).encode()
+        return _packed((Command.WRITE.value if lite else b"S") + data, config)
+
+    return {"send": send, "write": write, "raw": parse_raw}
+
+
+def _packed(body: bytes, config: NodeConfig) -> Send:
+    """Put a frame, or a packet of RTno, around a command and its data."""
+    if config.framing is Framing.LITE:
+        return Send(HEADER + body + bytes([config.checksum.of(body)]), body)
+    return Send(rtno.pack(body[:1], body[1:]), body)
+
+
+def _value(port_type: PortType[Any], words: list[str]) -> bytes:
+    """Write the value that a person typed: a word, or one for each element."""
+    if port_type.code in "cC":
+        return port_type.encode(" ".join(words))
+    values = tuple(parse_setting(word) for word in words)
+    if port_type.sequence:
+        return port_type.encode(values)
+    if len(values) != 1:
+        raise ValueError(f"{port_type.name} takes one value, got {len(values)}")
+    return port_type.encode(values[0])
+
+
+_PING_ANSWER: Final = re.compile(rb"\n" + Command.PING.value + rb"@..", re.DOTALL)
+
+
+def _noise(chance: Chance, threshold: int) -> Fault[bytes]:
+    def fault(now_us: int, data: bytes) -> bytes:
+        out = bytearray()
+        for byte in data:
+            if chance.hit(threshold):
+                out.append(chance.draw() & 0xFF)
+            out.append(byte)
+        return bytes(out)
+
+    return fault
+
+
+def _ping(chance: Chance, threshold: int) -> Fault[bytes]:
+    """Count; there is no chance in it. A node sends an answer whole, in one tick."""
+    every, seen = round(threshold_of(1) / threshold), 0
+
+    def cut(match: re.Match[bytes]) -> bytes:
+        nonlocal seen
+        seen += 1
+        return b"" if seen % every == 0 else match[0]
+
+    return lambda now_us, data: _PING_ANSWER.sub(cut, data)
+
+
+LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = MappingProxyType(
+    {
+        **BYTE_FAULTS,
+        "noise": FaultType("a byte of chance comes before each byte at this rate", _noise),
+        "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _ping),
+    }
+)
+
 
 ROUTINE: Final = tuple(
     command.value

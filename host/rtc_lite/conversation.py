@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.links.link import Link
-from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink
-from tickrig.host.rtc_lite.rtno_link import RtnoLink
+from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink, RtnoLink
 from tickrig.host.rtc_lite.settings import Settings
 from tickrig.host.rtc_lite.watch import Watch
 from tickrig.host.text.log import log_of

@@ -19,8 +19,8 @@ from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
-from tickrig.device.canopen.device_rtc.relays import Echo
+from tickrig.device.canopen.device_rtc.component import Echo
+from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.rtc_lite.reference_model import checked
+from tickrig.device.rtc_lite.component import Echo, LiteA, LiteB
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.rtc_lite.relays import Echo, LiteA, LiteB
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
+from tickrig.emulators.rtc_lite.emulate import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import ContextType
 from tickrig.wire.rtc_lite.frame import Framing

@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.table import RUNS, percentiles, rates, row
 from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import OutPort as DeviceOutPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station

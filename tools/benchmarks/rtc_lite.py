@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from benchmarks.table import percentiles, rates
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.rtc_lite.relays import Echo
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink

@@ -6,10 +6,11 @@ from copy import copy
 from enum import IntEnum
 from typing import Any, ClassVar, Final
 
-from tickrig.device.canopen.device_rtc.ports import Port
+from tickrig.device.canopen.device_rtc.ports import InPort, OutPort, Port
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
 from tickrig.device.twin import NonCopyable
+from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
 
@@ -124,3 +125,18 @@ class Component(NonCopyable):
 
     def on_reset(self) -> Result:
         """Leave Error; after an error it stays there."""
+
+
+class Echo(Component):
+    """One in-port, one out-port, both Long."""
+
+    type_name = "Echo"
+    vendor = "tickrig"
+    category = "example"
+    inlet = InPort("in", LONG)
+    outlet = OutPort("out", LONG)
+
+    def on_execute(self) -> None:
+        """Hand on what is new."""
+        if self.inlet.is_new:
+            self.outlet.write(self.inlet.read())

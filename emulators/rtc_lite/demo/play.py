@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from tickrig.emulators.rtc_lite.demo.overheard import OverheardLink
 from tickrig.emulators.rtc_lite.demo.stage import CAST, Stage
+from tickrig.emulators.rtc_lite.frame_log import OverheardLink
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc_lite import EventKind, ProxyEvent, Settings, attach

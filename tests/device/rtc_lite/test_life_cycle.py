@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rtc_lite.bench import NodeBench
-from tickrig.device.rtc_lite.relays import Echo
+from tickrig.device.rtc_lite.component import Echo
 
 STATES = ("Created", "Inactive", "Active", "Error", "None")
 COMMANDS = ("CI", "CF", "AA", "AD", "AE", "AB", "AC", "AR", "AS", "AH", "CX")

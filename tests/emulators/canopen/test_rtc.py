@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from examples.device_rtc_gripper import Gripper
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.device_rtc.make import make_dictionary
+from tickrig.device.canopen.device_rtc.device import make_dictionary
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.canopen.eds.eds import read_eds
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.host.rtc_lite.bench import Bench
-from tickrig.device.rtc_lite.relays import LiteA, LiteB
+from tickrig.device.rtc_lite.component import LiteA, LiteB
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc_lite import Settings
 

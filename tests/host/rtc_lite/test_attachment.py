@@ -6,7 +6,7 @@ import pytest
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
-from tickrig.device.rtc_lite.relays import Echo
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.host.rtc import Manager, RtcRefused
 from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
 from tickrig.wire.instant import NEVER

@@ -10,7 +10,7 @@ from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, TICK_US, Bench
 from tests.host.rtc_lite.experiment import ALL, JOINTS, Experiment
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.rtc_lite.relays import Echo
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.host.rtc_lite import Settings
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tickrig.device.chance import Chance
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.device.rtc_lite.relays import Echo
 from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings

@@ -6,7 +6,7 @@ from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tests.host.rtc_lite.test_experiments import recorder_bench
 from tests.host.rtc_lite.test_timer import active
 from tests.host.spy_link import SpyLink
-from tickrig.device.rtc_lite.relays import Echo
+from tickrig.device.rtc_lite.component import Echo
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite import Settings

@@ -6,10 +6,9 @@ import pytest
 
 from tests.host.rtc_lite.bench import Bench
 from tests.host.rtc_lite.scripted_node import ScriptedNode
-from tickrig.device.rtc_lite.component import Component
+from tickrig.device.rtc_lite.component import Component, Echo
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.device.rtc_lite.ports import InPort, OutPort
-from tickrig.device.rtc_lite.relays import Echo
 from tickrig.host.rtc import ExecutionContext, Manager, ReturnCode, RtcRefused
 from tickrig.host.rtc_lite import RtcLiteProxy, Settings, attach
 from tickrig.wire.rtc_lite.codes import Command

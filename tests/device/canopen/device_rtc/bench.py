@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
-from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.wire.rtc_canopen.port_types import SHORT

@@ -9,8 +9,7 @@ import canopen
 import pytest
 from examples.device_rtc_gripper import Gripper
 
-from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
-from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_canopen.port_types import OCTET, SHORT

@@ -9,11 +9,9 @@ import pytest
 from tests.device.canopen.device_rtc.bench import Recorder, RtcBench
 from tests.device.canopen.device_rtc.test_life_cycle import GOLDEN
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.device import DeviceRtc
-from tickrig.device.canopen.device_rtc.make import make_device_rtc
+from tickrig.device.canopen.device_rtc.component import Component, Echo
+from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
-from tickrig.device.canopen.device_rtc.relays import Echo
 from tickrig.device.physical import Input
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, CHARACTER, DOUBLE, LONG, SHORT

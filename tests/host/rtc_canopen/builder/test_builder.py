@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.make import make_device_rtc, make_dictionary
+from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.names import COMPONENT_NAMES
