@@ -13,8 +13,8 @@ from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
 from tickrig.emulators.canopen.build import describe_device
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
-from tickrig.emulators.canopen.rtc import one_line_for
 from tickrig.emulators.canopen.run import CanopenOptions, CanopenRun
+from tickrig.emulators.commands.run import mistakes_in
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.values import parse_size, parse_time_us
@@ -37,7 +37,7 @@ def emulate(
     specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
     run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, sdo=sdo, **options))
-    with one_line_for(spec.device for spec in specs):
+    with mistakes_in(spec.device for spec in specs):
         return run.run()
 
 

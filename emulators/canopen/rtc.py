@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import traceback
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Final
-
-import click
 
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.device import (
@@ -18,7 +12,6 @@ from tickrig.device.canopen.device_rtc.device import (
 )
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
 from tickrig.emulators.canopen.node.node import NODE_INPUTS
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.user_file import explain_error, find_class
 from tickrig.wire.rtc_canopen.objects import device_info
 
@@ -45,19 +38,3 @@ def describe_rtc(spec: str) -> DeviceDescription:
         make_dictionary(kind),
         application=application_of(kind),
     )
-
-
-@contextmanager
-def one_line_for(devices: Iterable[Path | str]) -> Iterator[None]:
-    """Say in a line what a callback of a user's file raised; other errors pass."""
-    files = {spec.rpartition(":")[0]: spec for spec in devices if isinstance(spec, str)}
-    try:
-        yield
-    except click.exceptions.Exit:
-        raise
-    except Exception as error:  # a user's callback may raise anything
-        frames = traceback.extract_tb(error.__traceback__)
-        mine = next((file for file in files if any(file == at.filename for at in frames)), None)
-        if mine is None:
-            raise
-        raise Refused(f"{files[mine]}: {explain_error(error, mine)}") from error

@@ -72,7 +72,7 @@ class CanopenRun(EmulatorRun):
         self._described: list[Described] = []
         self._channel = VIRTUAL_CHANNEL
 
-    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
+    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
         self._described = describe_nodes(self._options.specs, self._options.profile)
         if not self._described:
             raise Refused(NO_NODE)

@@ -13,6 +13,7 @@ HERE: Final = "tickrig.emulators.commands"
 COMMANDS: Final = {
     "ctl": (f"{HERE}.ctl_cli:ctl", "Touch and watch the emulator whose control socket is SOCKET."),
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
+    "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
@@ -28,6 +29,7 @@ def main() -> None:
 
     \b
     tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
+    tickrig emu rrc --link /tmp/rrc               emulate a device
     tickrig replay run.trace                      replay a recorded run
     tickrig demo rrc                              see a device and a host at work
     tickrig rtc run system.toml                   run RT components

@@ -28,12 +28,12 @@ def replay_command(context: click.Context, /, file: Path) -> None:
     tickrig replay run.trace
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.commands.catalog import build  # noqa: PLC0415 - slow
+        from tickrig.emulators.commands.device_type import build_recorded  # noqa: PLC0415 - slow
         from tickrig.emulators.record.replay import read_recording, replay  # noqa: PLC0415
 
     try:
         recording = read_recording(file.read_bytes())
-        difference = replay(recording, build(recording.header))
+        difference = replay(recording, build_recorded(recording.header))
     except OSError as error:
         refuse_path("trace", error)
     except ValueError as error:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from abc import ABC, abstractmethod
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+import click
 
 from tickrig.emulators.bench.control import Control
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
@@ -18,6 +22,7 @@ from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.control.clock import ServingClock
+from tickrig.host.text.user_file import explain_error
 
 RECORDING_ENDED: Final = 3
 """Exit status where the recording is not whole."""
@@ -82,7 +87,7 @@ class EmulatorRun(ABC):
         return True
 
     @abstractmethod
-    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
+    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
         """Build what options and scenario are checked against; nothing is opened."""
 
     @abstractmethod
@@ -99,7 +104,7 @@ class EmulatorRun(ABC):
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
         """Read all that can be wrong before anything is opened."""
-        bench, parser = self._rehearsal()
+        bench, parser = self._dry_run()
         with refused_at("--fault"):
             faults = [parse_fault_spec(text) for text in self._shared.faults]
             for spec in faults:
@@ -145,3 +150,23 @@ def _read(scenario: Path | None) -> tuple[str, str]:
     except OSError as error:
         refuse_path("scenario", error)
     return text, str(scenario)
+
+
+@contextmanager
+def mistakes_in(specs: Iterable[object]) -> Iterator[None]:
+    """Say in a line what a callback of a user's file raised; other errors pass.
+
+    Args:
+        specs: what runs, of which each `FILE.py:Class` is the user's.
+    """
+    files = {spec.rpartition(":")[0]: spec for spec in specs if isinstance(spec, str)}
+    try:
+        yield
+    except click.exceptions.Exit:
+        raise
+    except Exception as error:  # a user's callback may raise anything
+        frames = {frame.filename for frame in traceback.extract_tb(error.__traceback__)}
+        mine = next((file for file in files if file in frames), None)
+        if mine is None:
+            raise
+        raise Refused(f"{files[mine]}: {explain_error(error, mine)}") from error

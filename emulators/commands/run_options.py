@@ -1,12 +1,17 @@
-"""The options that the command lines of all emulators share."""
+"""What the command lines of all emulators share: their options, and how a device is run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
+from tickrig.host.cli.start import load, loading
+
+if TYPE_CHECKING:
+    from tickrig.device.physical import Input
 
 Faults = Callable[[click.Context], Iterable[str]]
 """Gives the faults of a device as the command line has it so far."""
@@ -39,3 +44,40 @@ def run_options(wire_faults: str, device_faults: Faults) -> Decorator:
         click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
         version_option(),
     )
+
+
+def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[Input]]) -> Decorator:
+    """Return a decorator that adds the options of a device on a serial line, and --version.
+
+    Args:
+        wire_faults: names with commas between.
+        inputs: gives its physical inputs, for the shell to complete; or where it is, as
+            `MODULE:NAME` of a table.
+    """
+
+    def device_faults(context: click.Context) -> list[str]:
+        table = load(inputs) if isinstance(inputs, str) else inputs()
+        return [item.name for item in table if item.type.value == "fault"]
+
+    return add_options(
+        click.option("--link", type=PATH, help="Symbolic link to make to the terminal."),
+        click.option("--trace", type=PATH, help="File to record the run in, for 'tickrig replay'."),
+        run_options(wire_faults, device_faults),
+    )
+
+
+def run_named(name: str, options: Mapping[str, Any]) -> int:
+    """Run a device as a command line asks, and return the exit status.
+
+    Args:
+        name: of one of `device_type.DEVICES`.
+        options: its own, and those of `line_options`.
+
+    Raises:
+        Refused: it cannot be run like this.
+    """
+    with loading():
+        from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+        from tickrig.emulators.commands.serial_run import run_device  # noqa: PLC0415 - slow
+
+    return run_device(DEVICES.load(name), options)

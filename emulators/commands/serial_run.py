@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import click
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.transcript import Transcript
-from tickrig.emulators.commands.run import EmulatorRun, RunOptions
+from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
-from tickrig.emulators.record.trace import Config, Header
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
+from tickrig.emulators.record.trace import Header
 from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import Encoder, Line, ScenarioParser, Sender
-from tickrig.emulators.serial.emulator import Emulator, LineSettings
+from tickrig.emulators.scenario.scenario import Line, ScenarioParser
+from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -38,65 +40,53 @@ class Options(RunOptions):
         return not self.scenario or bool(self.link or self.control or self.panel)
 
 
-def by_miniterm(link: str, baud: int) -> str:
-    """Say how to talk to a device of lines of text; miniterm comes with pyserial."""
-    return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
+def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
+    """Run a device as a command line asks, and return the exit status.
 
+    Args:
+        device_type: its type.
+        options: all options, its own and those of `line_options`.
 
-@dataclass(frozen=True, slots=True)
-class DeviceType:
-    """What the command line of one kind of device adds.
-
-    Attributes:
-        name: as in traces.
-        title: for people.
-        encoders: further verbs of its scenarios.
-        is_event: which lines -v shows.
-        panel: runs the operator panel until it is left.
-        senders: the verbs of its scenarios that send, where the line carries no text.
-        line: baud rate, wire faults and the cutting of the log.
-        talk: says how to talk to it at a path and a baud rate.
+    Raises:
+        Refused: the command line asks for something that cannot be done.
     """
-
-    name: str
-    title: str
-    encoders: Mapping[str, Encoder] = field(default_factory=dict)
-    is_event: Callable[[WireLine], bool] = lambda line: True
-    panel: Callable[[Emulator], None] | None = None
-    senders: Mapping[str, Sender] | None = None
-    line: LineSettings = field(default_factory=LineSettings)
-    talk: Callable[[str, int], str] = by_miniterm
+    names = {item.name for item in fields(Options)}
+    own = {name: value for name, value in options.items() if name not in names}
+    shared = Options(**{name: value for name, value in options.items() if name in names})
+    configured = device_type.of_options(own, shared.seed)
+    with mistakes_in([configured.type.user_code]):
+        return SerialRun(configured, shared).run()
 
 
 class SerialRun(EmulatorRun):
     """One run.
 
     Args:
-        kind: the kind of device.
-        device: the device.
-        config: its configuration, for the trace.
+        configured: the device.
         options: the command line.
     """
 
-    def __init__(
-        self, kind: DeviceType, device: Emulated[bytes], config: Config, options: Options
-    ) -> None:
+    def __init__(self, configured: ConfiguredDevice, options: Options) -> None:
         super().__init__(options, in_real_time=options.in_real_time)
-        self._kind, self._device, self._config, self._options = kind, device, config, options
+        self._type, self._device = configured.type, configured.device
+        self._config = configured.config
+        self._options = options
 
-    def _rehearsal(self) -> tuple[RunningEmulator, ScenarioParser]:
+    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
         if self._options.panel:
             self._check_panel()
-        kind = self._kind
-        bench = Emulator(kind.name, self._device, line=kind.line)
-        parser = ScenarioParser(self._device, bench.operator, kind.encoders, senders=kind.senders)
+        device_type = self._type
+        bench = Emulator(device_type.name, self._device, line=device_type.line)
+        parser = ScenarioParser(
+            self._device, bench.operator, device_type.encoders, senders=device_type.senders
+        )
         return bench, parser
 
     def _check_panel(self) -> None:
         if self._options.scenario or self._options.verbose:
             raise Refused("--panel has the screen to itself: no --scenario and no --verbose")
-        if self._kind.panel is None:
-            raise Refused(f"--panel: there is none for {self._kind.title}")
+        if self._type.panel is None:
+            raise Refused(f"--panel: there is none for {self._type.title}")
         if find_spec("textual") is None:
             raise Refused("--panel needs Textual: pip install 'tickrig[tui]'")
 
@@ -108,14 +98,14 @@ class SerialRun(EmulatorRun):
         options = self._options
         pty = self._open_pty(stack) if options.in_real_time else None
         return Emulator(
-            self._kind.name,
+            self._type.name,
             self._device,
             outside=pty,
             clock=self._clock if pty else None,
             seed=options.seed,
             trace=self._open_trace(),
             link=str(options.link or pty.path) if pty else "",
-            line=self._kind.line,
+            line=self._type.line,
         )
 
     def _open_pty(self, stack: ExitStack) -> PtyPort:
@@ -124,12 +114,12 @@ class SerialRun(EmulatorRun):
         except OSError as error:
             refuse_path("link", error)
         stack.callback(pty.close)
-        pty.watch_setting(self._kind.line.baud, self._tell_setting)
+        pty.watch_setting(self._type.line.baud, self._tell_setting)
         return pty
 
     def _tell_setting(self, setting: str) -> None:
         if not self._options.panel:
-            own = f"{self._kind.line.baud} 8N1"
+            own = f"{self._type.line.baud} 8N1"
             say(
                 f"The host has set its port to {setting}, the device has {own}:"
                 " on a real line they would not understand each other."
@@ -138,7 +128,7 @@ class SerialRun(EmulatorRun):
     def _open_trace(self) -> TraceFile | None:
         if self._options.trace is None:
             return None
-        header = Header(self._kind.name, {**self._config, "seed": self._options.seed})
+        header = Header(self._type.name, {**self._config, "seed": self._options.seed})
         try:
             return TraceFile(self._options.trace, header)
         except OSError as error:
@@ -149,13 +139,13 @@ class SerialRun(EmulatorRun):
         if options.panel or not (everything or options.verbose):
             return None
         everything = everything or options.verbose > 1
-        wanted = (lambda line: True) if everything else self._kind.is_event
+        wanted = (lambda line: True) if everything else self._type.is_event
         transcript = Transcript(bench, click.echo, wanted)
         return Player(bench, scenario, transcript, stays=options.in_real_time)
 
     def _go_on(self, bench: RunningEmulator) -> None:
-        if self._options.panel and self._kind.panel and isinstance(bench, Emulator):
-            self._kind.panel(bench)
+        if self._options.panel and self._type.panel and isinstance(bench, Emulator):
+            self._type.panel(bench)
             return
         super()._go_on(bench)
 
@@ -164,9 +154,10 @@ class SerialRun(EmulatorRun):
             return
         click.echo(bench.link)
         control = self._options.control
-        kind, talk = self._kind, self._kind.talk(bench.link, self._kind.line.baud)
-        say(f"{kind.title} at {bench.link}, {kind.line.baud} 8N1. Ctrl-C ends.{talk}")
-        way = "--control PATH or --panel" if kind.panel else "--control PATH"
+        shown, baud = self._type, self._type.line.baud
+        talk = shown.talk(bench.link, baud)
+        say(f"{shown.title} at {bench.link}, {baud} 8N1. Ctrl-C ends.{talk}")
+        way = "--control PATH or --panel" if shown.panel else "--control PATH"
         say(
             f"  tickrig ctl {control} describe"
             if control

@@ -44,7 +44,7 @@ base_options: Final = add_options(
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
     """Return a base of options, those left out as they are; Refused for one that cannot be."""
     with loading():
-        from tickrig.emulators.rh3.build import parameters_of  # noqa: PLC0415 - slow
+        from tickrig.emulators.rh3.device_type import parameters_of  # noqa: PLC0415 - slow
 
     try:
         return parameters_of({name: v for name, v in options.items() if v is not None})

@@ -6,9 +6,8 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.serial_options import line_options
+from tickrig.emulators.commands.run_options import line_options, run_named
 from tickrig.emulators.rh3.base_options import base_options
-from tickrig.host.cli.start import loading
 
 
 @click.command()
@@ -20,9 +19,9 @@ from tickrig.host.cli.start import loading
 )
 @click.option("--address", type=int, metavar="1..247", help="Modbus address.  [1]")
 @base_options
-@line_options("flip, drop, dup, cut", "tickrig.device.rh3.terminals")
+@line_options("flip, drop, dup, cut", "tickrig.device.rh3.terminals:INPUTS")
 @click.pass_context
-def main(context: click.Context, /, baud: int, **options: Any) -> None:
+def main(context: click.Context, /, **options: Any) -> None:
     """Emulate the base of Reference Hardware 3, a Modbus RTU slave, on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -41,7 +40,4 @@ def main(context: click.Context, /, baud: int, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_RH3_EMU_COMPLETE=bash_source rh3-emu)"
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.rh3.emulate import emulate  # noqa: PLC0415 - slow
-
-    context.exit(emulate(baud, options))
+    context.exit(run_named("rh3-base", options))

@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.serial_options import line_options
-from tickrig.host.cli.start import loading
+from tickrig.emulators.commands.run_options import line_options, run_named
 
 
 @click.command()
@@ -18,9 +17,9 @@ from tickrig.host.cli.start import loading
     help="Name of the power-on event, as in the field or as in the manual.",
 )
 @click.option("--panel", is_flag=True, help="Show an operator panel in this terminal.")
-@line_options("flip, drop, dup, cut", "tickrig.device.rrc.terminals")
+@line_options("flip, drop, dup, cut", "tickrig.device.rrc.terminals:INPUTS")
 @click.pass_context
-def main(context: click.Context, /, power_on_event: str, **options: Any) -> None:
+def main(context: click.Context, /, **options: Any) -> None:
     """Emulate an RRC, with the VR2 wheelchair around it, on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -35,7 +34,4 @@ def main(context: click.Context, /, power_on_event: str, **options: Any) -> None
     echo '1s press power_button' | rrc-emu --link /tmp/rrc --scenario -
     rrc-emu --link /tmp/rrc --fault flip=0.001 --fault cut@5s-7s -v
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.rrc.emulate import emulate  # noqa: PLC0415 - slow
-
-    context.exit(emulate(power_on_event, options))
+    context.exit(run_named("rrc", options))

@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.serial_options import line_options
-from tickrig.host.cli.start import loading
+from tickrig.emulators.commands.run_options import line_options, run_named
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
@@ -50,18 +49,9 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
     default=Checksum.SUM8.value,
     help="How frames are summed up.  [sum8]",
 )
-@line_options("flip, drop, dup, cut, noise, ping", "tickrig.device.rtc_lite.terminals")
+@line_options("flip, drop, dup, cut, noise, ping", "tickrig.device.rtc_lite.terminals:INPUTS")
 @click.pass_context
-def main(  # noqa: PLR0913, PLR0917 - options, by keyword
-    context: click.Context,
-    /,
-    node: str,
-    baud: int,
-    timer_hz: int | None,
-    framing: str,
-    checksum: str,
-    **options: Any,
-) -> None:
+def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -83,7 +73,4 @@ def main(  # noqa: PLR0913, PLR0917 - options, by keyword
     Completion of options and nodes in the shell:
     eval "$(_RTC_LITE_EMU_COMPLETE=bash_source rtc-lite-emu)"
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.rtc_lite.emulate import emulate  # noqa: PLC0415 - slow
-
-    context.exit(emulate(node, baud, timer_hz, framing, checksum, options))
+    context.exit(run_named("rtc-lite", options))

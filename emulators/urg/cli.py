@@ -6,9 +6,8 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.commands.serial_options import line_options
+from tickrig.emulators.commands.run_options import line_options, run_named
 from tickrig.host.cli.options import NumberRange, add_options
-from tickrig.host.cli.start import loading
 
 USB_BAUD: Final = 12_000_000
 """As fast as USB at full speed."""
@@ -41,11 +40,9 @@ _WORLD: Final = add_options(
     help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
 )
 @_WORLD
-@line_options("flip, drop, dup, cut", "tickrig.device.urg.terminals")
+@line_options("flip, drop, dup, cut", "tickrig.device.urg.terminals:INPUTS")
 @click.pass_context
-def main(
-    context: click.Context, /, serial: str, noise: float, scip: str, baud: int, **options: Any
-) -> None:
+def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a scanning range finder URG-04LX (SCIP 1.1 and 2.0) on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -63,7 +60,4 @@ def main(
     Completion of options in the shell:
     eval "$(_URG_EMU_COMPLETE=bash_source urg-emu)"
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.urg.emulate import emulate  # noqa: PLC0415 - slow
-
-    context.exit(emulate(serial, noise, scip, baud, options))
+    context.exit(run_named("urg", options))

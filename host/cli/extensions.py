@@ -64,7 +64,11 @@ class ExtensionGroup(Generic[T]):
         Args:
             tell: takes a line for people.
         """
-        members = {name: self.load(name) for name in self.built_in}
+        return {name: self.load(name) for name in self.built_in} | self.load_foreign(tell)
+
+    def load_foreign(self, tell: Callable[[str], None]) -> dict[str, T]:
+        """Return the members of other packages as `load_all` does."""
+        members = dict[str, T]()
         for point in self._foreign():
             try:
                 members.setdefault(point.name, self._load_foreign(point))
@@ -93,4 +97,6 @@ class ExtensionGroup(Generic[T]):
             raise ExtensionError(f"{place} ({path}): {explain_error(error)}") from error
         if not self.accepts(found):
             raise ExtensionError(f"{place} ({path}) is not {self.wanted}")
+        if (name := getattr(found, "name", None)) is not None and repr(name) not in place:
+            raise ExtensionError(f"{place} ({path}) calls itself {name!r}")
         return found

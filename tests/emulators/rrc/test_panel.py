@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import asyncio
+import runpy
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,11 +14,12 @@ from tickrig.emulators.bench.inbox import EmulatorEnded, Inbox
 from tickrig.emulators.rrc import panel as rrc_panel
 from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel import HELP, RrcPanel
-from tickrig.emulators.rrc.panel_picture import picture
 from tickrig.emulators.rrc.panel_run import run_panel
 from tickrig.emulators.rrc.panel_text import View
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import Object
+
+TOOL = Path(__file__).parents[3] / "tools" / "rrc_panel_picture.py"
 
 Act = Callable[[RrcPanel, Emulator, Any], Awaitable[None]]
 
@@ -308,7 +311,7 @@ def test_an_sa_line_that_cannot_be_read_is_shown_as_it_is() -> None:
 
 
 def test_the_picture_is_the_panel() -> None:
-    svg = picture().replace("&#160;", " ")
+    svg = runpy.run_path(str(TOOL))["picture"]().replace("&#160;", " ")
     for text in ("Limit", "within limits", "stick +80 -30", "hello", "ER:CommandUnknown"):
         assert text in svg
 

@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.emulators.commands.cli import main as tickrig
-from tickrig.emulators.urg.build import build_urg
 from tickrig.emulators.urg.cli import main as urg_emu
+from tickrig.emulators.urg.device_type import build_urg
 
 SCENARIO = """
 0 send SCIP2.0

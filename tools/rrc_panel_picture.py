@@ -1,6 +1,6 @@
 """Draw the operator panel into an SVG file, from a run in virtual time.
 
-`python -m tickrig.emulators.rrc.panel_picture docs/rrc-panel.svg`
+`python tools/rrc_panel_picture.py docs/rrc-panel.svg`
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from pathlib import Path
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import Control
 from tickrig.emulators.bench.transcript import Transcript
-from tickrig.emulators.rrc.build import NAME
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
@@ -35,7 +34,7 @@ SCENARIO = """
 
 def picture() -> str:
     """Return the panel as SVG, at the end of `SCENARIO`."""
-    emulator = Emulator(NAME, Rrc(), link="/tmp/rrc")
+    emulator = Emulator("rrc", Rrc(), link="/tmp/rrc")
     scenario = ScenarioParser(emulator.device, emulator.operator).parse(SCENARIO, "")
     Player(emulator, scenario, Transcript(emulator, lambda line: None))
     while emulator.running:

@@ -1,0 +1,143 @@
+"""Device types: what builds, connects and shows a device on a serial line (docs/extending.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from tickrig.emulators.bench.emulated import Emulated
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.record.trace import Config, Header
+from tickrig.emulators.scenario.scenario import Encoder, Sender
+from tickrig.emulators.serial.emulator import Emulator, LineSettings
+from tickrig.host.cli.extensions import ExtensionGroup
+from tickrig.host.cli.refused import Refused
+
+if TYPE_CHECKING:
+    import click
+
+SEED: Final = "seed"
+"""In a trace, that of the wire's faults: a replay has none, what came through is recorded."""
+
+
+def by_miniterm(link: str, baud: int) -> str:
+    """Say how to talk to a device of lines of text; miniterm comes with pyserial."""
+    return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceType:
+    """A type of device on a serial line: an entry point of the group `tickrig.devices`.
+
+    Attributes:
+        name: what traces and `tickrig emu` call it.
+        title: for people.
+        build: makes a device of the configuration that a trace carries; ValueError if it cannot be.
+        text: one sentence for `tickrig emu --help`.
+        options: of its command line; their values are the configuration.
+        configure: what else a command line makes of them; see `Configure`.
+        line: baud rate, wire faults, and how the log cuts what passes.
+        encoders: further verbs of its scenarios that send a line.
+        senders: the verbs of its scenarios that send, where the line carries no text.
+        is_event: which lines -v shows.
+        panel: runs the operator panel until it is left.
+        talk: says how to talk to it at a path and a baud rate.
+        user_code: `FILE.py:Class` whose mistakes are told in a line, if it runs such.
+    """
+
+    name: str
+    title: str
+    build: Callable[[Config], Emulated[bytes]]
+    text: str = ""
+    options: tuple[click.Option, ...] = ()
+    configure: Configure | None = None
+    line: LineSettings = field(default_factory=LineSettings)
+    encoders: Mapping[str, Encoder] = field(default_factory=dict)
+    senders: Mapping[str, Sender] | None = None
+    is_event: Callable[[WireLine], bool] = lambda line: True
+    panel: Callable[[Emulator], None] | None = None
+    talk: Callable[[str, int], str] = by_miniterm
+    user_code: str = ""
+
+    def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
+        """Make the device that a command line asks for.
+
+        Args:
+            options: its own, without those that all emulators share.
+            seed: of all chance.
+
+        Raises:
+            Refused: it cannot be made.
+        """
+        if self.configure is not None:
+            return self.configure(self, options, seed)
+        try:
+            return ConfiguredDevice(self, self.build(options), options)
+        except ValueError as error:
+            raise Refused(str(error)) from None
+
+    def of_trace(self, config: Config) -> Emulated[bytes]:
+        """Make the device that a trace was recorded on; ValueError if it cannot be."""
+        return self.build({name: value for name, value in config.items() if name != SEED})
+
+
+@dataclass(frozen=True)
+class ConfiguredDevice:
+    """A device as a command line asks for it.
+
+    Attributes:
+        type: its type, with what its options change of that.
+        device: the device.
+        config: all its settings, for the trace.
+    """
+
+    type: DeviceType
+    device: Emulated[bytes]
+    config: Config
+
+
+Configure = Callable[[DeviceType, Mapping[str, Any], int], ConfiguredDevice]
+"""Makes a device of its type, its options and a seed."""
+
+DEVICES: Final = ExtensionGroup[DeviceType](
+    name="tickrig.devices",
+    what="device",
+    built_in={
+        "rrc": "tickrig.emulators.rrc.device_type:RRC",
+        "rtc-lite": "tickrig.emulators.rtc_lite.device_type:RTC_LITE",
+        "rh3-base": "tickrig.emulators.rh3.device_type:RH3_BASE",
+        "urg": "tickrig.emulators.urg.device_type:URG",
+    },
+    accepts=lambda found: isinstance(found, DeviceType),
+    wanted="a DeviceType",
+)
+"""The device types that there are."""
+
+
+def build_recorded(header: Header) -> Emulated[bytes]:
+    """Build the device that a trace was recorded on.
+
+    Raises:
+        ValueError: there is none of this name, or its configuration cannot be.
+    """
+    if header.device not in DEVICES.built_in and header.device not in DEVICES.names():
+        known = ", ".join(DEVICES.names())
+        raise ValueError(f"recorded on {header.device!r}; this program knows {known}")
+    return DEVICES.load(header.device).of_trace(header.config)
+
+
+def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = True) -> None:
+    """Raise ValueError unless a configuration has settings of a device alone.
+
+    Args:
+        config: as a trace carries it.
+        defaults: all settings that there are.
+        owner: what has them, for people: `an RRC has no setting`.
+        typed: whether a value has to be of the type of its default.
+    """
+    for name, value in config.items():
+        if name not in defaults:
+            raise ValueError(f"{owner} {name!r}; known: {', '.join(defaults)}")
+        if typed and type(value) is not type(defaults[name]):
+            raise ValueError(f"{name} is {value!r}, expected is something like {defaults[name]!r}")

@@ -1,0 +1,89 @@
+"""The command `tickrig emu`: every device type there is, ours and those of other packages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.emulators.commands.run_options import line_options, run_named
+from tickrig.host.cli.extensions import ExtensionError
+from tickrig.host.cli.lazy_group import LazyGroup
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from tickrig.device.physical import Input
+    from tickrig.emulators.commands.device_type import DeviceType
+
+OURS: Final = {
+    "rrc": ("tickrig.emulators.rrc.cli:main", "Emulate an RRC, as rrc-emu."),
+    "rtc-lite": ("tickrig.emulators.rtc_lite.cli:main", "Emulate a PIC, as rtc-lite-emu."),
+    "rh3-base": ("tickrig.emulators.rh3.cli:main", "Emulate the base of RH3, as rh3-emu."),
+    "urg": ("tickrig.emulators.urg.cli:main", "Emulate a range finder, as urg-emu."),
+    "canopen-slave": (
+        "tickrig.emulators.canopen.cli:main",
+        "Emulate CANopen slaves, as canopen-slave-emu.",
+    ),
+}
+"""Our devices have command lines of their own."""
+
+HELP: Final = """\
+It runs in real time until Ctrl-C. A scenario alone runs in virtual time: as
+fast as it goes, with the same transcript each time, exit status 1 if something
+expected did not come. Together with --link or --control it is played in real
+time."""
+PANEL: Final = "Show an operator panel in this terminal."
+
+
+class DeviceGroup(LazyGroup):
+    """Our command lines, and one made for each device type of another package."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names, ours first; a device type that cannot be loaded is told in a line."""
+        with loading():
+            from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+
+        self.commands.update(
+            (name, device_command(each)) for name, each in DEVICES.load_foreign(say).items()
+        )
+        return list(self.commands)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command line of a device."""
+        if cmd_name in self.commands:
+            return self.commands[cmd_name]
+        with loading():
+            from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+
+        try:
+            return device_command(DEVICES.load(cmd_name))
+        except ExtensionError as error:
+            raise Refused(str(error)) from None
+
+
+def device_command(device_type: DeviceType) -> click.Command:
+    """Make the command line of a device type: its own options and those of all devices."""
+
+    @line_options(", ".join(device_type.line.faults), lambda: _inputs(device_type))
+    @click.pass_context
+    def run(context: click.Context, /, **options: Any) -> None:
+        context.exit(run_named(device_type.name, options))
+
+    first = device_type.text or f"Emulate {device_type.title}."
+    command = click.command(device_type.name, help=f"{first}\n\n{HELP}")(run)
+    command.params[:0] = device_type.options
+    if device_type.panel:
+        command.params.append(click.Option(["--panel"], is_flag=True, help=PANEL))
+    return command
+
+
+def _inputs(device_type: DeviceType) -> Iterable[Input]:
+    return device_type.build({}).inputs.table.values()
+
+
+@click.group(cls=DeviceGroup, commands=OURS)
+def emu() -> None:
+    """Emulate a device, ours or that of an installed package."""

@@ -1,0 +1,106 @@
+"""The RTC-Lite node as a device type: `rtc-lite-emu`, and the configuration of its traces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
+from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.emulators.bench.wire_log import WireLine
+from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
+from tickrig.emulators.record.trace import Config
+from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
+from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
+from tickrig.emulators.rtc_lite.frame_log import frame_splitter
+from tickrig.emulators.rtc_lite.verbs import verbs
+from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.host.cli.refused import refused_at
+from tickrig.wire.rtc_lite.codes import Command, ContextType
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
+
+ROUTINE: Final = tuple(
+    command.value
+    for command in (Command.PING, Command.EXECUTE, Command.ERROR, Command.WRITE, Command.DATA)
+)
+"""What -v leaves out: the traffic of each period."""
+
+
+def config_to_trace(node: str, config: NodeConfig) -> Config:
+    """Return all settings, also those left alone: defaults may change one day."""
+    return {
+        "node": node,
+        "framing": config.framing.value,
+        "checksum": config.checksum.value,
+        "context": config.context.name.lower(),
+        "rate_hz": config.rate_hz,
+        "slow_answer_us": config.slow_answer_us,
+    }
+
+
+def build_rtc_lite(config: Config) -> RtcLiteNode:
+    """Build a node.
+
+    Raises:
+        ValueError: a setting that a node does not have, or a value that it cannot have.
+    """
+    defaults = config_to_trace("echo", NodeConfig())
+    check_config(config, defaults, "a node has no setting")
+    settings: dict[str, Any] = {**defaults, **config}
+    return RtcLiteNode(
+        find_component(settings["node"]),
+        NodeConfig(
+            Framing(settings["framing"]),
+            Checksum(settings["checksum"]),
+            _context(settings["context"]),
+            settings["rate_hz"],
+            settings["slow_answer_us"],
+        ),
+    )
+
+
+def _context(name: str) -> ContextType:
+    try:
+        return ContextType[name.upper()]
+    except KeyError:
+        raise ValueError(f"context is {name!r}, proxy or timer is possible") from None
+
+
+def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
+    node, timer_hz = options["node"], options["timer_hz"]
+    with refused_at("--checksum"):
+        config = NodeConfig(
+            Framing(options["framing"]),
+            Checksum(options["checksum"]),
+            ContextType.TIMER if timer_hz else ContextType.PROXY,
+            timer_hz or DEFAULT_RATE_HZ,
+        )
+    with refused_at("--node"):
+        device = RtcLiteNode(find_component(node), config)
+    lite = replace(
+        lite,
+        title=f"{lite.title} {device.component.type_name}",
+        senders=verbs(device.component, config),
+        line=LineSettings(options["baud"], LINE_FAULTS, frame_splitter(config)),
+        user_code="" if node in COMPONENTS else node,
+    )
+    return ConfiguredDevice(lite, device, config_to_trace(node, config))
+
+
+def _talk(link: str, baud: int) -> str:
+    return f" Its proxy opens this path:\n  tickrig rtc run SYSTEM.toml --lite NAME={link}@{baud}"
+
+
+def _is_event(line: WireLine) -> bool:
+    return line.data[:2] not in ROUTINE
+
+
+RTC_LITE: Final = DeviceType(
+    name="rtc-lite",
+    title="RTC-Lite node",
+    build=build_rtc_lite,
+    configure=_configure,
+    is_event=_is_event,
+    talk=_talk,
+)
