@@ -16,8 +16,6 @@ from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
-from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.record.trace import Header
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import Line, ScenarioParser

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 
-MODULE = '''\
+MODULE = """\
 import click
 
 from tests.emulators.lamp import Lamp
@@ -32,8 +32,10 @@ DEVICE = DeviceType(
     build=build,
     options=(click.Option(["--greeting"], default="hi", help="What it says first."),),
 )
-'''
-POINTS = "[tickrig.devices]\nlamp = lamp_emu:DEVICE\nlight = lamp_emu:DEVICE\ndim = lamp_emu:build\n"
+"""
+POINTS = (
+    "[tickrig.devices]\nlamp = lamp_emu:DEVICE\nlight = lamp_emu:DEVICE\ndim = lamp_emu:build\n"
+)
 SCENARIO = "1ms send x\n2ms expect x within 10ms\n"
 
 
