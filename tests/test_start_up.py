@@ -16,7 +16,7 @@ from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
 from tickrig.emulators.canopen.profiles import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.host.canmon.cli import main as canmon
-from tickrig.host.cli.lazy_group import Awaited
+from tickrig.host.cli.lazy_group import LazyCommand
 from tickrig.host.cli.start import load
 
 ROOT = Path(__file__).parents[1]
@@ -73,7 +73,7 @@ def test_a_command_imports_what_it_needs(imported: dict[str, list[str]], line: s
 @pytest.mark.parametrize("group", [tickrig, canmon], ids=["tickrig", "canmon"])
 def test_a_list_of_commands_says_what_their_help_says(group: click.Group) -> None:
     for awaited in group.commands.values():
-        assert isinstance(awaited, Awaited)
+        assert isinstance(awaited, LazyCommand)
         assert awaited.short_help is not None
         told = " ".join(load(awaited.path).help.split())
         assert told.startswith(awaited.short_help.removesuffix("."))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, Self, TypeGuard
 
-from tickrig.host.canmon.sources.source_word import FileWord, parse_source
+from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.workspace import SettingError, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
@@ -25,7 +25,7 @@ _LISTS: Final = ("source", "dbc", "timing", "bus_kwargs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BenchSetup:
+class MonitorSetup:
     """Sources and files.
 
     Attributes:
@@ -67,11 +67,11 @@ class BenchSetup:
             dbc=tuple(folder / path for path in bus.get("dbc", ())),
         )
 
-    def under(self, other: BenchSetup) -> BenchSetup:
+    def under(self, other: MonitorSetup) -> MonitorSetup:
         """Return it with what another one says before it."""
         options = self.options if not other.source else BusOptions(bitrate=self.options.bitrate)
         given = {name: value for name in _OPTIONS if (value := getattr(other.options, name))}
-        return BenchSetup(
+        return MonitorSetup(
             source=other.source or (() if other.options else self.source),
             options=replace(options, **given),
             eds={**self.eds, **other.eds},
@@ -141,7 +141,7 @@ def _word(folder: Path, word: str) -> str:
 
 
 def _is_log(word: str) -> bool:
-    return isinstance(parse_source(word), FileWord)
+    return isinstance(parse_source(word), FileSpec)
 
 
 def _relative(workspace: Workspace, word: str, *, is_path: bool = False) -> str:
@@ -155,7 +155,7 @@ FRAME: Final = (BUS, NODES)
 """Sections that are no panel's."""
 
 
-class Bench:
+class PanelSettings:
     """Recalls settings, and keeps them.
 
     Args:
@@ -164,7 +164,7 @@ class Bench:
         panels: whose settings they are.
     """
 
-    def __init__(self, workspace: Workspace, setup: BenchSetup, panels: Sequence[Panel]) -> None:
+    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[Panel]) -> None:
         self.workspace, self._setup, self._panels = workspace, setup, tuple(panels)
         self._conflict = ""
 

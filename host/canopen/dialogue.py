@@ -40,7 +40,7 @@ def _nothing() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class QueuedScript:
     """A script, and who is told how it ended.
 
     Attributes:
@@ -74,16 +74,16 @@ class Dialogue:
     def __init__(self, node_id: int, send: Send) -> None:
         self._node_id, self._send = node_id, send
         self._now_us, self.due_us = 0, NEVER
-        self.job: Job | None = None
+        self.job: QueuedScript | None = None
         self._step: Step | None = None
-        self._jobs: deque[Job] = deque()
+        self._jobs: deque[QueuedScript] = deque()
 
     @property
     def moves(self) -> bool:
         """Whether something is under way that may change the NMT state of the node."""
         return self.job is not None and any(job.moves for job in (self.job, *self._jobs))
 
-    def start(self, now_us: int, job: Job) -> None:
+    def start(self, now_us: int, job: QueuedScript) -> None:
         """Run a job when those before it have ended."""
         self._now_us = now_us
         self._jobs.append(job)
@@ -104,7 +104,7 @@ class Dialogue:
             job.script.close()
             job.dropped()
 
-    def hear_sdo(self, now_us: int, data: bytes) -> None:
+    def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take a response; one that nobody asked for, or too late, is passed over."""
         self._now_us = now_us
         if isinstance(self._step, Ask):
@@ -115,7 +115,7 @@ class Dialogue:
             if _answers(self._step, answer):
                 self._go_on(answer)
 
-    def hear_state(self, now_us: int, state: NmtState) -> None:
+    def receive_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
         self._now_us = now_us
         if isinstance(self._step, Await) and self._step.state is state:

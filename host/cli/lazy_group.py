@@ -10,7 +10,7 @@ import click
 from tickrig.host.cli.start import load
 
 
-class Awaited(click.Command):
+class LazyCommand(click.Command):
     """Stands in lists for a command that is not imported yet.
 
     Args:
@@ -34,7 +34,7 @@ class LazyGroup(click.Group):
 
     def __init__(self, commands: Mapping[str, tuple[str, str]], **attributes: Any) -> None:
         awaited: dict[str, click.Command] = {
-            name: Awaited(name, *each) for name, each in commands.items()
+            name: LazyCommand(name, *each) for name, each in commands.items()
         }
         super().__init__(commands=awaited, **attributes)
 
@@ -47,4 +47,4 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Import the command that was asked for."""
         name, command, rest = super().resolve_command(ctx, args)
-        return name, load(command.path) if isinstance(command, Awaited) else command, rest
+        return name, load(command.path) if isinstance(command, LazyCommand) else command, rest

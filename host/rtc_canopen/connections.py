@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from tickrig.host.canopen.dialogue import Failure, Job
+from tickrig.host.canopen.dialogue import Failure, QueuedScript
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.ports.port import ConnectorProfile
@@ -181,7 +181,7 @@ class Links:
             self._note(EventKind.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
-        node.run(now_us, Job("link", script, done, failed, moves=False))
+        node.run(now_us, QueuedScript("link", script, done, failed, moves=False))
 
 
 def find_layout(name: PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from tickrig.host.canopen.dialogue import Failure, Job
+from tickrig.host.canopen.dialogue import Failure, QueuedScript
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.rtc.component import RtComponent
@@ -253,7 +253,7 @@ class ServerView:
     def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> Transfer:
         transfer = Transfer()
         tell = transfer.succeed, transfer.fail, transfer.drop
-        job = Job("transfer", script, *tell, moves=False)
+        job = QueuedScript("transfer", script, *tell, moves=False)
         self._node(node_id).run(self._server.now_us, job)
         return transfer
 

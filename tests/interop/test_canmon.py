@@ -183,4 +183,4 @@ def test_candump_reads_what_it_logs(vcan: Bus, tmp_path: Path) -> None:
         run("canplayer", "-I", str(log))
         wait(lambda: len(candump.lines) == 50)
         frames = [line.split()[2] for line in candump.lines]
-    assert frames == [str(heard.frame) for heard in read_log(log)]
+    assert frames == [str(record.frame) for record in read_log(log)]

@@ -17,7 +17,7 @@ from benchmarks.table import RUNS, rates, row
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.decode.node_board import NodeBoard
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 
@@ -47,17 +47,17 @@ def run(seconds: float) -> None:
 def pdos() -> None:
     """Decode TPDOs with a statusword and a position, one node and fifty."""
     frames = [_tpdo(n) for n in range(FRAMES)]
-    decoder = _told(Decoder())
+    decoder = _configured(Decoder())
     board, chosen = NodeBoard(decoder), parse_filter("node=5 and (statusword.fault or emcy)")
     rates("canmon: TPDO of two signals", FRAMES, "frames/s", lambda: _decode(decoder, frames))
-    unknown = [Heard(h.at_us, "can1", h.frame) for h in frames]
+    unknown = [Record(h.at_us, "can1", h.frame) for h in frames]
     rates("canmon: TPDO unmapped", FRAMES, "frames/s", lambda: _decode(decoder, unknown))
 
     def work() -> None:
-        for heard in frames:
-            decoded = decoder.take(heard)
-            board.take(heard, decoded)
-            chosen.matches(heard, decoded)
+        for record in frames:
+            decoded = decoder.take(record)
+            board.take(record, decoded)
+            chosen.matches(record, decoded)
 
     rates("canmon: the same with node board and a filter", FRAMES, "frames/s", work)
 
@@ -77,7 +77,7 @@ def library() -> None:
     for name in ("statusword", "position"):
         found.add_variable(name)
     found.cob_id = 0x180 + NODE
-    datas = [bytearray(heard.frame.data) for heard in (_tpdo(n) for n in range(FRAMES))]
+    datas = [bytearray(record.frame.data) for record in (_tpdo(n) for n in range(FRAMES))]
 
     def work() -> None:
         for number, data in enumerate(datas):
@@ -90,7 +90,7 @@ def library() -> None:
 def transfers() -> None:
     """Decode SDO traffic: reads that are answered at once."""
     pair = [CanFrame.parse(t) for t in ("605#4041600000000000", "585#4B41600037020000")]
-    frames = [Heard(n * 1_000, "can0", pair[n % 2]) for n in range(FRAMES)]
+    frames = [Record(n * 1_000, "can0", pair[n % 2]) for n in range(FRAMES)]
     decoder = Decoder()
     rates("canmon: SDO, expedited uploads", FRAMES, "frames/s", lambda: _decode(decoder, frames))
 
@@ -129,20 +129,20 @@ def seconds(what: str, command: list[str]) -> None:
     row(what, values, "s")
 
 
-def _tpdo(number: int) -> Heard:
+def _tpdo(number: int) -> Record:
     data = _VALUES.pack(0x0237, number)
-    return Heard(number * 1_000, "can0", CanFrame(0x180 + NODE, data))
+    return Record(number * 1_000, "can0", CanFrame(0x180 + NODE, data))
 
 
-def _told(decoder: Decoder) -> Decoder:
+def _configured(decoder: Decoder) -> Decoder:
     for text in MAPPING:
-        decoder.take(Heard(0, "can0", CanFrame.parse(text)))
+        decoder.take(Record(0, "can0", CanFrame.parse(text)))
     return decoder
 
 
-def _decode(decoder: Decoder, frames: list[Heard]) -> None:
-    for heard in frames:
-        decoder.take(heard)
+def _decode(decoder: Decoder, frames: list[Record]) -> None:
+    for record in frames:
+        decoder.take(record)
 
 
 def _write(path: Path) -> None:

@@ -49,8 +49,8 @@ def others(part: Path) -> None:
     for suffix, reader in readers.items():
         log = part.with_suffix(f".{suffix}")
         writer = write_log(log)
-        for heard in read_log(part):
-            writer.write(heard)
+        for record in read_log(part):
+            writer.write(record)
         writer.close()
         rates(f"{suffix} log", PEER_FRAMES, lambda log=log: taken(read_log(log)))
         rates(

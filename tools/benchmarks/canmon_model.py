@@ -24,7 +24,7 @@ from tickrig.host.monitor.check.column_check import check_columns
 from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.columns.column_traffic import snapshot_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import Traffic
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.top_table import View, render
@@ -132,8 +132,8 @@ def python_can_reader(path: Path) -> None:
 def live() -> None:
     """Count frames as they come."""
     chance = random.Random(2)
-    heards = [
-        Heard(
+    records = [
+        Record(
             n * 100, "can0", CanFrame(0x181 + n % IDS, n.to_bytes(4, "big") + chance.randbytes(4))
         )
         for n in range(LIVE)
@@ -141,11 +141,13 @@ def live() -> None:
 
     def model() -> None:
         traffic = Traffic()
-        for heard in heards:
-            traffic.take(heard)
+        for record in records:
+            traffic.take(record)
 
     rates("model, frame by frame, payloads that change", LIVE, "frames/s", model)
-    messages = [to_message(heard.frame) for heard in heards if isinstance(heard.frame, CanFrame)]
+    messages = [
+        to_message(record.frame) for record in records if isinstance(record.frame, CanFrame)
+    ]
     rates("bus of python-can, thread, queue, statistics", LIVE, "frames/s", _through_us(messages))
     rates("python-can Notifier, a listener that counts", LIVE, "frames/s", _notified(messages))
 
@@ -156,9 +158,9 @@ def _through_us(messages: list[can.Message]) -> Callable[[], None]:
         model, sender = TopModel(), _sender(messages)
         count = 0
         while count + source.lost < LIVE:
-            heards = source.poll(100_000)
-            count += len(heards)
-            model.take(heards)
+            records = source.poll(100_000)
+            count += len(records)
+            model.take(records)
         sender.join()
         source.close()
         assert source.lost == 0
@@ -200,7 +202,7 @@ def painting() -> None:
     """Make a screen of 50 identifiers."""
     traffic = Traffic()
     for n in range(20_000):
-        traffic.take(Heard(n * 100, "can0", CanFrame(0x181 + n % IDS, n.to_bytes(8, "big"))))
+        traffic.take(Record(n * 100, "can0", CanFrame(0x181 + n % IDS, n.to_bytes(8, "big"))))
 
     def work() -> None:
         for _ in range(100):

@@ -14,7 +14,7 @@ import can
 from benchmarks.table import percentiles, row
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import Series, View
 from tickrig.host.monitor.graph.svg import svg
@@ -53,7 +53,7 @@ def replay(who: str, seconds: float) -> tuple[list[float], float]:
     Time counts from when the first frame is asked for: then the clocks of both start.
     """
     log = [
-        Heard(n * 1_000_000 // FRAMES_S, "can0", CanFrame(0x181 + n % 50, n.to_bytes(8, "little")))
+        Record(n * 1_000_000 // FRAMES_S, "can0", CanFrame(0x181 + n % 50, n.to_bytes(8, "little")))
         for n in range(int(FRAMES_S * seconds))
     ]
     late_us: list[float] = []
@@ -68,19 +68,19 @@ def replay(who: str, seconds: float) -> tuple[list[float], float]:
     return late_us, (time.process_time() - cpu_s) / span_s
 
 
-def _planned(log: list[Heard]) -> Iterator[can.Message]:
+def _planned(log: list[Record]) -> Iterator[can.Message]:
     pace = Pace()
     for at_us, _, frame in ReplayPlan(log, lambda channel: channel):
         pace.wait_until(at_us)
         yield to_message(frame)
 
 
-def _synced(log: list[Heard]) -> Iterator[can.Message]:
+def _synced(log: list[Record]) -> Iterator[can.Message]:
     """Return its iterator; the messages are made before its clock starts."""
-    return iter(can.MessageSync([to_message(heard.frame, heard.at_us) for heard in log]))
+    return iter(can.MessageSync([to_message(record.frame, record.at_us) for record in log]))
 
 
-PEERS: dict[str, Callable[[list[Heard]], Iterator[can.Message]]] = {
+PEERS: dict[str, Callable[[list[Record]], Iterator[can.Message]]] = {
     "canmon play": _planned,
     "python-can MessageSync": _synced,
 }

@@ -17,10 +17,10 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary, render_dictionary
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, Sight
-from tickrig.host.monitor.graph.signal_word import parse_signal
-from tickrig.host.monitor.transmit.row_text import parse_words
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, ViewMode
+from tickrig.host.monitor.graph.signal_spec import parse_signal
+from tickrig.host.monitor.transmit.row_text import parse_row_text
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[2] / "examples/eds/epos.eds"
@@ -42,7 +42,7 @@ class Frames:
     def __init__(self) -> None:
         self._batches = [_batch(at * BATCH) for at in range(FRAMES // BATCH)][::-1]
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         """Return the next batch."""
         return self._batches.pop()
 
@@ -79,9 +79,9 @@ def _pictures() -> None:
     count = len(objects.rows())
     paint = [_spent_s(lambda: render_dictionary(objects.rows(), 0)) * 1e3 for _ in range(RUNS)]
     row(f"objects: {count} rows", paint, "ms of processor")
-    graph = LiveGraph(Sight.ALL)
+    graph = LiveGraph(ViewMode.ALL)
     for word in ("185[0]", "185[2:6]s@2"):
-        graph.add(parse_signal(word), ((heard, None) for heard in _batch(0, MOST)))
+        graph.add(parse_signal(word), ((record, None) for record in _batch(0, MOST)))
     paint = [_spent_s(lambda: graph.render(110, 24)) * 1e3 for _ in range(RUNS)]
     row(f"graph: 2 curves of {MOST:,} samples", paint, "ms of processor")
 
@@ -97,7 +97,7 @@ def _lateness(seconds: float) -> None:
 
     session.buses[name] = recording
     task = TransmitTask({})
-    task.add(parse_words("080# --every 10ms"))
+    task.add(parse_row_text("080# --every 10ms"))
     session.tasks.append(task)
     session.arm()
     start_us = session.now_us + 100_000
@@ -114,9 +114,9 @@ def _drive() -> dict[int, EdsObjects]:
     return {5: read_eds(EPOS, 5)}
 
 
-def _batch(first: int, count: int = BATCH) -> list[Heard]:
+def _batch(first: int, count: int = BATCH) -> list[Record]:
     return [
-        Heard(at * 200, "can0", CanFrame(0x185 if at % 2 else 0x205, at.to_bytes(6, "little")))
+        Record(at * 200, "can0", CanFrame(0x185 if at % 2 else 0x205, at.to_bytes(6, "little")))
         for at in range(first, first + count)
     ]
 

@@ -8,10 +8,10 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import HeardLine
+    from tickrig.host.monitor.frames.record import LineRecord
 
 
 class Stopwatch:
@@ -26,10 +26,10 @@ class Stopwatch:
     def __init__(self) -> None:
         self.latest_us, self._since_us = 0, _now_us()
 
-    def take(self, heards: Sequence[Heard | HeardLine]) -> None:
+    def take(self, records: Sequence[Record | LineRecord]) -> None:
         """Go on from the last of these frames."""
-        if heards:
-            self.latest_us, self._since_us = heards[-1].at_us, _now_us()
+        if records:
+            self.latest_us, self._since_us = records[-1].at_us, _now_us()
 
     @property
     def now_us(self) -> int:

@@ -11,14 +11,14 @@ import click
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.screen import Screen
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.sources.source_word import BusWord, parse_source
+from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import Decorator
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.values import parse_time_us
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import Heard, HeardLine
+    from tickrig.host.monitor.frames.record import LineRecord, Record
 
 Item = TypeVar("Item")
 
@@ -42,7 +42,7 @@ span_option: Final[Decorator] = click.option(
 
 def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
     """Return the bit rate that -b or a SOURCE word names, as can0@500k; None if none does."""
-    buses = (word for word in map(parse_source, words) if isinstance(word, BusWord))
+    buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
     named = (word.bitrate for word in buses if word.bitrate is not None)
     return next(named, None) if options.bitrate is None else options.bitrate
 
@@ -69,7 +69,7 @@ def is_over(begin_s: float, span_us: int | None) -> bool:
 PAINT_S: Final = 0.1
 QUIT: Final = "q"
 
-Shown = TypeVar("Shown", bound="Heard | HeardLine")
+Shown = TypeVar("Shown", bound="Record | LineRecord")
 Lines = Callable[[int, int, int], list[str]]
 """Returns what is shown at a time on a screen with so many columns and lines."""
 
@@ -93,9 +93,9 @@ def paint(
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
         while not (source.ended or is_over(begin_s, span_us)):
-            heards = source.poll(POLL_US)
-            take(heards)
-            watch.take(heards)
+            records = source.poll(POLL_US)
+            take(records)
+            watch.take(records)
             keys = screen.keys()
             if QUIT in keys:
                 break

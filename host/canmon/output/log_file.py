@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.output.meaning import Meant
-from tickrig.host.canmon.sources.source_word import FileWord, parse_source
+from tickrig.host.canmon.output.filtered_decoder import Meant
+from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogFormatError
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.logs.writing.log_writer import write_log
@@ -33,7 +33,7 @@ class LogFile:
     def __init__(self, path: Path, source: Sequence[str]) -> None:
         self._path = path
         read = (
-            parsed.path for word in source if isinstance(parsed := parse_source(word), FileWord)
+            parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec)
         )
         if path.exists() and any(one.exists() and one.samefile(path) for one in read):
             raise Refused(f"{path} is read, so it cannot be written")
@@ -47,9 +47,9 @@ class LogFile:
     def take(self, meant: Sequence[Meant], lost: int) -> None:
         """Add frames; what came is with the operating system then."""
         try:
-            for heard, _ in meant:
-                assert isinstance(heard, Heard), "who opens serial ports does not write a log"
-                self._writer.write(heard)
+            for record, _ in meant:
+                assert isinstance(record, Record), "who opens serial ports does not write a log"
+                self._writer.write(record)
             if meant:
                 self._writer.flush()
         except OSError as error:

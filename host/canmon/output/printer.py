@@ -8,18 +8,18 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, assert_never
 
-from tickrig.host.canmon.output.meaning import Meant
+from tickrig.host.canmon.output.filtered_decoder import Meant
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line
 from tickrig.host.monitor.logs.writing.log_writer import log_line
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
-Printer = Callable[["Listened", "Decoded | None"], str]
+Printer = Callable[["AnyRecord", "Decoded | None"], str]
 """Writes a frame, or a line of a serial port, and what it means, where that is known."""
 
 
@@ -48,8 +48,8 @@ def printer_of(
     if not raw:
         return write
     if errors:
-        return lambda heard, _: write(heard, _error_meaning(heard))
-    return lambda heard, _: write(heard, None)
+        return lambda record, _: write(record, _error_meaning(record))
+    return lambda record, _: write(record, None)
 
 
 def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
@@ -66,44 +66,44 @@ def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
             assert_never(output)
 
 
-def _error_meaning(heard: Listened) -> Decoded | None:
-    if not isinstance(heard.frame, ErrorFrame):
+def _error_meaning(record: AnyRecord) -> Decoded | None:
+    if not isinstance(record.frame, ErrorFrame):
         return None
     from tickrig.host.monitor.decode.services import (  # noqa: PLC0415 - seldom wanted
         decode_error,
     )
 
-    return decode_error(heard.frame)
+    return decode_error(record.frame)
 
 
 def text_printer(lines: DumpLines) -> Printer:
     """Return what writes lines as candump shows them."""
 
-    def printed(heard: Listened, decoded: Decoded | None) -> str:
+    def printed(record: AnyRecord, decoded: Decoded | None) -> str:
         text = decoded_text(decoded)
-        if isinstance(heard, Heard):
-            return lines.line(heard, text)
+        if isinstance(record, Record):
+            return lines.line(record, text)
         from tickrig.host.monitor.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
 
-        return f"{lines.stamp(heard.at_us)}  {line_text(heard, text)}"
+        return f"{lines.stamp(record.at_us)}  {line_text(record, text)}"
 
     return printed
 
 
-def log_printer(heard: Listened, decoded: Decoded | None) -> str:
+def log_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     """Write a line of a log, which holds frames alone."""
-    assert isinstance(heard, Heard), "who opens serial ports does not ask for a log"
-    return log_line(heard)
+    assert isinstance(record, Record), "who opens serial ports does not ask for a log"
+    return log_line(record)
 
 
-def json_printer(heard: Listened, decoded: Decoded | None) -> str:
+def json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     """Write an object in JSON, with kind, node, text, signals and their source."""
     more = "" if decoded is None else _meaning_json(decoded)
-    if isinstance(heard, Heard):
-        return json_line(heard, more)
+    if isinstance(record, Record):
+        return json_line(record, more)
     from tickrig.host.monitor.frames.dump_line import line_json  # noqa: PLC0415 - seldom wanted
 
-    return line_json(heard, more)
+    return line_json(record, more)
 
 
 def _meaning_json(decoded: Decoded) -> str:
@@ -117,15 +117,15 @@ def _meaning_json(decoded: Decoded) -> str:
     return f',"kind":"{decoded.kind}"{node}{text}{signals}{source}'
 
 
-def csv_printer(heard: Listened, decoded: Decoded | None) -> str:
+def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     """Write a row below `DUMP_HEADER`; a line of a serial port has no identifier."""
-    at_us, channel, sent = heard.at_us, heard.channel, heard.sent
-    if isinstance(heard, Heard):
-        frame = heard.frame
+    at_us, channel, sent = record.at_us, record.channel, record.sent
+    if isinstance(record, Record):
+        frame = record.frame
         text, _, data = str(frame).partition("#")
         length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
     else:
-        text, data, length = "", heard.data.hex().upper(), len(heard.data)
+        text, data, length = "", record.data.hex().upper(), len(record.data)
     meaning = ("", "", "")
     if decoded is not None:
         node = "" if decoded.node is None else str(decoded.node)
@@ -156,7 +156,7 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
-class Printed:
+class StdoutWriter:
     """Lines on standard output; in JSON, losses among them."""
 
     def __init__(self, printer: Printer, output: Output) -> None:

@@ -10,11 +10,11 @@ import can
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.bus_source import BusSource, merged, open_bus, reader_of
-from tickrig.host.canmon.sources.source_word import BusWord, parse_source
+from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 SEND_TIMEOUT_S: Final = 1
@@ -27,7 +27,7 @@ class Transmitter:
     Args:
         word: SOURCE word of a bus.
         options: what the command line says of it.
-        hears: read what comes in; else nothing is kept of it.
+        receives: read what comes in; else nothing is kept of it.
 
     Attributes:
         name: what the bus is called.
@@ -37,13 +37,13 @@ class Transmitter:
         SourceFailed: the bus cannot be opened.
     """
 
-    def __init__(self, word: str, options: BusOptions, *, hears: bool = False) -> None:
+    def __init__(self, word: str, options: BusOptions, *, receives: bool = False) -> None:
         bus_word = parse_source(word)
-        if not isinstance(bus_word, BusWord):
+        if not isinstance(bus_word, BusSpec):
             raise Refused(f"{word!r} is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k")
         self._bus, interface, self.name = open_bus(merged(bus_word, options))
         self._source: BusSource | None = None
-        if hears:
+        if receives:
             reader = reader_of(self._bus, interface, self.name)
             self._source = BusSource([reader], [bus_word.chosen])
 
@@ -51,17 +51,17 @@ class Transmitter:
         """Send a frame; SourceFailed if the bus is gone or takes none for 1 s."""
         send_on(self._bus, self.name, frame)
 
-    def poll(self, timeout_us: int) -> list[Heard]:
+    def poll(self, timeout_us: int) -> list[Record]:
         """Wait for a first frame, then return all that are there.
 
         Raises:
             SourceFailed: the bus is gone.
         """
         assert self._source is not None, "it was opened to hear"
-        heard = self._source.poll(timeout_us)
-        if not heard and self._source.failed:
+        records = self._source.poll(timeout_us)
+        if not records and self._source.failed:
             raise SourceFailed(self._source.failed)
-        return heard
+        return records
 
     def close(self) -> None:
         """Close the bus."""
@@ -82,13 +82,13 @@ def send_on(bus: can.BusABC, name: str, frame: CanFrame) -> None:
 
 @contextmanager
 def transmitters(
-    words: Sequence[str], options: BusOptions, *, hears: bool = False
+    words: Sequence[str], options: BusOptions, *, receives: bool = False
 ) -> Iterator[list[Transmitter]]:
     """Open buses, and close them behind the block."""
     opened: list[Transmitter] = []
     try:
         for word in words:
-            opened.append(Transmitter(word, options, hears=hears))
+            opened.append(Transmitter(word, options, receives=receives))
         yield opened
     finally:
         for one in opened:

@@ -13,12 +13,12 @@ from can.util import load_config
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.socket_reader import SocketReader
-from tickrig.host.canmon.sources.source_word import INTERFACES, BusWord
+from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.logs.can_record import to_heard
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.reading.can_log import channel_name
 from tickrig.host.monitor.logs.tally import Tally
 
@@ -77,19 +77,19 @@ class BusReader:
         self._bus, self.name, self.stepped = bus, name, interface in STEPPED
         self.lost, self.tally = 0, Tally()
 
-    def read(self, timeout_us: int, /) -> list[Heard]:
+    def read(self, timeout_us: int, /) -> list[Record]:
         """Wait for a first frame; LinkClosed if the bus is gone."""
-        heard: list[Heard] = []
+        records: list[Record] = []
         try:
             message = self._bus.recv(timeout_us / 1e6)
             while message is not None:
-                one = to_heard(message, self.name, self.tally)
-                heard += (one,) if one else ()
-                message = self._bus.recv(0) if len(heard) < BATCH else None
+                one = to_record(message, self.name, self.tally)
+                records += (one,) if one else ()
+                message = self._bus.recv(0) if len(records) < BATCH else None
         except (can.CanError, OSError, ValueError, TypeError) as error:
-            if not heard:
+            if not records:
                 raise LinkClosed(f"{self.name}: {' '.join(str(error).split())}") from error
-        return heard
+        return records
 
     def close(self) -> None:
         """Close the bus; one that is gone cannot be told."""
@@ -97,18 +97,18 @@ class BusReader:
             self._bus.shutdown()
 
 
-BusSource = LiveSource[Heard]
+BusSource = LiveSource[Record]
 """One or more buses: all that comes are frames."""
 
 
-def open_buses(words: Sequence[BusWord], options: BusOptions) -> BusSource:
+def open_buses(words: Sequence[BusSpec], options: BusOptions) -> BusSource:
     """Open the buses that are named, or none.
 
     Raises:
         Refused: options that python-can does not know.
         SourceFailed: a bus that cannot be opened.
     """
-    readers: list[Reader[Heard]] = []
+    readers: list[Reader[Record]] = []
     try:
         for word in words:
             readers.append(reader_of(*open_bus(merged(word, options))))
@@ -119,12 +119,12 @@ def open_buses(words: Sequence[BusWord], options: BusOptions) -> BusSource:
     return BusSource(readers, [word.chosen for word in words])
 
 
-def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Heard]:
+def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
     """Return what reads an open bus."""
     return SocketReader(bus, name) if interface == "socketcan" else BusReader(bus, interface, name)
 
 
-def merged(word: BusWord, options: BusOptions) -> BusOptions:
+def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     """Return the options of a bus: what its word says goes before them."""
     return replace(
         options,

@@ -10,9 +10,9 @@ from itertools import islice
 from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.source_word import FileWord
+from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.monitor.frames.candump_filter import flagged_id
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
 
@@ -29,7 +29,7 @@ class FileSource:
 
     live = False
 
-    def __init__(self, files: Sequence[FileWord]) -> None:
+    def __init__(self, files: Sequence[FileSpec]) -> None:
         self._names = [str(file.path) for file in files]
         self._readers = [read_log(file.path) for file in files]
         for file in files:
@@ -58,9 +58,9 @@ class FileSource:
         """Why reading ended early."""
         return self._failed
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         """Return the next frames; it never waits."""
-        batch: list[Heard] = []
+        batch: list[Record] = []
         try:
             batch.extend(islice(self._frames, BATCH))
         except (OSError, LogError) as error:
@@ -84,22 +84,22 @@ class FileSource:
         self._frames = iter(())
 
 
-def _check_readable(file: FileWord) -> None:
+def _check_readable(file: FileSpec) -> None:
     try:
         file.path.open("rb").close()
     except OSError as error:
         raise SourceFailed(f"{file.path}: {error.strerror}") from error
 
 
-def _chosen(file: FileWord, frames: Iterable[Heard]) -> Iterator[Heard]:
+def _chosen(file: FileSpec, frames: Iterable[Record]) -> Iterator[Record]:
     chosen = file.chosen
     if chosen is None:
         return iter(frames)
-    return (heard for heard in frames if chosen.passes(flagged_id(heard)))
+    return (record for record in frames if chosen.passes(flagged_id(record)))
 
 
-def _merged(streams: Sequence[Iterator[Heard]]) -> Iterator[Heard]:
-    return heapq.merge(*streams, key=lambda heard: heard.at_us)
+def _merged(streams: Sequence[Iterator[Record]]) -> Iterator[Record]:
+    return heapq.merge(*streams, key=lambda record: record.at_us)
 
 
 STDIN: Final = 0
@@ -135,7 +135,7 @@ class StdinSource:
         """Why reading ended early."""
         return self._failed
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         """Wait for bytes; return the frames of the lines that are whole."""
         if self._ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
             return []

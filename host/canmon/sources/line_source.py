@@ -14,14 +14,14 @@ from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
-from tickrig.host.canmon.sources.source_word import BusWord, LineWord
+from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter
-from tickrig.host.monitor.frames.record import HeardLine, Listened
+from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.rtc_lite.frame import Checksum
 
@@ -51,14 +51,14 @@ class LineReader:
         LinkClosed: the port cannot be opened.
     """
 
-    def __init__(self, word: LineWord) -> None:
+    def __init__(self, word: LineSpec) -> None:
         decoder, usual_baud = DECODINGS[word.protocol]
         self.name, self._from_host = PurePath(word.port).name or word.port, word.from_host
         self.lost, self.tally, self.stepped = 0, Tally(), False
         self._decoder = decoder(self.name)
         self._link = SerialLink(word.port, word.baud or usual_baud)
 
-    def read(self, timeout_us: int, /) -> list[HeardLine]:
+    def read(self, timeout_us: int, /) -> list[LineRecord]:
         """Wait for a first byte, then return the lines that are whole; LinkClosed if it is gone."""
         data = self._link.receive(timeout_us)
         at_us = time.time_ns() // 1_000
@@ -70,15 +70,15 @@ class LineReader:
 
 
 def open_lines(
-    words: Sequence[LineWord], buses: Sequence[BusWord], options: BusOptions
-) -> LiveSource[Listened]:
+    words: Sequence[LineSpec], buses: Sequence[BusSpec], options: BusOptions
+) -> LiveSource[AnyRecord]:
     """Open serial ports, and buses beside them.
 
     Raises:
         Refused: options that python-can does not know.
         SourceFailed: a port or bus that cannot be opened.
     """
-    readers: list[Reader[Listened]] = []
+    readers: list[Reader[AnyRecord]] = []
     try:
         for word in words:
             readers.append(open_port(word))
@@ -92,7 +92,7 @@ def open_lines(
     return LiveSource(readers, chosen + [bus.chosen for bus in buses])
 
 
-def open_port(word: LineWord) -> LineReader:
+def open_port(word: LineSpec) -> LineReader:
     """Open a serial port; SourceFailed if that cannot be."""
     try:
         return LineReader(word)
@@ -100,7 +100,7 @@ def open_port(word: LineWord) -> LineReader:
         raise SourceFailed(str(error)) from None
 
 
-def _open_bus(word: BusWord, options: BusOptions) -> Reader[Listened]:
+def _open_bus(word: BusSpec, options: BusOptions) -> Reader[AnyRecord]:
     from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
         merged,
         open_bus,

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import HeardLine
+    from tickrig.host.monitor.frames.record import LineRecord
 
 QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""
@@ -22,8 +22,8 @@ QUEUE_FRAMES: Final = 200_000
 WAIT_US: Final = 100_000
 """How long a thread may take to see that it shall end."""
 
-Item = TypeVar("Item", bound="Heard | HeardLine")
-Read_co = TypeVar("Read_co", bound="Heard | HeardLine", covariant=True)
+Item = TypeVar("Item", bound="Record | LineRecord")
+Read_co = TypeVar("Read_co", bound="Record | LineRecord", covariant=True)
 
 
 class Reader(Protocol[Read_co]):
@@ -143,20 +143,20 @@ class LiveSource(Generic[Item]):
 
     def _take(self, reader: Reader[Item], chosen: CandumpFilter | None, timeout_us: int) -> None:
         try:
-            heard = reader.read(timeout_us)
+            records = reader.read(timeout_us)
         except LinkClosed as error:
             self._failed = str(error)
             return
         if chosen is not None:
-            heard = [one for one in heard if _passes(chosen, one)]
+            records = [one for one in records if _passes(chosen, one)]
         room = self._queue_frames - len(self._queue)
-        if len(heard) > room:
-            self._overruns += len(heard) - room
-            heard = heard[:room]
-        self._queue += heard
-        if heard:
+        if len(records) > room:
+            self._overruns += len(records) - room
+            records = records[:room]
+        self._queue += records
+        if records:
             self._came.set()
 
 
-def _passes(chosen: CandumpFilter, one: Heard | HeardLine) -> bool:
-    return not isinstance(one, Heard) or chosen.passes(flagged_id(one))
+def _passes(chosen: CandumpFilter, one: Record | LineRecord) -> bool:
+    return not isinstance(one, Record) or chosen.passes(flagged_id(one))

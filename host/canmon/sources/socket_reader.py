@@ -15,7 +15,7 @@ from select import select
 from typing import Any, Final
 
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
@@ -72,19 +72,19 @@ class SocketReader:
         _enlarge(self._socket)
         self._socket.setblocking(False)
 
-    def read(self, timeout_us: int, /) -> list[Heard]:
+    def read(self, timeout_us: int, /) -> list[Record]:
         """Wait for a first frame; LinkClosed if the bus is gone."""
-        heard: list[Heard] = []
+        records: list[Record] = []
         select([self._socket], [], [], timeout_us / 1e6)
         try:
-            while len(heard) < BATCH:
-                heard += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
+            while len(records) < BATCH:
+                records += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
         except BlockingIOError:
             pass
         except OSError as error:
-            if not heard:
+            if not records:
                 raise LinkClosed(f"{self.name}: {error.strerror}") from error
-        return heard
+        return records
 
     def close(self) -> None:
         """Close the bus."""
@@ -92,7 +92,7 @@ class SocketReader:
 
     def _heard(
         self, data: bytes, ancillary: list[tuple[int, int, bytes]], flags: int, address: Any
-    ) -> tuple[Heard, ...]:
+    ) -> tuple[Record, ...]:
         at_us = 0
         for _, kind, said in ancillary:
             if kind == SO_TIMESTAMPNS:
@@ -104,7 +104,7 @@ class SocketReader:
             self.tally.passed_over[CAN_XL if data[_FLAGS_AT] & _XL_FLAG else CAN_FD] += 1
             return ()
         sent = bool(flags & MSG_CONFIRM)  # by this very socket (linux, networking/can)
-        return (Heard(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
+        return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
 
 
 def _enlarge(sock: socket.socket) -> None:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import click
 
 from tickrig.host.canmon.sources.file_source import FileSource, StdinSource
-from tickrig.host.canmon.sources.source_word import BusWord, FileWord, LineWord, parse_source
+from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
 SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
@@ -82,10 +82,10 @@ class AnySource(Protocol[Taken_co]):
         ...
 
 
-class Source(AnySource[Heard], Protocol):
+class Source(AnySource[Record], Protocol):
     """Frames as they come in."""
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         """Wait for a first frame, then return all that are there; none if none came."""
         ...
 
@@ -109,28 +109,28 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
             "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
         )
     parsed = [parse_source(word) for word in words]
-    files = [word for word in parsed if isinstance(word, FileWord)]
-    buses = [word for word in parsed if isinstance(word, BusWord)]
+    files = [word for word in parsed if isinstance(word, FileSpec)]
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
     if parsed == [None]:
         return StdinSource()
     if len(files) == len(parsed) > 0:
         return FileSource(files)
-    if any(isinstance(word, LineWord) for word in parsed):
+    if any(isinstance(word, LineSpec) for word in parsed):
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
     from tickrig.host.canmon.sources.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only
 
-    return open_buses(buses or [BusWord()], options)
+    return open_buses(buses or [BusSpec()], options)
 
 
-def open_any(words: Sequence[str], options: BusOptions) -> AnySource[Listened]:
+def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
     """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
     parsed = [parse_source(word) for word in words]
-    lines = [word for word in parsed if isinstance(word, LineWord)]
+    lines = [word for word in parsed if isinstance(word, LineSpec)]
     if not lines:
         return open_source(words, options)
-    buses = [word for word in parsed if isinstance(word, BusWord)]
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
     if len(buses) + len(lines) < len(parsed):
         raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
     from tickrig.host.canmon.sources.line_source import open_lines  # noqa: PLC0415 - pyserial
@@ -141,6 +141,6 @@ def open_any(words: Sequence[str], options: BusOptions) -> AnySource[Listened]:
 def log_path(word: str) -> Path:
     """Return the log file that a word names; Refused if it names none."""
     parsed = parse_source(word)
-    if not isinstance(parsed, FileWord):
+    if not isinstance(parsed, FileSpec):
         raise Refused(f"{word!r} is no log file")
     return parsed.path

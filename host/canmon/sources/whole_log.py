@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.source_word import FileWord, parse_source
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.traffic.traffic import Snapshot
 
@@ -44,7 +44,7 @@ class WholeLog:
         """Lines and frames that could not be taken."""
         return self.columns.tally.unread
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         """Return nothing: all is in the columns."""
         return []
 
@@ -90,7 +90,7 @@ def _large_log(words: Sequence[str]) -> Path | None:
     if len(words) != 1 or find_spec("numpy") is None:
         return None
     word = parse_source(words[0])
-    if not isinstance(word, FileWord) or word.chosen is not None:
+    if not isinstance(word, FileSpec) or word.chosen is not None:
         return None
     try:
         return word.path if word.path.stat().st_size >= SMALL_BYTES else None

@@ -14,7 +14,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Input, TabbedContent, TabPane
 
-from tickrig.host.canmon.monitor_setup import Bench, BenchSetup
+from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.tasks.session import Session
@@ -86,12 +86,12 @@ class Monitor(FramedApp):
     ]
 
     def __init__(
-        self, session: Session, panels: Sequence[Panel], bench: Bench | None = None
+        self, session: Session, panels: Sequence[Panel], bench: PanelSettings | None = None
     ) -> None:
         super().__init__()
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
-        self.bench = bench or Bench(Workspace(), BenchSetup(), panels)
+        self.bench = bench or PanelSettings(Workspace(), MonitorSetup(), panels)
 
     def compose(self) -> ComposeResult:
         """Lay out the tabs."""

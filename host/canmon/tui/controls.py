@@ -99,7 +99,7 @@ Take = Callable[[str], None]
 """Takes an answer; ValueError says what is wrong with it."""
 
 
-class AskLine(Vertical):
+class PromptLine(Vertical):
     """Is hidden until something is asked; Enter answers, Escape does not."""
 
     DEFAULT_CSS = """

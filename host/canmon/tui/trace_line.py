@@ -1,8 +1,8 @@
 """Rows of the trace as lines with styles.
 
->>> from tickrig.host.monitor.frames.record import Heard
+>>> from tickrig.host.monitor.frames.record import Record
 >>> from tickrig.wire.can import CanFrame
->>> row = TraceRow(7, Heard(1_250_000, "can0", CanFrame.parse("185#3702")), 50_000, 100_000, 0xFF)
+>>> row = TraceRow(7, Record(1_250_000, "can0", CanFrame.parse("185#3702")), 50_000, 100_000, 0xFF)
 >>> line = TraceLines(origin_us=1_000_000).line(row)
 >>> line_text(line)
 '     0.250000  100.000 185       [2] 37 02'
@@ -21,7 +21,7 @@ from typing import Final
 from tickrig.host.monitor.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
 from tickrig.host.monitor.frames.ident import ident_of, ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.line_traffic import ARROWS
 from tickrig.host.monitor.views.top_model import meaning_text
 from tickrig.host.monitor.views.trace import TraceRow
@@ -82,8 +82,8 @@ class TraceLines:
 
     def line(self, row: TraceRow, count: int = 0) -> Line:
         """Return the line of a row."""
-        heard = row.heard
-        channel = f"{heard.channel:<{self.channel_width}} " * bool(self.channel_width)
+        record = row.record
+        channel = f"{record.channel:<{self.channel_width}} " * bool(self.channel_width)
         counted = f"{count:>8} " * self.counts
         begin = f"{self._stamp(row):>{self._stamp_width}} {ms_text(row.gap_us):>8} "
         pieces = [(begin, DIM), (counted + channel, ""), _ident(row), *self._data(row)]
@@ -102,7 +102,7 @@ class TraceLines:
         return BITS_WIDTH if self.bits else BYTES_WIDTH
 
     def _stamp(self, row: TraceRow) -> str:
-        at_us = row.heard.at_us
+        at_us = row.record.at_us
         match self.stamp:
             case Stamp.DELTA:
                 return seconds_text(row.since_us or 0, 1)
@@ -114,11 +114,11 @@ class TraceLines:
                 return seconds_text(at_us - self.origin_us, 1)
 
     def _data(self, row: TraceRow) -> Iterator[tuple[str, str]]:
-        heard = row.heard
-        if not isinstance(heard, Heard):
-            yield bytes_text(heard.data), ""
+        record = row.record
+        if not isinstance(record, Record):
+            yield bytes_text(record.data), ""
             return
-        frame = heard.frame
+        frame = record.frame
         if isinstance(frame, CanFrame) and frame.remote:
             yield f"[{frame.dlc}] remote request", ""
             return
@@ -139,11 +139,11 @@ def _cells(data: bytes, changed: int, bits: bool) -> Iterator[tuple[str, bool]]:
 
 
 def _ident(row: TraceRow) -> tuple[str, str]:
-    heard = row.heard
-    style = SENT if heard.sent else HEAD
-    if not isinstance(heard, Heard):
-        return f"{ARROWS[heard.sent]:<9} ", style
-    frame = heard.frame
+    record = row.record
+    style = SENT if record.sent else HEAD
+    if not isinstance(record, Record):
+        return f"{ARROWS[record.sent]:<9} ", style
+    frame = record.frame
     if isinstance(frame, ErrorFrame):
         return f"{'error':<9} ", ERROR
     return f"{ident_text(ident_of(frame)):<9} ", style

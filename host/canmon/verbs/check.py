@@ -22,10 +22,10 @@ from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.junit import junit
-from tickrig.host.monitor.check.parse_rules import SWITCHES, VALUES, Words, joined, parse_rules
+from tickrig.host.monitor.check.parse_rules import SWITCHES, VALUES, RuleValues, joined, parse_rules
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -62,7 +62,7 @@ def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
     Raises:
         Refused: a rule that is none, a file that cannot be read, or no rule at all.
     """
-    words: Words = {}
+    words: RuleValues = {}
     for path in files:
         words = joined(words, _file(path))
     given = {name: options[name] for name in (*SWITCHES, *VALUES) if options.get(name)}
@@ -77,7 +77,7 @@ def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
     return rules
 
 
-def _file(path: Path) -> Words:
+def _file(path: Path) -> RuleValues:
     """Read a file, and check it alone so that it is named if it is wrong."""
     try:
         words = tomllib.loads(path.read_text("utf-8"))
@@ -190,15 +190,15 @@ class Verdict:
 
 def finding_json(finding: Finding) -> str:
     """Write a finding as an object; its frame as candump does."""
-    heard = finding.heard
+    record = finding.record
     said: dict[str, object] = {
         "v": 1,
         "t": finding.at_us / 1e6,
         "rule": finding.rule,
         "text": finding.text,
     }
-    if heard is not None:
-        said |= {"ch": heard.channel, "frame": str(heard.frame)}
+    if record is not None:
+        said |= {"ch": record.channel, "frame": str(record.frame)}
     return json.dumps(said, ensure_ascii=False)
 
 
@@ -227,10 +227,10 @@ def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]
 def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int | None) -> None:
     watch = Stopwatch()
 
-    def take(heards: Sequence[Heard]) -> None:
-        watch.take(heards)
-        verdict.frames += len(heards)
-        verdict.take([finding for heard in heards for finding in checker.take(heard)])
+    def take(records: Sequence[Record]) -> None:
+        watch.take(records)
+        verdict.frames += len(records)
+        verdict.take([finding for record in records for finding in checker.take(record)])
 
     with until_interrupted():
         listen(source, take, span_us)

@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 
 from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.log_file import LogFile
-from tickrig.host.canmon.output.meaning import Meaning
 from tickrig.host.canmon.sources.source import explain_sources, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -52,7 +52,7 @@ def command(  # noqa: PLR0913 - options
     """  # noqa: D301 - click wants the backspace
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
-    meaning, frames = Meaning(decoder, chosen), open_source(source)
+    meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
     with closing(frames), closing(LogFile(log, source)) as out, until_interrupted():
         pass_on(frames, meaning, out.take)
     report(frames, strict, meaning.words())

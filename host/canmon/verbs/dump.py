@@ -13,11 +13,11 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder, Meant
 from tickrig.host.canmon.output.log_file import LogFile
-from tickrig.host.canmon.output.meaning import Meaning, Meant
-from tickrig.host.canmon.output.printer import Output, Printed, printer_of
+from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
 from tickrig.host.canmon.sources.source import AnySource, explain_sources, open_any
-from tickrig.host.canmon.sources.source_word import LineWord, parse_source
+from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
@@ -30,7 +30,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.dump_line import Stamp
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
 POLL_US: Final = 100_000
 
@@ -111,8 +111,8 @@ def command(  # noqa: PLR0913 - options
     chosen, form = read_filter(wanted), Output(output or "")
     plain = raw or form is Output.LOG or file is not None
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
-    meaning = Meaning(decoder, chosen)
-    shown = Printed(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
+    meaning = FilteredDecoder(decoder, chosen)
+    shown = StdoutWriter(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
     with ExitStack() as held:
         frames = held.enter_context(closing(open_any(source, BusOptions(**options))))
         log = None if file is None else held.enter_context(closing(LogFile(file, source)))
@@ -122,12 +122,12 @@ def command(  # noqa: PLR0913 - options
 
 
 def _is_line(word: str) -> bool:
-    return isinstance(parse_source(word), LineWord)
+    return isinstance(parse_source(word), LineSpec)
 
 
 def pass_on(
-    source: AnySource[Listened],
-    meaning: Meaning,
+    source: AnySource[AnyRecord],
+    meaning: FilteredDecoder,
     take: Take,
     count: int | None = None,
     quiet_ms: int | None = None,
@@ -136,11 +136,11 @@ def pass_on(
     quiet_s = quiet_ms / 1e3 if quiet_ms else float("inf")
     latest_s, left = time.monotonic(), count
     while not source.ended and left != 0:
-        heards = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
-        meant = list(islice(meaning.take(heards), left))
+        records = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
+        meant = list(islice(meaning.take(records), left))
         take(meant, source.lost)
         left = None if left is None else left - len(meant)
-        if heards:
+        if records:
             latest_s = time.monotonic()
         elif time.monotonic() - latest_s >= quiet_s:
             break

@@ -25,7 +25,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import Series, View
-from tickrig.host.monitor.graph.signal_word import ObjectName, parse_signal
+from tickrig.host.monitor.graph.signal_spec import ObjectName, parse_signal
 from tickrig.host.text.values import parse_time_us
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")

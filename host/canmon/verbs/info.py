@@ -83,7 +83,7 @@ def read_head(path: Path) -> LogHead:
         path.stat().st_size,
         len(head) if whole else None,
         len(head),
-        tuple(dict.fromkeys(heard.channel for heard in head)),
+        tuple(dict.fromkeys(record.channel for record in head)),
         head[0].at_us if head else None,
         last_us,
         reader.tally,

@@ -19,7 +19,7 @@ from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
@@ -84,11 +84,11 @@ class NodesView:
         self._board = NodeBoard(self._decoder, {node: found.name for node, found in eds.items()})
         self._watch = Stopwatch()
 
-    def take(self, heards: Sequence[Heard]) -> None:
+    def take(self, records: Sequence[Record]) -> None:
         """Take what was heard."""
-        for heard in heards:
-            self._board.take(heard, self._decoder.take(heard))
-        self._watch.take(heards)
+        for record in records:
+            self._board.take(record, self._decoder.take(record))
+        self._watch.take(records)
 
     def lines(self, *, live: bool) -> list[str]:
         """Return the board for paper, or as wide as the terminal is."""

@@ -57,8 +57,8 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     path = log_path(log)
     reader = read_log(path)
     plan = _plan(reader, route, options)
-    hears = wait_rx is not None
-    with transmitters(words, BusOptions(**options), hears=hears) as opened:
+    receives = wait_rx is not None
+    with transmitters(words, BusOptions(**options), receives=receives) as opened:
         _play(plan, dict(zip(words, opened, strict=True)), step, wait_rx)
     for word in reader.tally.words(str(path)):
         click.echo(word, err=True)

@@ -19,7 +19,7 @@ from tickrig.host.monitor.transmit.frame_fields import (
     parse_checksum,
     parse_counter,
 )
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import Cyclic
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
@@ -77,7 +77,7 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame]:
             texts[-1] += f" {word}"
         else:
             texts.append(word)
-    named = PdoWords(read_eds_files(eds))
+    named = PdoFrames(read_eds_files(eds))
     try:
         return [CanFrame.parse(text) if "#" in text else named.frame(text) for text in texts]
     except (ValueError, WireError) as error:

@@ -18,14 +18,14 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence import steps
-from tickrig.host.monitor.sequence.conditions import HeardCondition
+from tickrig.host.monitor.sequence.conditions import DecodedCondition
 from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun, note_line
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun, event_line
 from tickrig.host.monitor.sequence.steps import Condition
 from tickrig.host.monitor.sequence.variables import parse_variable
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
@@ -41,11 +41,11 @@ class Watch:
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
         self.eds = eds
-        self._decoder, self._latest = Decoder(eds), HeardCondition()
+        self._decoder, self._latest = Decoder(eds), DecodedCondition()
 
-    def take(self, heard: Heard) -> None:
+    def take(self, record: Record) -> None:
         """Decode a frame; conditions are asked about it next."""
-        self._latest.take(heard, self._decoder.take(heard))
+        self._latest.take(record, self._decoder.take(record))
 
     def condition(self, text: str) -> Condition:
         """Return the condition of a filter expression; ValueError if it is none."""
@@ -109,7 +109,7 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
                 raise Refused(f"--var {name}: {file} does not name it")
         if file.suffix != ".toml":
             return parse_lines(text, str(file))
-        resolve = PdoWords(watch.eds).frame
+        resolve = PdoFrames(watch.eds).frame
         return TomlSequence(
             text, str(file), variables, resolve=resolve, condition=watch.condition
         ).parse()
@@ -124,14 +124,14 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
 def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, quiet: bool) -> None:
     from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
 
-    with transmitters([bus], options, hears=True) as (out,), until_interrupted(), until_unread():
+    with transmitters([bus], options, receives=True) as (out,), until_interrupted(), until_unread():
         pace = Pace()
         _send(out, watch, run.tick(pace.now_us))
         while not run.done:
             _show(run, quiet)
-            for heard in out.poll(max(0, min(POLL_US, run.due_us - pace.now_us))):
-                watch.take(heard)
-                _send(out, watch, run.tick(pace.now_us, (heard,)))
+            for record in out.poll(max(0, min(POLL_US, run.due_us - pace.now_us))):
+                watch.take(record)
+                _send(out, watch, run.tick(pace.now_us, (record,)))
             _send(out, watch, run.tick(pace.now_us))
     _show(run, quiet)
 
@@ -139,12 +139,12 @@ def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, qu
 def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
     for frame in frames:
         out.send(frame)
-        watch.take(Heard(time.time_ns() // 1_000, out.name, frame, sent=True))
+        watch.take(Record(time.time_ns() // 1_000, out.name, frame, sent=True))
 
 
 def _show(run: SequenceRun, quiet: bool) -> None:
     """Print what happened since the last time."""
     for note in run.notes:
-        if not quiet or note.mark is Mark.MISSED:
-            click.echo(note_line(note))
+        if not quiet or note.mark is EventType.MISSED:
+            click.echo(event_line(note))
     run.notes.clear()

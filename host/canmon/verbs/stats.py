@@ -13,7 +13,7 @@ from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_u
 from tickrig.host.canmon.sources.source import explain_sources, open_source
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.host.monitor.views.statistics import (
     bus_json,
@@ -64,9 +64,9 @@ def command(
     frames = log or open_source(source, bus)
     traffic = Traffic()
 
-    def take(heards: Sequence[Heard]) -> None:
-        for heard in heards:
-            traffic.take(heard)
+    def take(records: Sequence[Record]) -> None:
+        for record in records:
+            traffic.take(record)
 
     try:
         with until_interrupted():

@@ -11,6 +11,7 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.listening import (
     bit_rate_of,
     listen,
@@ -18,7 +19,6 @@ from tickrig.host.canmon.output.listening import (
     patience_us,
     span_option,
 )
-from tickrig.host.canmon.output.meaning import Meaning
 from tickrig.host.canmon.sources.source import explain_sources, open_any
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (
@@ -31,9 +31,9 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.views.top_model import TopModel
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
-Take = Callable[["Sequence[Listened]"], None]
+Take = Callable[["Sequence[AnyRecord]"], None]
 
 
 @click.command(cls=BusCommand)
@@ -76,8 +76,8 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**options)
     chosen, model = read_filter(wanted), TopModel(bit_rate_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
-    meaning = Meaning(None if plain else make_decoder(eds, dbc), chosen)
-    take = model.take if plain else _meant(model, meaning)
+    meaning = FilteredDecoder(None if plain else make_decoder(eds, dbc), chosen)
+    take = model.take if plain else _take_decoded(model, meaning)
     log = whole_log(source) if plain else None
     model.press("d" if decode else "")
     frames = log or open_any(source, bus)
@@ -103,8 +103,8 @@ def command(  # noqa: PLR0913 - options
     report(frames, strict, meaning.words())
 
 
-def _meant(model: TopModel, meaning: Meaning) -> Take:
-    return lambda heards: model.take_meant(meaning.take(heards))
+def _take_decoded(model: TopModel, meaning: FilteredDecoder) -> Take:
+    return lambda records: model.take_decoded(meaning.take(records))
 
 
 explain_sources(command)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.monitor_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.output.ending import report
 from tickrig.host.canmon.sources.source import explain_sources
 from tickrig.host.canmon.verbs.decode_options import (
@@ -62,7 +62,7 @@ def command(
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    said = BenchSetup(
+    said = MonitorSetup(
         source=tuple(source), options=BusOptions(**options), eds=eds_paths(eds), dbc=tuple(dbc)
     )
     monitor = _monitor(path, said)
@@ -76,7 +76,7 @@ def command(
     report(monitor.session.source, strict)
 
 
-def _monitor(path: Path | None, said: BenchSetup) -> Monitor:
+def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
     """Make the program, its panels with the settings of the workspace."""
     try:
         with loading():
@@ -84,20 +84,20 @@ def _monitor(path: Path | None, said: BenchSetup) -> Monitor:
             from tickrig.host.canmon.tui.panels.panels import PANELS  # noqa: PLC0415
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.canmon.monitor_setup import Bench  # noqa: PLC0415 - an extra
+    from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
     from tickrig.host.canmon.tui.tasks.model import Model  # noqa: PLC0415 - slow
     from tickrig.host.canmon.tui.tasks.opening import open_session  # noqa: PLC0415
 
     try:
         workspace = Workspace() if path is None else Workspace.read(path)
-        setup = BenchSetup.read(workspace).under(said)
+        setup = MonitorSetup.read(workspace).under(said)
         objects = read_eds_paths(setup.eds)
         with refusing_dbc():
             model = Model(objects, setup.dbc, setup.options.bitrate)
         session = open_session(setup.source, setup.options, model)
         try:
             panels = [panel(session) for panel in PANELS]
-            bench = Bench(workspace, setup, panels)
+            bench = PanelSettings(workspace, setup, panels)
             bench.load()
         except BaseException:
             session.source.close()

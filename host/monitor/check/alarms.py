@@ -11,7 +11,7 @@ from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
 from tickrig.host.monitor.frames.quantity import s_text
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 RECENT_US: Final = 2_000_000
 """A rule that a frame broke counts as broken for so long."""
@@ -94,10 +94,10 @@ class Alarms:
         self.findings = deque(maxlen=KEPT)
         self._begin_us, self.judged = None, False
 
-    def take(self, heard: Heard) -> None:
+    def take(self, record: Record) -> None:
         """Hold a frame against the rules."""
         self.judged = True
-        for finding in self._checker.take(heard):
+        for finding in self._checker.take(record):
             self._found(finding)
 
     def look(self, now_us: int, lost: int = 0) -> None:

@@ -2,7 +2,7 @@
 
 >>> from tickrig.wire.can import CanFrame
 >>> checker = Checker(Rules(no_emcy=True))
->>> for finding in checker.take(Heard(5, "can0", CanFrame.parse("083#3081110000000000"))):
+>>> for finding in checker.take(Record(5, "can0", CanFrame.parse("083#3081110000000000"))):
 ...     print(finding)
 (0.000005) no-emcy: node 3: EMCY 8130h life guard error or heartbeat error [can0 083#3081110000000000]
 """  # noqa: E501 - as it is printed
@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
 from tickrig.host.monitor.frames.ident import ERROR, ident_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.load import Load, Window
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
@@ -38,18 +38,18 @@ class Checker:
         self._last_us: dict[tuple[str, int], int] = {}
         self._loads: dict[str, Load] = {}
 
-    def take(self, heard: Heard) -> list[Finding]:
+    def take(self, record: Record) -> list[Finding]:
         """Return what is wrong with a frame, and with the second that it ended."""
-        at_us, channel, frame, _ = heard
+        at_us, channel, frame, _ = record
         found = self._too_busy(at_us, channel, frame) if self._load else []
         if isinstance(frame, ErrorFrame):
-            return found + self._judged(ERROR, heard, None)
+            return found + self._judged(ERROR, record, None)
         ident = ident_of(frame)
         key = channel, ident
         before_us = self._last_us.get(key)
         self._last_us[key] = at_us
         gap_us = None if before_us is None else max(0, at_us - before_us)
-        return found + self._judged(ident, heard, gap_us)
+        return found + self._judged(ident, record, gap_us)
 
     def end(self, end_us: int, lost: Iterable[str] = ()) -> list[Finding]:
         """Return what is missing.
@@ -71,12 +71,12 @@ class Checker:
         text = self._load.judge(channel, window) if self._load else None
         return [] if text is None else [Finding(window.at_us, "max-load", text)]
 
-    def _judged(self, ident: int, heard: Heard, gap_us: int | None) -> list[Finding]:
+    def _judged(self, ident: int, record: Record, gap_us: int | None) -> list[Finding]:
         wanting = self._wanting.get(ident)
         if wanting is None:
             wanting = self._wanting[ident] = [rule for rule in self._made if rule.wants(ident)]
-        texts = ((rule.name, rule.judge(heard, gap_us)) for rule in wanting)
-        return [Finding(heard.at_us, name, text, heard) for name, text in texts if text]
+        texts = ((rule.name, rule.judge(record, gap_us)) for rule in wanting)
+        return [Finding(record.at_us, name, text, record) for name, text in texts if text]
 
     def _too_busy(self, at_us: int, channel: str, frame: CanFrame | ErrorFrame) -> list[Finding]:
         load = self._loads.get(channel)

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.monitor.check.checker import ended
-from tickrig.host.monitor.check.rule import NO_GAP_US, Finding, Rule, Suspects
+from tickrig.host.monitor.check.rule import NO_GAP_US, Finding, FrameSelection, Rule
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.columns.column_bits import column_bits
 from tickrig.host.monitor.columns.column_traffic import windows_of
-from tickrig.host.monitor.columns.columns import Columns, Ints, Runs, heards
+from tickrig.host.monitor.columns.columns import Columns, Ints, Runs, records
 from tickrig.host.monitor.frames.ident import ERROR
 
 
@@ -40,45 +40,45 @@ class SortedLog:
 
     def judged(self, rule: Rule) -> list[tuple[int, Finding]]:
         """Let a rule see what it suspects; return rows and findings."""
-        rows, gaps_us = self._suspects(rule)
+        rows, gaps_us = self._selection(rule)
         found = []
-        for row, gap_us, heard in zip(
-            rows.tolist(), gaps_us.tolist(), heards(self._columns, rows), strict=True
+        for row, gap_us, record in zip(
+            rows.tolist(), gaps_us.tolist(), records(self._columns, rows), strict=True
         ):
-            text = rule.judge(heard, None if gap_us == NO_GAP_US else gap_us)
+            text = rule.judge(record, None if gap_us == NO_GAP_US else gap_us)
             if text:
-                found.append((row, Finding(heard.at_us, rule.name, text, heard)))
+                found.append((row, Finding(record.at_us, rule.name, text, record)))
         return found
 
-    def _suspects(self, rule: Rule) -> tuple[Ints, Ints]:
+    def _selection(self, rule: Rule) -> tuple[Ints, Ints]:
         """Return rows and gaps in the order of the log."""
         errors = self._errors if rule.wants(ERROR) else self._errors[:0]
         rows, gaps_us = [errors], [np.full(len(errors), NO_GAP_US)]
         for ident, begin, end in self._idents():
             if rule.wants(ident):
-                suspected = self._suspected(rule.suspects(ident), begin, end)
-                places = begin + np.flatnonzero(suspected)
+                selected = self._selected(rule.selection(ident), begin, end)
+                places = begin + np.flatnonzero(selected)
                 rows.append(self._row(places))
                 gaps_us.append(np.where(places == begin, NO_GAP_US, self._gaps_us[places]))
         every = np.concatenate(rows)
         order = np.argsort(every, kind="stable")
         return every[order], np.concatenate(gaps_us)[order]
 
-    def _suspected(self, suspects: Suspects, begin: int, end: int) -> npt.NDArray[np.bool_]:
-        below_us, above_us, first_bytes, firsts = suspects
-        if suspects == Suspects():
+    def _selected(self, selection: FrameSelection, begin: int, end: int) -> npt.NDArray[np.bool_]:
+        below_us, above_us, first_bytes, firsts = selection
+        if selection == FrameSelection():
             return np.ones(end - begin, np.bool_)
         gaps_us = self._gaps_us[begin:end]
-        suspected = np.zeros(end - begin, np.bool_)
-        suspected[0] = firsts
+        selected = np.zeros(end - begin, np.bool_)
+        selected[0] = firsts
         if below_us is not None:
-            suspected |= gaps_us < below_us
+            selected |= gaps_us < below_us
         if above_us is not None:
-            suspected |= gaps_us > above_us
+            selected |= gaps_us > above_us
         if first_bytes:
             low = self._columns.payload[self._row(slice(begin, end))] & np.uint64(0xFF)
-            suspected |= np.isin(low, np.array(sorted(first_bytes), np.uint64))
-        return suspected
+            selected |= np.isin(low, np.array(sorted(first_bytes), np.uint64))
+        return selected
 
     def _idents(self) -> Iterable[tuple[int, int, int]]:
         """Give each identifier with begin and end of its run."""

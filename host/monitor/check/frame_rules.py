@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.monitor.check.rule import Suspects
+from tickrig.host.monitor.check.rule import FrameSelection
 from tickrig.host.monitor.check.time_rules import BOOT_UP
 from tickrig.host.monitor.frames.ident import ERROR, ident_of, ident_text, sender_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
 from tickrig.wire.canopen.emcy import Emcy, describe
@@ -33,9 +33,9 @@ class FrameRule:
 
     name = ""
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect all."""
-        return Suspects()
+        return FrameSelection()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Say nothing."""
@@ -51,9 +51,9 @@ class NoEmcy(FrameRule):
         """Take the COB-IDs of EMCY."""
         return ident in EMCY_IDS
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Name the error."""
-        frame = heard.frame
+        frame = record.frame
         assert isinstance(frame, CanFrame)
         try:
             emcy = Emcy.parse(frame.data)
@@ -74,13 +74,13 @@ class NoSdoAbort(FrameRule):
         """Take the COB-IDs of the default servers."""
         return ident in ANSWER_IDS or ident in REQUEST_IDS
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect aborts."""
-        return Suspects(first_bytes=frozenset([ClientCommand.ABORT]))
+        return FrameSelection(first_bytes=frozenset([ClientCommand.ABORT]))
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Name object and abort code."""
-        frame = heard.frame
+        frame = record.frame
         assert isinstance(frame, CanFrame)
         data = frame.data
         if len(data) != FRAME_BYTES or data[0] != ClientCommand.ABORT:
@@ -102,14 +102,14 @@ class NoErrorFrames(FrameRule):
         """Take error frames."""
         return ident == ERROR
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Say what failed."""
-        frame = heard.frame
+        frame = record.frame
         assert isinstance(frame, ErrorFrame)
         return describe_error_frame(frame)
 
 
-class Known(FrameRule):
+class KnownIds(FrameRule):
     """No other identifiers than these; each other one is told once a bus.
 
     Args:
@@ -125,18 +125,18 @@ class Known(FrameRule):
         """Take all others."""
         return ident not in self._idents and ident != ERROR
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect the first frame."""
-        return Suspects(firsts=True)
+        return FrameSelection(firsts=True)
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Tell the first frame."""
-        return None if gap_us is not None else f"{_text(heard)} is not expected"
+        return None if gap_us is not None else f"{_text(record)} is not expected"
 
 
-def _text(heard: Heard) -> str:
-    assert isinstance(heard.frame, CanFrame)
-    return ident_text(ident_of(heard.frame))
+def _text(record: Record) -> str:
+    assert isinstance(record.frame, CanFrame)
+    return ident_text(ident_of(record.frame))
 
 
 RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
@@ -155,15 +155,15 @@ class NodesPresent(FrameRule):
         """Take nothing: what is missing is seen at the end."""
         return False
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Find nothing."""
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Name those that were never heard."""
-        heard = set(map(sender_of, latest_us))
+        present = set(map(sender_of, latest_us))
         for node in self._nodes:
-            if node not in heard:
+            if node not in present:
                 yield f"node {node} was never heard"
 
 
@@ -174,30 +174,30 @@ class NoReboot(FrameRule):
 
     def __init__(self) -> None:
         self._asked: set[int] = set()
-        self._heard: set[tuple[str, int]] = set()
+        self._present: set[tuple[str, int]] = set()
 
     def wants(self, ident: int, /) -> bool:
         """Take NMT commands and what nodes send."""
         return ident == NMT_COB_ID or sender_of(ident) is not None
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
         if ident == NMT_COB_ID:
-            return Suspects(first_bytes=RESETS)
+            return FrameSelection(first_bytes=RESETS)
         boot_up = frozenset(BOOT_UP) if ident in ERROR_CONTROL_IDS else frozenset()
-        return Suspects(first_bytes=boot_up, firsts=True)
+        return FrameSelection(first_bytes=boot_up, firsts=True)
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Note a reset; say that a boot-up comes without one."""
-        frame = heard.frame
+        frame = record.frame
         assert isinstance(frame, CanFrame)
         node = sender_of(frame.can_id)
         if node is None:
             if len(frame.data) == 2 and frame.data[0] in RESETS:
                 self._ask(frame.data[1])
             return None
-        is_new = (heard.channel, node) not in self._heard
-        self._heard.add((heard.channel, node))
+        is_new = (record.channel, node) not in self._present
+        self._present.add((record.channel, node))
         if frame.can_id not in ERROR_CONTROL_IDS or frame.data != BOOT_UP:
             return None
         expected = is_new or node in self._asked

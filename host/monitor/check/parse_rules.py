@@ -11,7 +11,7 @@ from tickrig.host.monitor.check.time_rules import HeartbeatTimes
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
 from tickrig.host.text.values import parse_time_us
 
-Words = Mapping[str, object]
+RuleValues = Mapping[str, object]
 """Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
 
 SWITCHES: Final = ("no_emcy", "no_sdo_abort", "no_error_frames", "no_reboot", "no_loss")
@@ -24,7 +24,7 @@ _MAX_NODE: Final = 127
 _MAX_IDENTS: Final = 1 << 16
 
 
-def parse_rules(words: Words) -> Rules:
+def parse_rules(words: RuleValues) -> Rules:
     """Read rules.
 
     Raises:
@@ -52,7 +52,7 @@ def parse_rules(words: Words) -> Rules:
     )
 
 
-def joined(first: Words, second: Words) -> Words:
+def joined(first: RuleValues, second: RuleValues) -> RuleValues:
     """Return the rules of both; a number of the second goes before one of the first.
 
     >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
@@ -87,7 +87,7 @@ def _bit_rate(value: object) -> int | None:
     return value
 
 
-def _texts(name: str, words: Words) -> list[str]:
+def _texts(name: str, words: RuleValues) -> list[str]:
     """Return what a rule is given as texts; a table is texts with `=`."""
     value = words.get(name, ())
     if isinstance(value, Mapping):
@@ -97,7 +97,7 @@ def _texts(name: str, words: Words) -> list[str]:
     return [str(value)]
 
 
-def _lists(name: str, words: Words) -> list[str]:
+def _lists(name: str, words: RuleValues) -> list[str]:
     return [part.strip() for text in _texts(name, words) for part in text.split(",")]
 
 

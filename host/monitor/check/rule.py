@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple, Protocol
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 
 class Finding(NamedTuple):
@@ -15,13 +15,13 @@ class Finding(NamedTuple):
         at_us: when it was seen.
         rule: name of the rule.
         text: what is wrong, in words.
-        heard: the frame that shows it, None if none does.
+        record: the frame that shows it, None if none does.
     """
 
     at_us: int
     rule: str
     text: str
-    heard: Heard | None = None
+    record: Record | None = None
 
     def __str__(self) -> str:
         """Write it as one line, time and frame as candump does.
@@ -29,7 +29,7 @@ class Finding(NamedTuple):
         >>> str(Finding(1_500_000, "nodes", "node 3 was never heard"))
         '(1.500000) nodes: node 3 was never heard'
         """
-        shown = f" [{self.heard.channel} {self.heard.frame}]" if self.heard else ""
+        shown = f" [{self.record.channel} {self.record.frame}]" if self.record else ""
         seconds, micros = divmod(self.at_us, 1_000_000)
         return f"({seconds}.{micros:06d}) {self.rule}: {self.text}{shown}"
 
@@ -38,7 +38,7 @@ NO_GAP_US: Final = -1
 """Where a gap is compared: the first frame of an identifier has none."""
 
 
-class Suspects(NamedTuple):
+class FrameSelection(NamedTuple):
     """Which frames of an identifier a rule must see; no other can change what it finds.
 
     Where nothing is given, all of them.
@@ -72,15 +72,15 @@ class Rule(Protocol):
         """Say whether frames of an identifier matter; error frames have `ident.ERROR`."""
         ...
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Say which frames of an identifier that it wants it must see."""
         ...
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Say what is wrong with a frame.
 
         Args:
-            heard: the frame.
+            record: the frame.
             gap_us: since the one before it with this identifier on this bus; None for the first.
         """
         ...

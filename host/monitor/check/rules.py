@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.check.frame_rules import (
-    Known,
+    KnownIds,
     NodesPresent,
     NoEmcy,
     NoErrorFrames,
@@ -70,7 +70,7 @@ class Rules:
         made += [Heartbeat(times) for times in self.heartbeats]
         made += [NodesPresent(self.nodes)] * bool(self.nodes)
         made += [MaxGap(*gap) for gap in self.max_gaps]
-        made += [Known(self.known)] if self.known is not None else []
+        made += [KnownIds(self.known)] if self.known is not None else []
         return made
 
     def load(self, bit_rate: int | None) -> MaxLoad | None:

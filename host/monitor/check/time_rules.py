@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.check.rule import Suspects
+from tickrig.host.monitor.check.rule import FrameSelection
 from tickrig.host.monitor.frames.ident import ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.load import WINDOW_US, Window
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 
@@ -70,17 +70,17 @@ class Heartbeat:
         """Take its COB-ID."""
         return ident == self._ident
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect what comes too soon or too late, and boot-ups."""
         _, low_us, high_us = self._times
-        return Suspects(low_us, high_us, frozenset(BOOT_UP), firsts=True)
+        return FrameSelection(low_us, high_us, frozenset(BOOT_UP), firsts=True)
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Compare the gap, unless the frame or the one before it is a boot-up."""
-        if heard.frame.data == BOOT_UP:
-            self._booted_us[heard.channel] = heard.at_us
+        if record.frame.data == BOOT_UP:
+            self._booted_us[record.channel] = record.at_us
             return None
-        if gap_us is None or heard.at_us - gap_us == self._booted_us.get(heard.channel):
+        if gap_us is None or record.at_us - gap_us == self._booted_us.get(record.channel):
             return None
         if gap_us > self._times.high_us:
             return self._said(gap_us, "at most", self._times.high_us)
@@ -115,11 +115,11 @@ class MaxGap:
         """Take its frames."""
         return ident == self._ident
 
-    def suspects(self, ident: int, /) -> Suspects:
+    def selection(self, ident: int, /) -> FrameSelection:
         """Suspect what comes too late."""
-        return Suspects(above_us=self._most_us)
+        return FrameSelection(above_us=self._most_us)
 
-    def judge(self, heard: Heard, gap_us: int | None, /) -> str | None:
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Compare the gap."""
         return None if gap_us is None or gap_us <= self._most_us else self._said(gap_us)
 

@@ -78,8 +78,8 @@ def _take_apart(
     rows = Rows(len(block.starts))
     block.take(rows, channels)
     for row in (~rows.known).nonzero()[0].tolist():
-        heard = parse_log_line(block.line(row), number + row + 1, tally, clock)
-        if heard is None:
+        record = parse_log_line(block.line(row), number + row + 1, tally, clock)
+        if record is None:
             continue
-        rows.put(row, heard, channels.place(heard.channel))
+        rows.put(row, record, channels.place(record.channel))
     return rows

@@ -14,12 +14,12 @@ from tickrig.host.monitor.columns.columns import (
     Runs,
     by_channel,
     frames_of,
-    heards,
+    records,
     select,
 )
 from tickrig.host.monitor.frames.ident import ERROR
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.traffic.controller import Controller
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.traffic.controller import ErrorStatistics
 from tickrig.host.monitor.traffic.gaps import EXACT_US, SUB_BITS, Gaps
 from tickrig.host.monitor.traffic.load import WINDOW_US, Load, Window
 from tickrig.host.monitor.traffic.tally import BitRow, IdRow
@@ -153,8 +153,8 @@ def _bus(channel: str, frames: Columns, now_us: int) -> tuple[BusRow, list[IdRow
     return row, _id_rows(channel, frames, bits)
 
 
-def _take_errors(frames: Columns) -> tuple[Controller, Columns]:
-    errors = Controller()
+def _take_errors(frames: Columns) -> tuple[ErrorStatistics, Columns]:
+    errors = ErrorStatistics()
     is_error = frames.ident & ERROR != 0
     if not is_error.any():
         return errors, frames
@@ -184,7 +184,7 @@ def _id_rows(channel: str, frames: Columns, bits: Ints) -> list[IdRow]:
     columns = zip(
         runs.idents.tolist(),
         frames.at_us[runs.order[runs.begins]].tolist(),
-        heards(frames, runs.order[runs.ends - 1]),
+        records(frames, runs.order[runs.ends - 1]),
         gaps_us[runs.ends - 1].tolist(),
         column_gaps(runs, gaps_us),
         runs.sums(bits[runs.order]).tolist(),
@@ -198,7 +198,7 @@ def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
     channel: str,
     ident: int,
     first_us: int,
-    latest: Heard,
+    latest: Record,
     gap_us: int,
     gaps: Gaps,
     bits: int,

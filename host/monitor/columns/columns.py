@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tickrig.host.monitor.frames.candump_filter import flagged_id
 from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.reading.log_reader import LogError
 from tickrig.host.monitor.logs.tally import BadLines, Tally
 from tickrig.wire.can import EXTENDED_MAX, CanFrame
@@ -99,17 +99,17 @@ class Rows:
         self.known = np.zeros(count, np.bool_)
 
     @classmethod
-    def of(cls, frames: list[Heard], channels: ChannelNames) -> Rows:
+    def of(cls, frames: list[Record], channels: ChannelNames) -> Rows:
         """Return rows of frames."""
         rows = cls(len(frames))
-        for row, heard in enumerate(frames):
-            rows.put(row, heard, channels.place(heard.channel))
+        for row, record in enumerate(frames):
+            rows.put(row, record, channels.place(record.channel))
         return rows
 
-    def put(self, row: int, heard: Heard, channel: int) -> None:
+    def put(self, row: int, record: Record, channel: int) -> None:
         """Write one row."""
-        frame = heard.frame
-        self.at_us[row], self.ident[row] = heard.at_us, flagged_id(heard)
+        frame = record.frame
+        self.at_us[row], self.ident[row] = record.at_us, flagged_id(record)
         self.dlc[row] = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
         self.payload[row] = int.from_bytes(frame.data, "little")
         self.channel[row], self.known[row] = channel, True
@@ -166,7 +166,7 @@ def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
     return sorted(parts, key=lambda part: part[0])
 
 
-def heards(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Heard]:
+def records(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Record]:
     """Return rows as they were heard; who sent them is not in them."""
     names = columns.channels
     parts = zip(
@@ -177,12 +177,12 @@ def heards(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Heard]:
         columns.payload[rows].tolist(),
         strict=True,
     )
-    return [Heard(at_us, names[channel], _frame(*frame)) for at_us, channel, *frame in parts]
+    return [Record(at_us, names[channel], _frame(*frame)) for at_us, channel, *frame in parts]
 
 
 def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[CanFrame | ErrorFrame]:
     """Return the frames of rows."""
-    return [heard.frame for heard in heards(columns, rows)]
+    return [record.frame for record in records(columns, rows)]
 
 
 def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:

@@ -42,7 +42,11 @@ def board_json(board: NodeBoard, now_us: int) -> list[str]:
 
 
 def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
-    boots = f"{row.boots} ({row.unasked_boots} unasked)" if row.unasked_boots else f"{row.boots}"
+    boots = (
+        f"{row.boots} ({row.unrequested_boots} unasked)"
+        if row.unrequested_boots
+        else f"{row.boots}"
+    )
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
         row.name,
@@ -104,7 +108,7 @@ def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
         "late": row.is_late(now_us),
         "late_count": row.late,
         "boots": row.boots,
-        "unasked_boots": row.unasked_boots,
+        "unasked_boots": row.unrequested_boots,
         "drive": row.drive_state,
         "error_code": row.error_code,
         "emcy": [{"t": e.at_us / 1e6, "code": e.code, "text": e.text} for e in row.emcys],

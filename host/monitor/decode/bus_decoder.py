@@ -65,7 +65,7 @@ class BusDecoder:
         self._channels: dict[tuple[int, int], SdoChannel] = {}
         self._guarded: set[int] = set()
         self._pdos = PdoTable()
-        self._told: dict[int, Route] = {}
+        self._configured: dict[int, Route] = {}
         self._routes: dict[int, Route] = {}
         for node, objects in eds.items():
             self._refresh(pdos_of(node, (index for index, _ in objects.values)))
@@ -92,7 +92,7 @@ class BusDecoder:
         return memory
 
     def _route(self, can_id: int) -> Route:
-        told = self._told.get(can_id) or PRE_DEFINED.get(can_id)
+        told = self._configured.get(can_id) or PRE_DEFINED.get(can_id)
         if told is not None:
             return told
         if can_id in LSS_IDS:
@@ -185,29 +185,29 @@ class BusDecoder:
     def _learn_cob_ids(self, node: int, index: int) -> None:
         """Learn a CAN-ID that is not that of the pre-defined connection set."""
         if index in SDO_SERVERS:
-            request, response = (self._told_id(node, index, sub) for sub in (1, 2))
+            request, response = (self._configured_id(node, index, sub) for sub in (1, 2))
             if request is not None and response is not None:
-                self._tell(request, self._sdo_route(node, request, request))
-                self._tell(response, self._sdo_route(node, response, request))
+                self._configure(request, self._sdo_route(node, request, request))
+                self._configure(response, self._sdo_route(node, response, request))
             return
-        can_id = self._told_id(node, index, 0)
+        can_id = self._configured_id(node, index, 0)
         if can_id is None:
             return
         match index:
             case 0x1005:
-                self._tell(can_id, decode_sync)
+                self._configure(can_id, decode_sync)
             case 0x1012:
-                self._tell(can_id, decode_time)
+                self._configure(can_id, decode_time)
             case 0x1014:
-                self._tell(can_id, partial(_emcy, node))
+                self._configure(can_id, partial(_emcy, node))
 
-    def _told_id(self, node: int, index: int, sub: int) -> int | None:
+    def _configured_id(self, node: int, index: int, sub: int) -> int | None:
         cob_id = self.memory(node).number(index, sub)
         flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
         return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
 
-    def _tell(self, can_id: int, route: Route) -> None:
-        self._told[can_id] = route
+    def _configure(self, can_id: int, route: Route) -> None:
+        self._configured[can_id] = route
         self._routes.pop(can_id, None)
 
 

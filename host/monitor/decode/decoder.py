@@ -13,7 +13,7 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.node_memory import EdsObjects, NodeMemory, read_eds
 from tickrig.host.monitor.decode.sdo.transfer import Transfer
 from tickrig.host.monitor.decode.services import decode_error
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_error import ErrorFrame
 
 NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
@@ -42,9 +42,9 @@ class Decoder:
         self._dbc = tuple(DbcFile(path) for path in dbc)
         self._buses: dict[str, BusDecoder] = {}
 
-    def take(self, heard: Heard) -> Decoded:
+    def take(self, record: Record) -> Decoded:
         """Decode a frame, and learn from it."""
-        frame = heard.frame
+        frame = record.frame
         if isinstance(frame, ErrorFrame):
             return decode_error(frame)
         for file in self._dbc:
@@ -53,10 +53,10 @@ class Decoder:
                 return decoded
         if frame.extended:
             return Decoded("raw")
-        bus = self._buses.get(heard.channel)
+        bus = self._buses.get(record.channel)
         if bus is None:
-            bus = self._bus(heard.channel)
-        return bus.take(heard.at_us, frame)
+            bus = self._bus(record.channel)
+        return bus.take(record.at_us, frame)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the SDO transfers that run, as they would end now."""

@@ -15,10 +15,10 @@ term   = 181 | 181-18F | 18FF0000-18FFFFFF | 123:7FF | 400~700 | #FF
 Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python.
 
 >>> from tickrig.host.monitor.decode.decoded import Decoded
->>> from tickrig.host.monitor.frames.record import Heard
+>>> from tickrig.host.monitor.frames.record import Record
 >>> from tickrig.wire.can import CanFrame
->>> heard = Heard(0, "can0", CanFrame.parse("085#3081110700000000"))
->>> parse_filter("node=5 and (pdo or emcy)").matches(heard, Decoded("emcy", 5))
+>>> record = Record(0, "can0", CanFrame.parse("085#3081110700000000"))
+>>> parse_filter("node=5 and (pdo or emcy)").matches(record, Decoded("emcy", 5))
 True
 """
 
@@ -123,7 +123,7 @@ class FilterParser:
             tests.append(self._and())
         if len(tests) == 1:
             return tests[0]
-        return lambda heard, decoded: any(test(heard, decoded) for test in tests)
+        return lambda record, decoded: any(test(record, decoded) for test in tests)
 
     def _and(self) -> Test:
         tests = [self._not()]
@@ -131,12 +131,12 @@ class FilterParser:
             tests.append(self._not())
         if len(tests) == 1:
             return tests[0]
-        return lambda heard, decoded: all(test(heard, decoded) for test in tests)
+        return lambda record, decoded: all(test(record, decoded) for test in tests)
 
     def _not(self) -> Test:
         if self._take("not", "!"):
             test = self._not()
-            return lambda heard, decoded: not test(heard, decoded)
+            return lambda record, decoded: not test(record, decoded)
         if self._take("("):
             test = self._or()
             self._expect(")")

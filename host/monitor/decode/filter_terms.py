@@ -11,11 +11,11 @@ from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.object_text import BITS
 from tickrig.host.monitor.decode.sdo.transfer import Outcome
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
-from tickrig.host.monitor.frames.record import Heard, Listened
+from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
-Test = Callable[[Listened, Decoded], bool]
+Test = Callable[[AnyRecord, Decoded], bool]
 Compare = Callable[[float, float], bool]
 
 COMPARISONS: Final[dict[str, Compare]] = {
@@ -37,16 +37,16 @@ OUTCOMES: Final = {
     "sdo.unanswered": Outcome.UNANSWERED,
     "sdo.broken": Outcome.BROKEN,
 }
-FIELDS: Final[dict[str, Callable[[Listened, Decoded], int | None]]] = {
-    "node": lambda heard, decoded: decoded.node,
-    "id": lambda heard, decoded: _can_id(heard),
-    "dlc": lambda heard, decoded: getattr(heard.frame, "dlc", None),
+FIELDS: Final[dict[str, Callable[[AnyRecord, Decoded], int | None]]] = {
+    "node": lambda record, decoded: decoded.node,
+    "id": lambda record, decoded: _can_id(record),
+    "dlc": lambda record, decoded: getattr(record.frame, "dlc", None),
 }
-WORDS: Final[dict[str, Callable[[Listened, Decoded], str]]] = {
-    "channel": lambda heard, decoded: heard.channel,
-    "kind": lambda heard, decoded: decoded.kind,
-    "dir": lambda heard, decoded: "tx" if heard.sent else "rx",
-    "src": lambda heard, decoded: decoded.source,
+WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
+    "channel": lambda record, decoded: record.channel,
+    "kind": lambda record, decoded: decoded.kind,
+    "dir": lambda record, decoded: "tx" if record.sent else "rx",
+    "src": lambda record, decoded: decoded.source,
 }
 
 _PDO: Final = re.compile(r"([tr]?)pdo([0-9]{0,3})")
@@ -56,10 +56,10 @@ _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 def kind_test(word: str) -> Test | None:
     """Return the test for a kind of frame, or for how an SDO transfer ended."""
     if word in KINDS:
-        return lambda heard, decoded: decoded.kind == word
+        return lambda record, decoded: decoded.kind == word
     if word in OUTCOMES:
         outcome = OUTCOMES[word]
-        return lambda heard, decoded: any(t.outcome is outcome for t in decoded.transfers)
+        return lambda record, decoded: any(t.outcome is outcome for t in decoded.transfers)
     match = _PDO.fullmatch(word)
     if match is None:
         return None
@@ -67,15 +67,15 @@ def kind_test(word: str) -> Test | None:
     unmapped = ("unmapped",) if word == "pdo" else ()
     if match[2]:
         kinds = tuple(f"{direction}pdo{match[2]}" for direction in directions)
-        return lambda heard, decoded: decoded.kind in kinds
+        return lambda record, decoded: decoded.kind in kinds
     begins = (*(f"{direction}pdo" for direction in directions), *unmapped)
-    return lambda heard, decoded: decoded.kind.startswith(begins)
+    return lambda record, decoded: decoded.kind.startswith(begins)
 
 
 def object_test(index: int, sub: int | None) -> Test:
     """Return the test for SDO frames about an object."""
 
-    def test(heard: Listened, decoded: Decoded) -> bool:
+    def test(record: AnyRecord, decoded: Decoded) -> bool:
         entries = (decoded.entry, *(transfer.entry for transfer in decoded.transfers))
         return any(entry and entry[0] == index and sub in (None, entry[1]) for entry in entries)
 
@@ -85,8 +85,8 @@ def object_test(index: int, sub: int | None) -> Test:
 def range_test(low: int, high: int, *, extended: bool) -> Test:
     """Return the test for CAN-IDs, both ends included."""
 
-    def test(heard: Listened, decoded: Decoded) -> bool:
-        frame = heard.frame
+    def test(record: AnyRecord, decoded: Decoded) -> bool:
+        frame = record.frame
         if not isinstance(frame, CanFrame) or frame.extended != extended:
             return False
         return low <= frame.can_id <= high
@@ -96,22 +96,22 @@ def range_test(low: int, high: int, *, extended: bool) -> Test:
 
 def error_test(mask: int) -> Test:
     """Return the test for error frames of some classes."""
-    return lambda heard, decoded: (
-        isinstance(heard.frame, ErrorFrame) and bool(heard.frame.error_class & mask)
+    return lambda record, decoded: (
+        isinstance(record.frame, ErrorFrame) and bool(record.frame.error_class & mask)
     )
 
 
 def candump_test(chosen: CandumpFilter) -> Test:
     """Return the test of candump's rules."""
-    return lambda heard, decoded: isinstance(heard, Heard) and chosen.passes(flagged_id(heard))
+    return lambda record, decoded: isinstance(record, Record) and chosen.passes(flagged_id(record))
 
 
 def field_test(name: str, compare: Compare, value: float) -> Test:
     """Return the test for a number that every frame of some kind has."""
     field = FIELDS[name]
 
-    def test(heard: Listened, decoded: Decoded) -> bool:
-        found = field(heard, decoded)
+    def test(record: AnyRecord, decoded: Decoded) -> bool:
+        found = field(record, decoded)
         return found is not None and compare(found, value)
 
     return test
@@ -120,7 +120,7 @@ def field_test(name: str, compare: Compare, value: float) -> Test:
 def word_test(name: str, sign: str, value: str) -> Test:
     """Return the test for a word."""
     word, wanted = WORDS[name], sign != "!="
-    return lambda heard, decoded: (word(heard, decoded) == value) == wanted
+    return lambda record, decoded: (word(record, decoded) == value) == wanted
 
 
 def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
@@ -134,7 +134,7 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
     node, whole, shift = signal_place(path)
     compare = _comparison(sign, text)
 
-    def test(heard: Listened, decoded: Decoded) -> bool:
+    def test(record: AnyRecord, decoded: Decoded) -> bool:
         if node is not None and decoded.node != node:
             return False
         for signal in decoded.signals:
@@ -191,8 +191,8 @@ def _bit(signal: Signal, shift: int) -> Signal:
     return Signal(signal.name, value >> shift & 1 if isinstance(value, int) else "")
 
 
-def _can_id(heard: Listened) -> int | None:
-    return heard.frame.can_id if isinstance(heard.frame, CanFrame) else None
+def _can_id(record: AnyRecord) -> int | None:
+    return record.frame.can_id if isinstance(record.frame, CanFrame) else None
 
 
 class MissingSignals:

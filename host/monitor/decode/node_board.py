@@ -13,7 +13,7 @@ from tickrig.host.monitor.decode.node_memory import HEARTBEAT_TIME, NodeMemory
 from tickrig.host.monitor.decode.object_text import drive_state
 from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer
 from tickrig.host.monitor.decode.services import nmt_state_name
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 EMCY_KEPT: Final = 16
@@ -31,7 +31,7 @@ _TARGETS: Final = {
 }
 
 
-class EmcyHeard(NamedTuple):
+class EmcyRecord(NamedTuple):
     """An EMCY and when it came."""
 
     at_us: int
@@ -51,9 +51,9 @@ class NodeStatus:
     Attributes:
         state: NMT state as it told it, None while it told none.
         commanded: where the NMT master sent it since, None once it has told its state.
-        told_us: when it last told its state.
+        reported_us: when it last told its state.
         boots: boot-up messages.
-        unasked_boots: those that no NMT command had asked for, of a node that was heard before.
+        unrequested_boots: those that no NMT command had asked for, of a node that was heard before.
         late: gaps between heartbeats that were longer than `LATE` periods.
         emcys: the latest, oldest first.
         emcy_count: all.
@@ -62,7 +62,7 @@ class NodeStatus:
         sdo_error: the last of them, for people.
         drive_state: of CiA 402, empty while no statusword was heard.
         name: the device name it told.
-        heard: it has sent anything that is known to be its own.
+        present: it has sent anything that is known to be its own.
     """
 
     channel: str
@@ -70,19 +70,19 @@ class NodeStatus:
     memory: NodeMemory
     state: int | None = None
     commanded: int | None = None
-    told_us: int | None = None
+    reported_us: int | None = None
     boots: int = 0
-    unasked_boots: int = 0
+    unrequested_boots: int = 0
     late: int = 0
-    emcys: deque[EmcyHeard] = field(default_factory=lambda: deque(maxlen=EMCY_KEPT))
+    emcys: deque[EmcyRecord] = field(default_factory=lambda: deque(maxlen=EMCY_KEPT))
     emcy_count: int = 0
     error_code: int = 0
     sdo_errors: int = 0
     sdo_error: str = ""
     drive_state: str = ""
     name: str = ""
-    heard: bool = False
-    _reset_asked: bool = False
+    present: bool = False
+    _reset_requested: bool = False
     _gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
 
     @property
@@ -103,7 +103,7 @@ class NodeStatus:
 
     def age_us(self, now_us: int) -> int | None:
         """Return how long ago it told its state."""
-        return None if self.told_us is None else now_us - self.told_us
+        return None if self.reported_us is None else now_us - self.reported_us
 
     def is_late(self, now_us: int) -> bool:
         """Say whether a heartbeat is missing."""
@@ -122,41 +122,41 @@ class NodeStatus:
         """Take an NMT command to this node."""
         target = _TARGETS[NmtCommand(specifier)]
         self.commanded = target
-        self._reset_asked = target is NmtState.INITIALISING
+        self._reset_requested = target is NmtState.INITIALISING
 
     def boot(self, at_us: int) -> None:
         """Take its boot-up: it is pre-operational then (CiA 301, boot-up)."""
         self.boots += 1
-        self.unasked_boots += self.heard and not self._reset_asked
-        self._reset_asked, self.drive_state, self.error_code = False, "", 0
+        self.unrequested_boots += self.present and not self._reset_requested
+        self._reset_requested, self.drive_state, self.error_code = False, "", 0
         self._gaps.clear()
-        self._tell(at_us, NmtState.PRE_OPERATIONAL)
+        self._report(at_us, NmtState.PRE_OPERATIONAL)
 
-    def beat(self, at_us: int, state: int) -> None:
+    def heartbeat(self, at_us: int, state: int) -> None:
         """Take a heartbeat, or the answer to a guarding request."""
-        if self.told_us is not None:
+        if self.reported_us is not None:
             self.late += self.is_late(at_us)
-            if at_us > self.told_us:  # logs may have several frames of one time
-                self._gaps.append(at_us - self.told_us)
-        self._tell(at_us, state)
+            if at_us > self.reported_us:  # logs may have several frames of one time
+                self._gaps.append(at_us - self.reported_us)
+        self._report(at_us, state)
 
-    def _tell(self, at_us: int, state: int) -> None:
-        self.state, self.commanded, self.told_us, self.heard = state, None, at_us, True
+    def _report(self, at_us: int, state: int) -> None:
+        self.state, self.commanded, self.reported_us, self.present = state, None, at_us, True
 
     def emcy(self, at_us: int, decoded: Decoded) -> None:
         """Take an EMCY."""
-        self.heard = True
+        self.present = True
         if not decoded.signals:
             return
         code = decoded.signals[0].value
         assert isinstance(code, int)
         self.emcy_count += 1
         self.error_code = code
-        self.emcys.append(EmcyHeard(at_us, code, decoded.text))
+        self.emcys.append(EmcyRecord(at_us, code, decoded.text))
 
     def transfer(self, transfer: Transfer) -> None:
         """Take an SDO transfer that ended."""
-        self.heard = self.heard or transfer.outcome.answered
+        self.present = self.present or transfer.outcome.answered
         if transfer.outcome is not Outcome.DONE:
             self.sdo_errors += 1
             self.sdo_error = str(transfer)
@@ -195,28 +195,28 @@ class NodeBoard:
         """Return the nodes by bus and node-ID."""
         return [self._nodes[key] for key in sorted(self._nodes)]
 
-    def take(self, heard: Heard, decoded: Decoded) -> None:
+    def take(self, record: Record, decoded: Decoded) -> None:
         """Take a decoded frame."""
-        self.now_us = max(self.now_us, heard.at_us)
+        self.now_us = max(self.now_us, record.at_us)
         if self._expected:
-            self._expect(heard.channel)
+            self._expect(record.channel)
         kind, node = decoded.kind, decoded.node
         if kind == "nmt":
-            self._command(heard.channel, decoded)
+            self._command(record.channel, decoded)
         elif node is None:
             return
         elif kind.startswith("tpdo"):
-            self._process_data(heard.channel, node, decoded)
+            self._process_data(record.channel, node, decoded)
         elif kind == "sdo":
-            self._transfers(heard.channel, node, decoded)
+            self._transfers(record.channel, node, decoded)
         elif kind == "emcy":
-            self._status(heard.channel, node).emcy(heard.at_us, decoded)
+            self._status(record.channel, node).emcy(record.at_us, decoded)
         elif kind == "boot-up":
-            self._status(heard.channel, node).boot(heard.at_us)
+            self._status(record.channel, node).boot(record.at_us)
         elif kind in ERROR_CONTROL and decoded.signals:
             state = decoded.signals[0].value
             assert isinstance(state, int)
-            self._status(heard.channel, node).beat(heard.at_us, state)
+            self._status(record.channel, node).heartbeat(record.at_us, state)
 
     def _status(self, channel: str, node: int) -> NodeStatus:
         status = self._nodes.get((channel, node))
@@ -241,7 +241,7 @@ class NodeBoard:
 
     def _process_data(self, channel: str, node: int, decoded: Decoded) -> None:
         status = self._status(channel, node)
-        status.heard = True
+        status.present = True
         for signal in decoded.signals:
             if signal.name == STATUSWORD and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)

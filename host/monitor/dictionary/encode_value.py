@@ -1,10 +1,10 @@
 """Values of objects as people write them.
 
->>> encode_words(ObjectText("target_velocity", DataType.INTEGER32), "-2").hex()
+>>> encode_value(ObjectText("target_velocity", DataType.INTEGER32), "-2").hex()
 'feffffff'
->>> encode_words(ObjectText("angle", DataType.INTEGER16, "deg", 0.1), "1.5").hex()
+>>> encode_value(ObjectText("angle", DataType.INTEGER16, "deg", 0.1), "1.5").hex()
 '0f00'
->>> encode_words(ObjectText(), "37 02").hex()
+>>> encode_value(ObjectText(), "37 02").hex()
 '3702'
 """
 
@@ -22,7 +22,7 @@ TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIB
 TRUTH: Final = {"true": 1, "false": 0}
 
 
-def encode_words(text: ObjectText, words: str) -> bytes:
+def encode_value(text: ObjectText, words: str) -> bytes:
     """Return the bytes of a value, written as the table shows it: in the unit of the object.
 
     Args:

@@ -48,11 +48,11 @@ class ObjectRow(NamedTuple):
         """Its data type, empty where nobody said it."""
         return "" if self.text.kind is None else self.text.kind.name
 
-    def is_meant(self, wanted: str) -> bool:
+    def matches(self, wanted: str) -> bool:
         """Say whether a part of its name, or the begin of its index, is wanted.
 
         >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
-        >>> [row.is_meant(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
+        >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
         [True, True, True, True, False, False]
         """
         wanted = wanted.lower()
@@ -65,7 +65,7 @@ FIRST_OBJECT: Final = 0x1000
 MAPPINGS: Final = {"tpdo": 0x1A00, "rpdo": 0x1600}
 
 
-class _Seen(NamedTuple):
+class _Observed(NamedTuple):
     """A value, and how it came."""
 
     at_us: int
@@ -82,7 +82,7 @@ class NodeDictionary:
 
     def __init__(self, memory: NodeMemory) -> None:
         self.memory = memory
-        self._values: dict[Entry, _Seen] = {}
+        self._values: dict[Entry, _Observed] = {}
         self._troubles: dict[Entry, str] = {}
         self._pdos: dict[str, tuple[int, Decoded]] = {}
 
@@ -99,7 +99,7 @@ class NodeDictionary:
         entries = sorted({*self.memory.eds.texts, *seen, *self._troubles})
         objects = (entry for entry in entries if entry[0] >= FIRST_OBJECT)
         rows = (self._row(entry, seen.get(entry)) for entry in objects)
-        return [row for row in rows if row.is_meant(wanted)]
+        return [row for row in rows if row.matches(wanted)]
 
     def _transfer(self, at_us: int, transfer: Transfer) -> None:
         entry = transfer.entry
@@ -108,13 +108,13 @@ class NodeDictionary:
         if transfer.outcome is Outcome.DONE:
             self._troubles.pop(entry, None)
             value = f"{transfer.text}{transfer.unit}"
-            self._values[entry] = _Seen(at_us, value, Origin.SDO)
+            self._values[entry] = _Observed(at_us, value, Origin.SDO)
         elif transfer.outcome is Outcome.ABORTED:
             self._troubles[entry] = describe_abort(transfer.abort_code)
         else:
             self._troubles[entry] = transfer.outcome
 
-    def _latest(self) -> dict[Entry, _Seen]:
+    def _latest(self) -> dict[Entry, _Observed]:
         """Return the latest values, those of PDOs among them."""
         seen = dict(self._values)
         for kind, (at_us, decoded) in self._pdos.items():
@@ -123,7 +123,7 @@ class NodeDictionary:
                 entry = mapped.get(signal.name)
                 if entry is not None and (entry not in seen or seen[entry].at_us <= at_us):
                     value = f"{signal.text or str(signal.value)}{signal.unit}"
-                    seen[entry] = _Seen(at_us, value, Origin.PDO)
+                    seen[entry] = _Observed(at_us, value, Origin.PDO)
         return seen
 
     def _mapped(self, kind: str) -> dict[str, Entry]:
@@ -136,7 +136,7 @@ class NodeDictionary:
         entries = ((one.index, one.sub) for one in found)
         return {self.memory.describe(*one).name or write_entry(one): one for one in entries}
 
-    def _row(self, entry: Entry, seen: _Seen | None) -> ObjectRow:
+    def _row(self, entry: Entry, seen: _Observed | None) -> ObjectRow:
         text, trouble = self.memory.describe(*entry), self._troubles.get(entry, "")
         if seen is not None:
             return ObjectRow(entry, text, seen.value, seen.origin, seen.at_us, trouble)

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.frames.ident import EXTENDED, ident_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 
 _RULE: Final = re.compile(r"([0-9A-Fa-f]{1,8})([:~])([0-9A-Fa-f]{1,8})")
 _ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
 
 
-def flagged_id(heard: Heard) -> int:
+def flagged_id(record: Record) -> int:
     """Return the identifier with its flags, as struct can_frame has it (linux/can.h)."""
-    frame = heard.frame
+    frame = record.frame
     if isinstance(frame, ErrorFrame):
         return ERROR_FLAG | frame.error_class
     return ident_of(frame)

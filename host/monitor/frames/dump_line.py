@@ -1,14 +1,14 @@
 """Frames as lines of text, as candump shows them.
 
 >>> lines = DumpLines(Stamp.ZERO)
->>> lines.line(Heard(1_000_000, "can0", CanFrame.parse("705#7F")))
+>>> lines.line(Record(1_000_000, "can0", CanFrame.parse("705#7F")))
 ' (000.000000)  can0  705   [1]  7F'
->>> lines.line(Heard(1_250_000, "can0", CanFrame.parse("185#R5")))
+>>> lines.line(Record(1_250_000, "can0", CanFrame.parse("185#R5")))
 ' (000.250000)  can0  185   [5]  remote request'
 
 >>> from tickrig.host.monitor.decode.decoded import Decoded
->>> from tickrig.host.monitor.frames.record import HeardLine
->>> line = HeardLine(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc", None, "event"))
+>>> from tickrig.host.monitor.frames.record import LineRecord
+>>> line = LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc", None, "event"))
 >>> line_text(line, "rrc event")
 'ttyS0  <  EV:PowerOn                     rrc event'
 >>> line_json(line)
@@ -21,14 +21,14 @@ import json
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import LINE_EVENT, VERSION
 from tickrig.host.monitor.traffic.line_traffic import ARROWS
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import HeardLine
+    from tickrig.host.monitor.frames.record import LineRecord
 
 DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
 
@@ -58,14 +58,14 @@ class DumpLines:
         self._first_us: int | None = None
         self._last_us, self._width = 0, 3
 
-    def line(self, heard: Heard, text: str = "") -> str:
+    def line(self, record: Record, text: str = "") -> str:
         """Return the line, with what the frame means behind it."""
-        ident = _ident(heard.frame)
+        ident = _ident(record.frame)
         self._width = max(self._width, len(ident))
-        direction = f"  {'TX' if heard.sent else 'RX'} - -" if self._extra else ""
-        stamp = self.stamp(heard.at_us)
-        data = f"{_data(heard.frame):<{DATA_WIDTH}}   {text}" if text else _data(heard.frame)
-        return f"{stamp}  {heard.channel}{direction}  {ident:>{self._width}}   {data}"
+        direction = f"  {'TX' if record.sent else 'RX'} - -" if self._extra else ""
+        stamp = self.stamp(record.at_us)
+        data = f"{_data(record.frame):<{DATA_WIDTH}}   {text}" if text else _data(record.frame)
+        return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}   {data}"
 
     def stamp(self, at_us: int) -> str:
         """Return what stands before what was heard at this time."""
@@ -119,14 +119,14 @@ def date_text(at_us: int) -> str:
         return seconds_text(at_us, 10)
 
 
-def line_text(line: HeardLine, text: str) -> str:
+def line_text(line: LineRecord, text: str) -> str:
     """Write the line, with what it means behind it."""
     data = bytes_text(line.data)
     shown = f"{data:<{DATA_WIDTH}}   {text}" if text else data
     return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
 
 
-def line_json(line: HeardLine, more: str = "") -> str:
+def line_json(line: LineRecord, more: str = "") -> str:
     """Write an event in JSON; `more` are further members, each with its comma in front."""
     at_us = line.at_us
     return (

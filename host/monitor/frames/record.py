@@ -9,7 +9,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
 
-class Heard(NamedTuple):
+class Record(NamedTuple):
     """One frame or error frame, as it was on the bus.
 
     Attributes:
@@ -25,8 +25,8 @@ class Heard(NamedTuple):
     sent: bool = False
 
 
-class HeardLine(NamedTuple):
-    """A message of a serial line, beside `Heard` in one trace; filters take both.
+class LineRecord(NamedTuple):
+    """A message of a serial line, beside `Record` in one trace; filters take both.
 
     Attributes:
         at_us: when its last byte was heard.
@@ -48,5 +48,5 @@ class HeardLine(NamedTuple):
         return None
 
 
-Listened = Heard | HeardLine
+AnyRecord = Record | LineRecord
 """What a trace of buses and serial lines is made of."""

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.series import Series
-from tickrig.host.monitor.graph.signal_word import EXTENDED, FrameSlice, ObjectName, SignalWord
+from tickrig.host.monitor.graph.signal_spec import EXTENDED, FrameSlice, ObjectName, SignalSpec
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Collector:
     """
 
     def __init__(
-        self, words: Sequence[SignalWord], decoder: Decoder | None = None, most: int = 0
+        self, words: Sequence[SignalSpec], decoder: Decoder | None = None, most: int = 0
     ) -> None:
         self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
         self._decoder = decoder
@@ -58,14 +58,14 @@ class Collector:
             pairs[:] = [pair for pair in pairs if pair[1] is not gone]
         self._objects = [wanted for wanted in self._objects if wanted.series is not gone]
 
-    def take(self, heard: Heard) -> None:
+    def take(self, record: Record) -> None:
         """Take the values in a frame."""
         wanted = self._objects and self._decoder
-        self.take_meant(heard, wanted.take(heard) if wanted else None)
+        self.take_decoded(record, wanted.take(record) if wanted else None)
 
-    def take_meant(self, heard: Heard, decoded: Decoded | None) -> None:
+    def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
         """Take the values in a frame that somebody has decoded, or whose objects nobody wants."""
-        at_us, _, frame, _ = heard
+        at_us, _, frame, _ = record
         if not isinstance(frame, ErrorFrame) and not frame.remote:
             key = frame.can_id | EXTENDED if frame.extended else frame.can_id
             for cut, series in self._slices.get(key, ()):
@@ -76,10 +76,10 @@ class Collector:
             for wanted in self._objects:
                 wanted.take(at_us, decoded)
 
-    def take_all(self, heards: Iterable[Heard]) -> None:
+    def take_all(self, records: Iterable[Record]) -> None:
         """Take the values in frames."""
-        for heard in heards:
-            self.take(heard)
+        for record in records:
+            self.take(record)
 
     def take_columns(self, columns: Columns) -> None:
         """Take the values of slices in a whole log at once."""
@@ -94,7 +94,7 @@ class Collector:
 class _Object:
     """An object that is waited for."""
 
-    def __init__(self, word: SignalWord, wanted: ObjectName, series: Series) -> None:
+    def __init__(self, word: SignalSpec, wanted: ObjectName, series: Series) -> None:
         self._word, self._wanted, self.series = word, wanted, series
         self._found: tuple[int | None, str] | None = None
 

@@ -8,12 +8,12 @@ from enum import StrEnum
 from typing import Final, assert_never
 
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.chart import chart
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import LEAST_US, Series, View
-from tickrig.host.monitor.graph.signal_word import SignalWord
+from tickrig.host.monitor.graph.signal_spec import SignalSpec
 
 MOST: Final = 200_000
 """Samples of a signal that are kept."""
@@ -23,7 +23,7 @@ COLUMNS: Final = 200
 """In how many columns the range of an axis is looked for."""
 
 
-class Sight(StrEnum):
+class ViewMode(StrEnum):
     """What is seen."""
 
     LIVE = "live"  # a window that ends now
@@ -35,20 +35,20 @@ class LiveGraph:
     """Takes the values of signals, and shows them.
 
     Args:
-        sight: what is seen at first.
+        mode: what is seen at first.
 
     Attributes:
         words: the signals.
-        sight: what is seen.
+        mode: what is seen.
         window_us: how long the window is that ends now.
         cursor_us: a moment that is read out, None for none.
         axis: the vertical axis that is stretched and moved.
         now_us: the time of the frames, as it was told last.
     """
 
-    def __init__(self, sight: Sight = Sight.LIVE) -> None:
-        self.words: list[SignalWord] = []
-        self.sight, self.window_us, self.axis = sight, WINDOW_US, 1
+    def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:
+        self.words: list[SignalSpec] = []
+        self.mode, self.window_us, self.axis = mode, WINDOW_US, 1
         self.cursor_us: int | None = None
         self.now_us = 0
         self._collector = Collector((), None)
@@ -60,11 +60,11 @@ class LiveGraph:
         """The samples of each signal."""
         return self._collector.series
 
-    def add(self, word: SignalWord, past: Iterable[tuple[Heard, Decoded | None]] = ()) -> None:
+    def add(self, word: SignalSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
         """Show one more signal; its values in frames of the past are taken, too."""
         fresh = Collector([word], None, MOST)
-        for heard, decoded in past:
-            fresh.take_meant(heard, decoded)
+        for record, decoded in past:
+            fresh.take_decoded(record, decoded)
         self._collector.join(fresh)
         self.words.append(word)
 
@@ -73,9 +73,9 @@ class LiveGraph:
         self._collector.remove(number)
         del self.words[number]
 
-    def take(self, heard: Heard, decoded: Decoded | None) -> None:
+    def take(self, record: Record, decoded: Decoded | None) -> None:
         """Take the values in a frame."""
-        self._collector.take_meant(heard, decoded)
+        self._collector.take_decoded(record, decoded)
 
     def clear(self) -> None:
         """Forget all samples."""
@@ -87,12 +87,12 @@ class LiveGraph:
         whole = View.of(self.series)
         if not self._origin_us or whole.to_us < self._origin_us:
             self._origin_us = whole.origin_us
-        match self.sight:
-            case Sight.LIVE:
+        match self.mode:
+            case ViewMode.LIVE:
                 view = View(self.now_us - self.window_us, self.now_us)
-            case Sight.ALL:
+            case ViewMode.ALL:
                 view = whole
-            case Sight.HELD:
+            case ViewMode.HELD:
                 view = self._held
             case _ as never:
                 assert_never(never)
@@ -104,14 +104,14 @@ class LiveGraph:
         """Return the picture as lines with ANSI colours."""
         return render(self.series, self.view(), width, height, colour=True)
 
-    def show(self, sight: Sight) -> None:
+    def show(self, mode: ViewMode) -> None:
         """See something else, without the cursor; `HELD` stops what is seen now."""
         self._held = self.view()
-        self.sight, self.cursor_us = sight, None
+        self.mode, self.cursor_us = mode, None
 
     def zoom(self, factor: float) -> None:
         """Come closer by a factor: to the end of a live window, else to the cursor or middle."""
-        if self.sight is Sight.LIVE:
+        if self.mode is ViewMode.LIVE:
             self.window_us = max(LEAST_US, round(self.window_us / factor))
             return
         self._hold(self.view().zoomed(factor, self.cursor_us))
@@ -151,7 +151,7 @@ class LiveGraph:
         self._ranges.pop(self.axis, None)
 
     def _hold(self, view: View) -> None:
-        self._held, self.sight = view, Sight.HELD
+        self._held, self.mode = view, ViewMode.HELD
 
     def _range(self) -> tuple[float, float]:
         return chart(self.series, self.view(), COLUMNS).ranges.get(self.axis, (0.0, 1.0))

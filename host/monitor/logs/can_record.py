@@ -5,7 +5,7 @@ from __future__ import annotations
 import can
 
 from tickrig.host.links.can_message import to_frame, to_message
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import CAN_FD, Tally
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
@@ -15,7 +15,7 @@ BAD_FRAMES = "frames that CAN cannot have"
 NO_TIME = "frames with what is no time"
 
 
-def to_heard(message: can.Message, channel: str, tally: Tally) -> Heard | None:
+def to_record(message: can.Message, channel: str, tally: Tally) -> Record | None:
     """Return what was heard; None for CAN FD, impossible frames and times, which are counted."""
     try:
         at_us = to_us(message.timestamp)
@@ -25,20 +25,20 @@ def to_heard(message: can.Message, channel: str, tally: Tally) -> Heard | None:
     if message.is_error_frame:
         data = bytes(message.data)[:8].ljust(8, b"\0")
         error = ErrorFrame(message.arbitration_id & ERROR_CLASS_MASK, data)
-        return Heard(at_us, channel, error, not message.is_rx)
+        return Record(at_us, channel, error, not message.is_rx)
     frame = to_frame(message)
     try:
         if frame is not None:
-            return Heard(at_us, channel, frame.checked(), not message.is_rx)
+            return Record(at_us, channel, frame.checked(), not message.is_rx)
         tally.passed_over[CAN_FD] += 1
     except WireError:
         tally.passed_over[BAD_FRAMES] += 1
     return None
 
 
-def to_can(heard: Heard, channel: str | int) -> can.Message:
+def to_can(record: Record, channel: str | int) -> can.Message:
     """Return the message that python-can's writers take."""
-    at_us, _, frame, sent = heard
+    at_us, _, frame, sent = record
     if isinstance(frame, ErrorFrame):
         message = can.Message(
             at_us / 1e6, frame.error_class, is_error_frame=True, data=frame.data, dlc=8

@@ -1,6 +1,6 @@
 r"""Frames as lines of JSON and CSV, and in candump's compact notation.
 
->>> csv_row(Heard(1_500_000, "can0", CanFrame(0x705, b"\x7f"), sent=True))
+>>> csv_row(Record(1_500_000, "can0", CanFrame(0x705, b"\x7f"), sent=True))
 '1.500000,0x705,0,0,0,1,fw==>'
 
 >>> str(parse_frame("123#0011223344556677_C")), str(parse_frame("20000080#01"))
@@ -13,7 +13,7 @@ import re
 from binascii import a2b_base64, b2a_base64
 from typing import Any, Final
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import CanFrame
@@ -42,13 +42,13 @@ LINE_EVENT: Final = "line"
 """A line of a serial port, which no log of CAN holds."""
 
 
-def json_line(heard: Heard, more: str = "") -> str:
+def json_line(record: Record, more: str = "") -> str:
     """Write a frame; `more` are further members, each with its comma in front.
 
-    >>> json_line(Heard(1_500_000, "can0", CanFrame(0x185, b"7")))
+    >>> json_line(Record(1_500_000, "can0", CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
     """
-    at_us, channel, frame, sent = heard
+    at_us, channel, frame, sent = record
     if isinstance(frame, ErrorFrame):
         what = f'"id":{frame.error_class},"x":0,"err":1'
     else:
@@ -69,7 +69,7 @@ def drop_line(lost: int) -> str:
     return f'{{"v":{VERSION},"ev":"drop","n":{lost}}}'
 
 
-def parse_json_line(text: str, tally: Tally) -> Heard | str | None:
+def parse_json_line(text: str, tally: Tally) -> Record | str | None:
     """Return a frame, the name of an event, or None for anything else."""
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
@@ -77,7 +77,7 @@ def parse_json_line(text: str, tally: Tally) -> Heard | str | None:
         said = json.loads(text)
         if "ev" in said:
             return _event(said, tally)
-        return Heard(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
+        return Record(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, WireError):
         return None
 
@@ -128,9 +128,9 @@ _DUMPED: Final = re.compile(
 )
 
 
-def csv_row(heard: Heard) -> str:
+def csv_row(record: Record) -> str:
     """Write a frame below `LOG_HEADER`."""
-    at_us, _, frame, sent = heard
+    at_us, _, frame, sent = record
     if isinstance(frame, ErrorFrame):
         what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
     else:
@@ -139,7 +139,7 @@ def csv_row(heard: Heard) -> str:
     return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{SENT * sent}"
 
 
-def parse_csv_line(text: str, tally: Tally) -> Heard | str | None:
+def parse_csv_line(text: str, tally: Tally) -> Record | str | None:
     """Return a frame, the name of a header or of what was counted instead, or None."""
     if text.startswith((LOG_HEADER, DUMP_HEADER)):
         return text
@@ -151,15 +151,15 @@ def parse_csv_line(text: str, tally: Tally) -> Heard | str | None:
         return None
 
 
-def _dumped(match: re.Match[str], tally: Tally) -> Heard | str:
+def _dumped(match: re.Match[str], tally: Tally) -> Record | str:
     stamp, channel, ident, direction, data = match.groups()
     if not ident:
         tally.passed_over[SERIAL_LINES] += 1
         return SERIAL_LINES
-    return Heard(to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx")
+    return Record(to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx")
 
 
-def _logged(cells: list[str]) -> Heard:
+def _logged(cells: list[str]) -> Record:
     stamp, ident, extended, remote, error, dlc, text = cells
     data, can_id, length = a2b_base64(text), int(ident, 16), int(dlc)
     frame: CanFrame | ErrorFrame
@@ -169,4 +169,4 @@ def _logged(cells: list[str]) -> Heard:
         frame = CanFrame(can_id, b"", True, extended == "1", length).checked()
     else:
         frame = CanFrame(can_id, data, False, extended == "1").checked()
-    return Heard(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))
+    return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))

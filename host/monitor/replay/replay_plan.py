@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.gaps import bucket_of, middle_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -53,7 +53,7 @@ class ReplayPlan:
         ValueError: a span that is empty, or a speed below 0.
     """
 
-    log: Iterable[Heard]
+    log: Iterable[Record]
     route: Callable[[str], str | None]
     speed: float = 1.0
     from_us: int = 0
@@ -73,31 +73,31 @@ class ReplayPlan:
         begin_us, loop = 0, 0
         while self.loops == FOREVER or loop < self.loops:
             end_us, sent = begin_us, False
-            for at_us, heard in self._span():
+            for at_us, record in self._span():
                 end_us = begin_us + at_us
-                channel = self.route(heard.channel)
-                if channel is None or isinstance(heard.frame, ErrorFrame):
+                channel = self.route(record.channel)
+                if channel is None or isinstance(record.frame, ErrorFrame):
                     self.left_out += 1
                     continue
                 sent = True
-                yield Due(self._scaled(end_us), channel, heard.frame)
+                yield Due(self._scaled(end_us), channel, record.frame)
             if not sent:
                 return
             loop += 1
             end_us = end_us if self.to_us is None else begin_us + self.to_us - self.from_us
             begin_us = max(end_us, begin_us + LEAST_LOOP_US)
 
-    def _span(self) -> Iterator[tuple[int, Heard]]:
+    def _span(self) -> Iterator[tuple[int, Record]]:
         """Yield what is in the span, with its time after the beginning of the span."""
         first_us: int | None = None
         latest_us = 0
-        for heard in self.log:
-            first_us = heard.at_us if first_us is None else first_us
-            latest_us = max(latest_us, heard.at_us - first_us)
+        for record in self.log:
+            first_us = record.at_us if first_us is None else first_us
+            latest_us = max(latest_us, record.at_us - first_us)
             if self.to_us is not None and latest_us > self.to_us:
                 return
             if latest_us >= self.from_us:
-                yield latest_us - self.from_us, heard
+                yield latest_us - self.from_us, record
 
     def _scaled(self, at_us: int) -> int:
         return round(at_us / self.speed) if self.speed else 0

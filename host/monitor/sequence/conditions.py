@@ -13,7 +13,7 @@ from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.filter import parse_filter
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.steps import Condition
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -51,22 +51,22 @@ def parse_pattern(text: str) -> FramePattern:
     return FramePattern(text.strip(), regex)
 
 
-class HeardCondition:
+class DecodedCondition:
     """Keeps the latest frame with its meaning, for the conditions of a sequence."""
 
     def __init__(self) -> None:
-        self._latest: tuple[Heard, Decoded] | None = None
+        self._latest: tuple[Record, Decoded] | None = None
 
-    def take(self, heard: Heard, decoded: Decoded) -> None:
+    def take(self, record: Record, decoded: Decoded) -> None:
         """Take a frame; conditions are asked about it next."""
-        self._latest = heard, decoded
+        self._latest = record, decoded
 
     def condition(self, text: str) -> Condition:
         """Return the condition of a filter expression; ValueError if it is none."""
         chosen = parse_filter(text)
 
-        def matches(heard: Heard) -> bool:
+        def matches(record: Record) -> bool:
             latest = self._latest
-            return latest is not None and latest[0] is heard and chosen.matches(*latest)
+            return latest is not None and latest[0] is record and chosen.matches(*latest)
 
         return Condition(text, matches)

@@ -260,4 +260,4 @@ def _texts(value: Any, key: str) -> list[str]:
 
 def _pattern(text: str) -> Condition:
     pattern = parse_pattern(text)
-    return Condition(text, lambda heard: pattern.fits(heard.frame))
+    return Condition(text, lambda record: pattern.fits(record.frame))

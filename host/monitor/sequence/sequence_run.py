@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterable
 from enum import StrEnum
 from typing import NamedTuple, assert_never
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.steps import (
     FOREVER,
     Condition,
@@ -22,7 +22,7 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
 
-class Mark(StrEnum):
+class EventType(StrEnum):
     """What a note is about."""
 
     SENT = ">"
@@ -31,11 +31,11 @@ class Mark(StrEnum):
     END = "."
 
 
-class Note(NamedTuple):
+class SequenceEvent(NamedTuple):
     """What happened when."""
 
     at_us: int
-    mark: Mark
+    mark: EventType
     text: str
 
 
@@ -72,35 +72,35 @@ class SequenceRun:
         self._out: list[CanFrame] = []
         self.done = False
         self.met = self.missed = 0
-        self.notes: list[Note] = []
+        self.notes: list[SequenceEvent] = []
 
     @property
     def due_us(self) -> int:
         """When it next wants to be called without a frame."""
         return self._pause.until_us
 
-    def tick(self, now_us: int, heard: Iterable[Heard] = ()) -> Frames:
+    def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
         """Take in what was heard, carry out what is due, and return what to send.
 
         Args:
             now_us: the time; the first call begins the sequence.
-            heard: frames since the last call; those that this program sent are passed over.
+            records: frames since the last call; those that this program sent are passed over.
         """
         if not self._begun:
             self._begun, self._at_us = True, now_us
             self._resume(now_us, None)
-        for one in heard:
+        for one in records:
             if self._pause.conditions and not one.sent:
-                self._hear(one, now_us)
+                self._receive(one, now_us)
         while self.due_us <= now_us:
             self._resume(self._pause.until_us, not self._pause.conditions)
         out, self._out = tuple(self._out), []
         return out
 
-    def _hear(self, heard: Heard, now_us: int) -> None:
+    def _receive(self, record: Record, now_us: int) -> None:
         conditions = self._pause.conditions
         for number, condition in enumerate(conditions):
-            if condition.matches(heard):
+            if condition.matches(record):
                 left = conditions[:number] + conditions[number + 1 :]
                 self._pause = _Pause(self._pause.until_us, left)
                 if not left:
@@ -114,7 +114,7 @@ class SequenceRun:
             self._pause = next(self._play) if met is None else self._play.send(met)
         except StopIteration:
             self.done, self._pause = True, _Pause(NEVER)
-            self._note(Mark.END, f"{self.met} met, {self.missed} missed")
+            self._note(EventType.END, f"{self.met} met, {self.missed} missed")
 
     def _all(self, steps: tuple[Step, ...]) -> _Play:
         for step in steps:
@@ -143,29 +143,29 @@ class SequenceRun:
     def _send(self, frames: Frames) -> None:
         self._out += frames
         for frame in frames:
-            self._note(Mark.SENT, str(frame))
+            self._note(EventType.SENT, str(frame))
 
     def _expect(self, step: Expect) -> _Play:
         wanted = " and ".join(condition.text for condition in step.conditions)
         if (yield _Pause(self._at_us + step.within_us, step.conditions)):
             self.met += 1
-            self._note(Mark.MET, wanted)
+            self._note(EventType.MET, wanted)
             return True
         self.missed += 1
         missing = " and ".join(condition.text for condition in self._pause.conditions)
         place = self._sequence.locate(step.place)
-        self._note(Mark.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms")
+        self._note(EventType.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms")
         return (yield from self._all(step.on_fail)) and step.goes_on
 
-    def _note(self, mark: Mark, text: str) -> None:
-        self.notes.append(Note(self._at_us, mark, text))
+    def _note(self, mark: EventType, text: str) -> None:
+        self.notes.append(SequenceEvent(self._at_us, mark, text))
 
 
-def note_line(note: Note) -> str:
+def event_line(note: SequenceEvent) -> str:
     """Write a note: seconds, mark, and what happened.
 
-    >>> from tickrig.host.monitor.sequence.sequence_run import Mark
-    >>> note_line(Note(4_718, Mark.MET, "703#05"))
+    >>> from tickrig.host.monitor.sequence.sequence_run import EventType
+    >>> event_line(SequenceEvent(4_718, EventType.MET, "703#05"))
     '0.004718 ok 703#05'
     """
     return f"{format_time(note.at_us)} {note.mark} {note.text}"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import Frames
 
 Place = tuple[str | int, ...]
@@ -21,7 +21,7 @@ class Condition:
     """What is waited for, as it was written, and what decides."""
 
     text: str
-    matches: Callable[[Heard], bool]
+    matches: Callable[[Record], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +98,12 @@ def outline(steps: tuple[Step, ...], depth: int = 0) -> list[str]:
     """Return the steps as lines for people, indented where they are repeated."""
     lines = []
     for step in steps:
-        text, inner = _told(step)
+        text, inner = _configured(step)
         lines += ["  " * depth + text, *outline(inner, depth + 1)]
     return lines
 
 
-def _told(step: Step) -> tuple[str, tuple[Step, ...]]:
+def _configured(step: Step) -> tuple[str, tuple[Step, ...]]:
     match step:
         case Send(_, frames):
             return "send " + " ".join(map(str, frames)), ()

@@ -39,7 +39,7 @@ class ErrorRow(NamedTuple):
     kinds: tuple[tuple[str, int], ...] = ()
 
 
-class Controller:
+class ErrorStatistics:
     """Follows the error frames of a bus."""
 
     __slots__ = ("_frames", "_kinds", "_overflows", "_rec", "_state", "_tec")

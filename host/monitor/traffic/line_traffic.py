@@ -8,7 +8,7 @@ from tickrig.host.monitor.frames.quantity import ms_text, rate_text, s_text
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.frames.record import HeardLine
+    from tickrig.host.monitor.frames.record import LineRecord
 
 ANSWERS: Final = ("ok", "refused", "event")
 """Signals that name a kind of answer."""
@@ -56,7 +56,7 @@ class LineTraffic:
     def __init__(self) -> None:
         self._rows: dict[tuple[str, bool, str], LineRow] = {}
 
-    def take(self, line: HeardLine) -> None:
+    def take(self, line: LineRecord) -> None:
         """Count a message."""
         at_us, decoded = line.at_us, line.decoded
         key = line.channel, line.sent, word_of(decoded)

@@ -1,8 +1,8 @@
 """The traffic of all buses: one row for each identifier, one for each bus.
 
 >>> traffic = Traffic()
->>> traffic.take(Heard(0, "can0", CanFrame.parse("705#7F")))
->>> traffic.take(Heard(100_000, "can0", CanFrame.parse("705#05")))
+>>> traffic.take(Record(0, "can0", CanFrame.parse("705#7F")))
+>>> traffic.take(Record(100_000, "can0", CanFrame.parse("705#05")))
 >>> row = traffic.snapshot().rows[0]
 >>> row.frames, row.gap_us, row.changed.latest == 0x7F ^ 0x05
 (2, 100000, True)
@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tickrig.host.monitor.frames.ident import ident_of
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.traffic.controller import Controller, ErrorRow
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.traffic.controller import ErrorRow, ErrorStatistics
 from tickrig.host.monitor.traffic.load import Load, LoadRow
 from tickrig.host.monitor.traffic.tally import IdRow, Tally
 from tickrig.wire.can import CanFrame
@@ -64,7 +64,7 @@ class BusTally:
         self._channel = channel
         self._first_us = self._last_us = first_us
         self._ids: dict[int, Tally] = {}
-        self._load, self._errors = Load(first_us), Controller()
+        self._load, self._errors = Load(first_us), ErrorStatistics()
         self._frames = self._went_back = 0
 
     def take(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
@@ -116,9 +116,9 @@ class Traffic:
         self._buses: dict[str, BusTally] = {}
         self._last_us = 0
 
-    def take(self, heard: Heard) -> None:
+    def take(self, record: Record) -> None:
         """Count a frame or an error frame."""
-        at_us, channel, frame, _ = heard
+        at_us, channel, frame, _ = record
         bus = self._buses.get(channel)
         if bus is None:
             bus = self._buses[channel] = BusTally(channel, at_us)

@@ -31,7 +31,7 @@ class _Place(NamedTuple):
     power_on: int
 
 
-class PdoWords:
+class PdoFrames:
     """Makes frames of what people call them.
 
     An object that is not named has its power-on value, else 0. Values are those on the wire:

@@ -1,6 +1,6 @@
 """A row of the transmit list as people write it: the words of `canmon send`.
 
->>> words = parse_words("123#00 --every 10ms --counter 0:0..14 --name alive")
+>>> words = parse_row_text("123#00 --every 10ms --counter 0:0..14 --name alive")
 >>> words.every, words.counters, words.name, str(words)
 ('10ms', ('0:0..14',), 'alive', '123#00 --every 10ms --counter 0:0..14 --name alive')
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_checksum, parse_counter
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import ONCE, TransmitRow
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
@@ -22,7 +22,7 @@ OPTIONS: Final = ("every", "counter", "checksum", "name")
 
 
 @dataclass(frozen=True, slots=True)
-class TransmitWords:
+class RowText:
     """What a row says.
 
     Attributes:
@@ -48,7 +48,7 @@ class TransmitWords:
         words += ["--name", shlex.quote(self.name)] if self.name else []
         return " ".join(words)
 
-    def row(self, pdos: PdoWords) -> TransmitRow:
+    def row(self, pdos: PdoFrames) -> TransmitRow:
         """Return what is sent.
 
         Raises:
@@ -65,10 +65,10 @@ class TransmitWords:
         return TransmitRow(self.name or self.frame, frame, period_us, fields)
 
 
-def parse_words(text: str) -> TransmitWords:
+def parse_row_text(text: str) -> RowText:
     """Read a row; ValueError if it is none.
 
-    What it says is not checked; `TransmitWords.row` does that.
+    What it says is not checked; `RowText.row` does that.
     """
     try:
         words = iter(shlex.split(text))
@@ -88,7 +88,7 @@ def parse_words(text: str) -> TransmitWords:
         raise ValueError("a row needs a frame as 123#DEADBEEF, or a PDO as 5.rpdo1 target=1")
     if len(frame) > 1 and "#" in frame[0]:
         raise ValueError(f"{frame[1]!r} behind a frame: a row has one frame")
-    return TransmitWords(
+    return RowText(
         " ".join(frame),
         _one("every", found["every"]),
         tuple(found["counter"]),

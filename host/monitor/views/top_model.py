@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.frames.ident import ident_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.line_traffic import LineRow, LineTraffic, line_table
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
@@ -17,7 +17,7 @@ from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
 PAGE: Final = 10
 """Rows that a key for a page goes."""
@@ -55,20 +55,20 @@ class TopModel:
             "p": lambda: self._scroll(-PAGE),
         }
 
-    def take(self, heards: Iterable[Listened]) -> None:
+    def take(self, records: Iterable[AnyRecord]) -> None:
         """Count frames, and lines of serial ports, whatever is shown."""
-        for heard in heards:
-            if isinstance(heard, Heard):
-                self.traffic.take(heard)
+        for record in records:
+            if isinstance(record, Record):
+                self.traffic.take(record)
             else:
-                self._serial.take(heard)
+                self._serial.take(record)
 
-    def take_meant(self, meant: Iterable[tuple[Listened, Decoded | None]]) -> None:
+    def take_decoded(self, meant: Iterable[tuple[AnyRecord, Decoded | None]]) -> None:
         """Count frames, and keep what the latest of each identifier means."""
-        for heard, decoded in meant:
-            self.take((heard,))
-            if decoded is not None and isinstance(heard.frame, CanFrame):
-                self._meanings[heard.channel, ident_of(heard.frame)] = decoded
+        for record, decoded in meant:
+            self.take((record,))
+            if decoded is not None and isinstance(record.frame, CanFrame):
+                self._meanings[record.channel, ident_of(record.frame)] = decoded
 
     def press(self, key: str) -> None:
         """Act on a key; one without a meaning does nothing."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.decode.filter import Filter
 from tickrig.host.monitor.frames.ident import ERROR, ident_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
 LINE: Final = 1 << 32
 """In a key: a line of a serial port; 1 above it for those to the device."""
@@ -29,7 +29,7 @@ class TraceRow(NamedTuple):
 
     Attributes:
         number: of the frame since the trace began, from 0.
-        heard: the frame.
+        record: the frame.
         since_us: since the frame before it on any bus; None for the first.
         gap_us: since the frame before it with this identifier on this bus; None for the first.
         changed: bits in which its payload differs from that one's; see `BitRow`.
@@ -37,7 +37,7 @@ class TraceRow(NamedTuple):
     """
 
     number: int
-    heard: Listened
+    record: AnyRecord
     since_us: int | None
     gap_us: int | None
     changed: int = 0
@@ -110,15 +110,15 @@ class Trace(Ring):
         self._latest: dict[Key, tuple[int, int]] = {}
         self._last_us: int | None = None
 
-    def take(self, heard: Listened, decoded: Decoded | None = None) -> TraceRow:
+    def take(self, record: AnyRecord, decoded: Decoded | None = None) -> TraceRow:
         """Add a frame or a line at the end."""
-        at_us, key = heard.at_us, key_of(heard)
-        data = heard.frame.data if isinstance(heard, Heard) else heard.data
+        at_us, key = record.at_us, key_of(record)
+        data = record.frame.data if isinstance(record, Record) else record.data
         payload = int.from_bytes(data, "little")
         before_us, before = self._latest.get(key, (None, payload))
         row = TraceRow(
             self.count,
-            heard,
+            record,
             _since(at_us, self._last_us),
             _since(at_us, before_us),
             payload ^ before,
@@ -136,12 +136,12 @@ class Trace(Ring):
         self._last_us = None
 
 
-def key_of(heard: Listened) -> Key:
+def key_of(record: AnyRecord) -> Key:
     """Return bus and identifier; error frames are a kind of their own, and so are lines."""
-    if not isinstance(heard, Heard):
-        return heard.channel, LINE + heard.sent
-    frame = heard.frame
-    return heard.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+    if not isinstance(record, Record):
+        return record.channel, LINE + record.sent
+    frame = record.frame
+    return record.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
 
 
 def _since(at_us: int, before_us: int | None) -> int | None:
@@ -160,7 +160,7 @@ class Latest(NamedTuple):
     frames: int
 
 
-class Sieve:
+class DisplayFilter:
     """Follows a trace.
 
     Args:
@@ -184,10 +184,10 @@ class Sieve:
         for row in self._trace.rows(self._seen, self._trace.count - self._seen):
             decoded = row.decoded
             if wanted is not None:
-                if decoded is None or not wanted.matches(row.heard, decoded):
+                if decoded is None or not wanted.matches(row.record, decoded):
                     continue
                 self.passed.append(row)
-            key = key_of(row.heard)
+            key = key_of(row.record)
             before = self._latest.get(key)
             self._latest[key] = Latest(row, 1 if before is None else before.frames + 1)
         self._seen = self._trace.count

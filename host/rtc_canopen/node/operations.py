@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.canopen.script import Command, Script
 from tickrig.host.rtc.execution.states import LifeCycleState
@@ -184,7 +184,7 @@ class Operations:
     def _run(
         self, what: str, script: Script[None], done: Callable[[Any], None] | None = None
     ) -> None:
-        self._dialogue.start(self.now_us, Job(what, script, done or _nothing, self.fail))
+        self._dialogue.start(self.now_us, QueuedScript(what, script, done or _nothing, self.fail))
 
     def _move(self, proxy: ProxyRtc, wanted: LifeCycleState) -> None:
         context = proxy.contexts[0]

@@ -150,7 +150,7 @@ class Receiver:
         elif can_id in ERROR_CONTROL:
             node.hear_error_control(now_us, at_us, frame.data)
         elif can_id in SDO_RESPONSES:
-            node.hear_sdo(now_us, frame.data)
+            node.receive_sdo(now_us, frame.data)
         elif can_id in EMERGENCY:
             self._hear_emergency(node, frame.data)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final, Protocol
 
-from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
@@ -119,7 +119,7 @@ class ServedNode:
         self.operations.now_us = now_us
         self.phase, self.lost = Phase.ABSENT, False
         self._twins.forget()
-        job = Job("probe", probe(), lambda _: self._found(), self._not_booted)
+        job = QueuedScript("probe", probe(), lambda _: self._found(), self._not_booted)
         self.dialogue.start(now_us, job)
         self._plan()
 
@@ -151,15 +151,15 @@ class ServedNode:
         changed = state is not operations.nmt_state
         operations.now_us, operations.nmt_state, self.heard_us = now_us, state, at_us
         self._blind_us = 0
-        self.dialogue.hear_state(now_us, state)
+        self.dialogue.receive_state(now_us, state)
         self._take(state, changed=changed)
         self._plan()
 
-    def hear_sdo(self, now_us: int, data: bytes) -> None:
+    def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take an SDO response."""
         self.operations.now_us = now_us
         self._twins.answer(data)
-        self.dialogue.hear_sdo(now_us, data)
+        self.dialogue.receive_sdo(now_us, data)
         self._judge()
         self._plan()
 
@@ -169,7 +169,7 @@ class ServedNode:
         if command in RESETS:
             self._foreign_reset_us = at_us
 
-    def run(self, now_us: int, job: Job) -> None:
+    def run(self, now_us: int, job: QueuedScript) -> None:
         """Run a job of somebody else."""
         self.operations.now_us = now_us
         self.dialogue.start(now_us, job)
@@ -260,7 +260,7 @@ class ServedNode:
         if first is not None:
             self.operations.say(first)
         script = boot(self.entry, self.file, self.writes)
-        job = Job("boot", script, self._booted, self._not_booted)
+        job = QueuedScript("boot", script, self._booted, self._not_booted)
         self.dialogue.start(self.operations.now_us, job)
 
     def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:

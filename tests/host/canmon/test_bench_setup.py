@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.monitor_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 
@@ -21,8 +21,8 @@ name = "left wheel"
 
 
 def test_paths_are_taken_from_the_folder_of_the_file(tmp_path: Path) -> None:
-    setup = BenchSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
-    assert setup == BenchSetup(
+    setup = MonitorSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
+    assert setup == MonitorSetup(
         source=("can0", str(tmp_path / "run.log")),
         options=BusOptions(bitrate=500_000, bus_kwargs=("port=1",)),
         eds={3: tmp_path / "drive.eds"},
@@ -33,18 +33,18 @@ def test_paths_are_taken_from_the_folder_of_the_file(tmp_path: Path) -> None:
 def test_it_is_written_as_it_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     workspace = Workspace(TEXT, tmp_path / "bench.toml")
     monkeypatch.chdir("/")
-    BenchSetup.read(workspace).write(workspace)
+    MonitorSetup.read(workspace).write(workspace)
     assert workspace.text == TEXT
 
 
 def test_the_command_line_goes_before(tmp_path: Path) -> None:
-    kept = BenchSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
-    assert kept.under(BenchSetup()) == kept
-    said = BenchSetup(source=("can1",), eds={4: Path("io.eds")})
+    kept = MonitorSetup.read(Workspace(TEXT, tmp_path / "bench.toml"))
+    assert kept.under(MonitorSetup()) == kept
+    said = MonitorSetup(source=("can1",), eds={4: Path("io.eds")})
     both = kept.under(said)
     assert (both.source, both.options) == (("can1",), BusOptions(bitrate=500_000))
     assert both.eds == {3: tmp_path / "drive.eds", 4: Path("io.eds")}
-    other = kept.under(BenchSetup(options=BusOptions(interface="virtual", channel="a")))
+    other = kept.under(MonitorSetup(options=BusOptions(interface="virtual", channel="a")))
     assert other.source == ()
     assert other.options.interface == "virtual"
 
@@ -64,4 +64,4 @@ def test_the_command_line_goes_before(tmp_path: Path) -> None:
 )
 def test_a_wrong_setting_is_told_with_its_line(text: str, reason: str) -> None:
     with pytest.raises(WorkspaceError, match=reason):
-        BenchSetup.read(Workspace(text, Path("bench.toml")))
+        MonitorSetup.read(Workspace(text, Path("bench.toml")))

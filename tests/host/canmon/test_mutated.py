@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.monitor_setup import BenchSetup
+from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.sources import whole_log
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.refused import Refused
@@ -115,4 +115,4 @@ def test_a_mutated_workspace_is_no_traceback() -> None:
     for _ in range(30):
         text = mutated(chance, WORKSPACE).decode("utf-8", "replace")
         with suppress(WorkspaceError, Refused):
-            BenchSetup.read(Workspace(text, Path("bench.toml")))
+            MonitorSetup.read(Workspace(text, Path("bench.toml")))

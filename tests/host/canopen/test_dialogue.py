@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.script import SDO_TIMEOUT_US, Await, Command, Pause, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
@@ -28,10 +28,10 @@ class Talk:
         self.dialogue = Dialogue(
             5, lambda can_id, data: self.sent.append(f"{can_id:03X}#{data.hex()}")
         )
-        self.dialogue.start(0, Job("test", script, self._done, self._failed))
+        self.dialogue.start(0, QueuedScript("test", script, self._done, self._failed))
 
     def answer(self, now_us: int, text: str) -> None:
-        self.dialogue.hear_sdo(now_us, bytes.fromhex(text))
+        self.dialogue.receive_sdo(now_us, bytes.fromhex(text))
 
     def _send(self, can_id: int, data: bytes) -> None:
         self.sent.append(f"{can_id:03X}#{data.hex()}")
@@ -168,7 +168,9 @@ def test_jobs_run_one_after_the_other() -> None:
         yield Pause(1_000)
 
     talk = Talk(pausing())
-    talk.dialogue.start(0, Job("second", download(0x1017, 0, b"\0\0"), talk._done, talk._failed))
+    talk.dialogue.start(
+        0, QueuedScript("second", download(0x1017, 0, b"\0\0"), talk._done, talk._failed)
+    )
     assert talk.sent == ["000#0105"]
     talk.dialogue.tick(1_000)
     assert talk.sent == ["000#0105", "605#2b17100000000000"]
@@ -178,7 +180,7 @@ def test_jobs_run_one_after_the_other() -> None:
 def test_noise_ends_a_transfer_or_leaves_it_waiting(noise: list[bytes], reading: bool) -> None:
     talk = Talk(upload(0x1000, 0) if reading else download(0x2008, 0, bytes(20)))
     for data in noise:
-        talk.dialogue.hear_sdo(0, data)
+        talk.dialogue.receive_sdo(0, data)
     if talk.dialogue.job is not None:
         talk.dialogue.tick(SDO_TIMEOUT_US)
     assert talk.dialogue.job is None
@@ -206,7 +208,9 @@ def idle() -> Dialogue:
     return Dialogue(5, lambda can_id, data: None)
 
 
-def job(script: Script[Any], ended: list[str], what: str = "", *, moves: bool = True) -> Job:
+def job(
+    script: Script[Any], ended: list[str], what: str = "", *, moves: bool = True
+) -> QueuedScript:
     """A job that notes how it ended."""
 
     def note(how: str) -> None:
@@ -215,25 +219,25 @@ def job(script: Script[Any], ended: list[str], what: str = "", *, moves: bool = 
     def fail(failure: Failure) -> None:
         note(str(failure))
 
-    return Job(what, script, lambda _: note("done"), fail, lambda: note("dropped"), moves)
+    return QueuedScript(what, script, lambda _: note("done"), fail, lambda: note("dropped"), moves)
 
 
 def test_without_a_job_nothing_is_due_and_nothing_moves() -> None:
     dialogue = idle()
     dialogue.tick(NEVER - 1)
     dialogue.clear()
-    dialogue.hear_state(0, NmtState.OPERATIONAL)
-    dialogue.hear_sdo(0, bytes(8))
+    dialogue.receive_state(0, NmtState.OPERATIONAL)
+    dialogue.receive_sdo(0, bytes(8))
     assert (dialogue.due_us, dialogue.job, dialogue.moves) == (NEVER, None, False)
 
 
 def test_a_state_that_is_awaited_ends_the_wait_and_no_other_does() -> None:
     dialogue, ended = idle(), list[str]()
     dialogue.start(0, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))
-    dialogue.hear_state(10, NmtState.PRE_OPERATIONAL)
-    dialogue.hear_sdo(20, bytes.fromhex("4300100091010700"))
+    dialogue.receive_state(10, NmtState.PRE_OPERATIONAL)
+    dialogue.receive_sdo(20, bytes.fromhex("4300100091010700"))
     assert ended == []
-    dialogue.hear_state(30, NmtState.OPERATIONAL)
+    dialogue.receive_state(30, NmtState.OPERATIONAL)
     assert ended == ["done"]
     assert (dialogue.due_us, dialogue.job) == (NEVER, None)
 
@@ -242,7 +246,7 @@ def test_a_state_is_nothing_to_who_awaits_an_answer_or_pauses() -> None:
     for script in (upload(0x1000, 0), steps(Pause(300))):
         dialogue, ended = idle(), list[str]()
         dialogue.start(0, job(script, ended))
-        dialogue.hear_state(10, NmtState.OPERATIONAL)
+        dialogue.receive_state(10, NmtState.OPERATIONAL)
         assert ended == []
 
 
@@ -263,7 +267,7 @@ def test_each_wait_begins_when_the_one_before_has_ended() -> None:
     assert dialogue.due_us == 1_050
     dialogue.tick(1_060)
     assert dialogue.due_us == 1_360
-    dialogue.hear_state(1_100, NmtState.OPERATIONAL)
+    dialogue.receive_state(1_100, NmtState.OPERATIONAL)
     assert dialogue.due_us == 1_170
 
 
@@ -274,7 +278,7 @@ def test_an_answer_begins_the_next_wait() -> None:
 
     dialogue = idle()
     dialogue.start(0, job(reading_on(), []))
-    dialogue.hear_sdo(100, bytes.fromhex("4300100091010700"))
+    dialogue.receive_sdo(100, bytes.fromhex("4300100091010700"))
     assert dialogue.due_us == 170
 
 
@@ -317,7 +321,7 @@ def test_a_job_moves_the_node_unless_it_says_otherwise() -> None:
     dialogue, ended, moves = idle(), list[str](), list[bool]()
     dialogue.start(0, job(steps(Pause(50)), ended, moves=False))
     moves.append(dialogue.moves)
-    dialogue.start(0, Job("", steps(Pause(50)), ended.append, lambda _: None))
+    dialogue.start(0, QueuedScript("", steps(Pause(50)), ended.append, lambda _: None))
     for now_us in (0, 50, 100):
         dialogue.tick(now_us)
         moves.append(dialogue.moves)

@@ -6,7 +6,7 @@ from itertools import accumulate
 
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -34,9 +34,9 @@ STEPS_US = st.one_of(st.integers(0, 300), st.integers(-5_000, 400_000), st.just(
 
 
 @st.composite
-def traffic(draw: st.DrawFn) -> list[Heard]:
+def traffic(draw: st.DrawFn) -> list[Record]:
     steps_us = draw(st.lists(STEPS_US, max_size=60))
     begin_us = draw(st.sampled_from([0, 1_700_000_000_000_000]))
     times_us = [max(0, at_us) for at_us in accumulate(steps_us, initial=begin_us)][1:]
     channel = st.sampled_from(["can0", "can0", "can1"])
-    return [Heard(at_us, draw(channel), draw(FRAMES)) for at_us in times_us]
+    return [Record(at_us, draw(channel), draw(FRAMES)) for at_us in times_us]

@@ -58,11 +58,11 @@ class AlarmTask:
         self.alarms = Alarms(rules, self.bit_rate)
         self._due_us = NEVER if rules == Rules() else 0
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take what was heard."""
         if self._due_us == NEVER:
             return ()
-        for one, _ in heard:
+        for one, _ in records:
             self.alarms.take(one)
         if now_us >= self._due_us:
             self._due_us = now_us + LOOK_US

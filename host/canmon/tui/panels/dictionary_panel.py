@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.tui.controls import AskLine, ChoiceView, TitleLine
+from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import next_bus, text_of
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
@@ -16,7 +16,7 @@ from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.monitor.dictionary.encode_value import encode_words
+from tickrig.host.monitor.dictionary.encode_value import encode_value
 from tickrig.host.monitor.dictionary.node_dictionary import ObjectRow, render_dictionary
 from tickrig.host.tui.line_view import Line, plain
 
@@ -68,7 +68,7 @@ class DictionaryPanel(Panel):
         yield TitleLine("node")
         yield TitleLine("head")
         yield ChoiceView()
-        yield AskLine()
+        yield PromptLine()
 
     def snapshot(self, model: Model) -> None:
         """Keep the objects of the node."""
@@ -113,7 +113,7 @@ class DictionaryPanel(Panel):
 
     def action_go(self) -> None:
         """Ask for a node-ID."""
-        self.query_one(AskLine).ask("node-ID 1 to 127", "", self._go)
+        self.query_one(PromptLine).ask("node-ID 1 to 127", "", self._go)
 
     def action_read(self) -> None:
         """Read the chosen object."""
@@ -137,11 +137,11 @@ class DictionaryPanel(Panel):
         if row is not None and self._may_send():
             kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))
             question = f"{write_entry(row.entry)} {row.text.name} ({kind})"
-            self.query_one(AskLine).ask(question, "", lambda text: self._write(row, text))
+            self.query_one(PromptLine).ask(question, "", lambda text: self._write(row, text))
 
     def action_filter(self) -> None:
         """Ask for a part of a name, or the begin of an index."""
-        self.query_one(AskLine).ask("name or index", self.filter_text, self._filter)
+        self.query_one(PromptLine).ask("name or index", self.filter_text, self._filter)
 
     def _show(self, node: Node) -> None:
         with self.session.lock:
@@ -164,7 +164,7 @@ class DictionaryPanel(Panel):
         self.look()
 
     def _write(self, row: ObjectRow, text: str) -> None:
-        data = encode_words(row.text, text)
+        data = encode_value(row.text, text)
         with self.session.lock:
             self.client.write(self.session.now_us, row.entry, data)
         self.look()

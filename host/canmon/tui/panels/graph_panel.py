@@ -17,16 +17,16 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.tui.controls import AskLine, PictureView, TitleLine
+from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, text_of, texts_of
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH
 from tickrig.host.monitor.graph.series import LEAST_US
-from tickrig.host.monitor.graph.signal_word import SignalWord, parse_signal
+from tickrig.host.monitor.graph.signal_spec import SignalSpec, parse_signal
 from tickrig.host.text.values import parse_time_us
 from tickrig.host.tui.line_view import Line
 from tickrig.wire.can import Frames
@@ -64,10 +64,10 @@ class GraphTask:
     def __init__(self, graph: LiveGraph) -> None:
         self._graph = graph
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take what was heard."""
         if self._graph.words:
-            for one, decoded in heard:
+            for one, decoded in records:
                 self._graph.take(one, decoded)
         return ()
 
@@ -122,7 +122,7 @@ class GraphPanel(Panel):
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
-        self.graph = LiveGraph(Sight.LIVE if session.source.live else Sight.ALL)
+        self.graph = LiveGraph(ViewMode.LIVE if session.source.live else ViewMode.ALL)
         session.tasks.append(GraphTask(self.graph))
         self._texts: list[str] = []
         self._lines: list[Line] = []
@@ -131,7 +131,7 @@ class GraphPanel(Panel):
         """Lay out state and picture."""
         yield TitleLine("state")
         yield PictureView()
-        yield AskLine()
+        yield PromptLine()
 
     def snapshot(self, model: Model) -> None:
         """Draw the picture: it reads the samples."""
@@ -162,12 +162,12 @@ class GraphPanel(Panel):
 
     def action_add(self) -> None:
         """Ask for a signal."""
-        self.query_one(AskLine).ask(QUESTION, "", self._add)
+        self.query_one(PromptLine).ask(QUESTION, "", self._add)
 
     def action_remove(self) -> None:
         """Ask which signal is shown no more."""
         if self._texts:
-            self.query_one(AskLine).ask("take out", self._texts[-1], self._remove)
+            self.query_one(PromptLine).ask("take out", self._texts[-1], self._remove)
 
     def action_zoom(self, factor: float) -> None:
         """Come closer in time."""
@@ -181,9 +181,9 @@ class GraphPanel(Panel):
         """Move the cursor."""
         self._act(lambda: self.graph.move_cursor(fraction))
 
-    def action_show(self, sight: str) -> None:
+    def action_show(self, mode: str) -> None:
         """See what comes, all, or what stands still."""
-        self._act(lambda: self.graph.show(Sight(sight)))
+        self._act(lambda: self.graph.show(ViewMode(mode)))
 
     def action_next_axis(self) -> None:
         """Choose a vertical axis."""
@@ -207,7 +207,7 @@ class GraphPanel(Panel):
 
     def action_write(self) -> None:
         """Ask for a file, and write the picture or the samples."""
-        self.query_one(AskLine).ask("file: .svg .html .png .csv", "graph.svg", self._write)
+        self.query_one(PromptLine).ask("file: .svg .html .png .csv", "graph.svg", self._write)
 
     def on_picture_view_pointed(self, event: PictureView.Pointed) -> None:
         """Put the cursor where the mouse is."""
@@ -229,12 +229,12 @@ class GraphPanel(Panel):
         self.look()
 
     def _add_signal(self, text: str) -> None:
-        word: SignalWord = parse_signal(text)
+        word: SignalSpec = parse_signal(text)
         with self.session.lock:
             trace = self.session.model.trace
             rows = trace.rows(trace.first, trace.count)
-            heard = ((row.heard, row.decoded) for row in rows)
-            self.graph.add(word, ((one, meant) for one, meant in heard if isinstance(one, Heard)))
+            record = ((row.record, row.decoded) for row in rows)
+            self.graph.add(word, ((one, meant) for one, meant in record if isinstance(one, Record)))
         self._texts.append(text)
 
     def _remove(self, text: str) -> None:
@@ -259,7 +259,7 @@ class GraphPanel(Panel):
 
     def _state(self) -> str:
         graph = self.graph
-        words = [str(graph.sight), f"window {graph.window_us / 1e6:g} s", f"axis {graph.axis}"]
+        words = [str(graph.mode), f"window {graph.window_us / 1e6:g} s", f"axis {graph.axis}"]
         if graph.cursor_us is not None:
             words.append(f"cursor at {graph.view().seconds(graph.cursor_us):.6f} s")
         return "   ".join(words)

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
-from tickrig.host.canmon.tui.controls import AskLine, TitleLine
+from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import checked_bus, next_bus
 from tickrig.host.canmon.tui.tasks.model import Model
@@ -25,11 +25,11 @@ from tickrig.host.canmon.tui.tasks.sequence_task import (
 )
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.sequence.parse_sequence import SequenceError
-from tickrig.host.monitor.sequence.sequence_run import Mark, Note, note_line
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceEvent, event_line
 from tickrig.host.monitor.sequence.steps import Sequence, outline
 from tickrig.host.tui.line_view import Line, LineView, plain
 
-STYLES: Final = {Mark.MET: "green", Mark.MISSED: "bold red", Mark.END: "bold"}
+STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")
 
 
@@ -86,7 +86,7 @@ class SequencePanel(Panel):
         session.tasks.append(self.runner)
         self.texts, self.number = [NEW], 0
         self._steps: list[str] = []
-        self._notes: list[Note] = []
+        self._notes: list[SequenceEvent] = []
         self._going = False
 
     def compose(self) -> ComposeResult:
@@ -96,7 +96,7 @@ class SequencePanel(Panel):
             yield LineView()
             yield TextArea(self.texts[self.number], tab_behavior="focus", show_line_numbers=True)
         yield Static(id="mistake", markup=False)
-        yield AskLine()
+        yield PromptLine()
 
     def snapshot(self, model: Model) -> None:
         """Keep what happened."""
@@ -176,12 +176,12 @@ class SequencePanel(Panel):
 
     def action_open(self) -> None:
         """Ask for a file, and read a sequence from it."""
-        self.query_one(AskLine).ask("read a sequence from file", "", self._read_file)
+        self.query_one(PromptLine).ask("read a sequence from file", "", self._read_file)
 
     def action_write(self) -> None:
         """Ask for a file, and write the sequence to it."""
         name = f"{self._called()}.toml"
-        self.query_one(AskLine).ask("write the sequence to file", name, self._write_file)
+        self.query_one(PromptLine).ask("write the sequence to file", name, self._write_file)
 
     def action_bus(self) -> None:
         """Send on the next bus."""
@@ -234,5 +234,5 @@ class SequencePanel(Panel):
         return "   ".join(words)
 
 
-def _line(note: Note) -> Line:
-    return plain(note_line(note), STYLES.get(note.mark, ""))
+def _line(note: SequenceEvent) -> Line:
+    return plain(event_line(note), STYLES.get(note.mark, ""))

@@ -18,7 +18,7 @@ from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter
 from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.views.trace import Latest, Ring, Sieve
+from tickrig.host.monitor.views.trace import DisplayFilter, Latest, Ring
 from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
@@ -63,7 +63,7 @@ class TracePanel(Panel):
         self.overwrite, self.filter_text = False, ""
         self.paused: tuple[Ring, list[Latest]] | None = None
         self._look = TraceLines()
-        self._sieve = Sieve(session.model.trace)
+        self._display_filter = DisplayFilter(session.model.trace)
         self._follower = _Follower(self)
         session.tasks.append(self._follower)
         self._begin = self._total = 0
@@ -83,12 +83,12 @@ class TracePanel(Panel):
 
     def follow(self) -> None:
         """Take new rows of the trace."""
-        self._sieve.follow()
+        self._display_filter.follow()
 
     def snapshot(self, model: Model) -> None:
         """Keep the rows that are in view."""
         view = self.query_one(LineView)
-        passed, latest = self.paused or (self._sieve.passed, self._sieve.latest())
+        passed, latest = self.paused or (self._display_filter.passed, self._display_filter.latest())
         self._fit(passed, latest)
         if self.overwrite:
             self._begin, self._total = 0, len(latest)
@@ -122,7 +122,7 @@ class TracePanel(Panel):
         )
         text = text_of(settings, "filter", self.filter_text)
         try:
-            self.sift(text)
+            self.apply_filter(text)
         except FilterError as error:
             raise SettingError(("filter",), str(error)) from None
 
@@ -136,11 +136,11 @@ class TracePanel(Panel):
             "filter": self.filter_text,
         }
 
-    def sift(self, text: str) -> None:
+    def apply_filter(self, text: str) -> None:
         """Show only what a filter passes; FilterError if it is none."""
         wanted: Filter | None = parse_filter(text) if text else None
         with self.session.lock:
-            self._sieve = Sieve(self.session.model.trace, wanted)
+            self._display_filter = DisplayFilter(self.session.model.trace, wanted)
         self.filter_text, self.paused = text, None
 
     def on_line_view_moved(self) -> None:
@@ -151,7 +151,7 @@ class TracePanel(Panel):
         """Apply the filter, or say what is wrong with it."""
         wrong = self.query_one("#wrong", Static)
         try:
-            self.sift(event.value.strip())
+            self.apply_filter(event.value.strip())
         except FilterError as error:
             wrong.update(str(error))
             wrong.display = True
@@ -176,7 +176,7 @@ class TracePanel(Panel):
     def action_pause(self) -> None:
         """Hold the picture, or go on; frames are taken meanwhile."""
         with self.session.lock:
-            held = self._sieve.passed.copy(), self._sieve.latest()
+            held = self._display_filter.passed.copy(), self._display_filter.latest()
         self.paused = None if self.paused else held
         self.look()
 
@@ -204,7 +204,7 @@ class TracePanel(Panel):
     def action_clear(self) -> None:
         """Begin anew."""
         with self.session.lock:
-            self._sieve.clear()
+            self._display_filter.clear()
         self.paused = None
         self.look()
 
@@ -213,10 +213,10 @@ class TracePanel(Panel):
 
     def _fit(self, passed: Ring, latest: Sequence[Latest]) -> None:
         """Make room for what is there: buses, and the first time."""
-        buses = {one.row.heard.channel for one in latest}
+        buses = {one.row.record.channel for one in latest}
         width = min(CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
         first = passed.rows(0, 1) if passed.first == 0 else []
-        origin_us = first[0].heard.at_us if first else self._look.origin_us
+        origin_us = first[0].record.at_us if first else self._look.origin_us
         self._look = replace(
             self._look, channel_width=width, counts=self.overwrite, origin_us=origin_us
         )
@@ -237,7 +237,7 @@ class _Follower:
     def __init__(self, panel: TracePanel) -> None:
         self._panel = panel
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Follow; it sends nothing."""
         self._panel.follow()
         return ()

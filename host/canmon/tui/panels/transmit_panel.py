@@ -12,22 +12,22 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.tui.controls import AskLine, ChoiceView, TitleLine
+from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, checked_bus, next_bus, tables, text_of, texts_of
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
-from tickrig.host.monitor.transmit.row_text import TransmitWords, parse_words
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
+from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
 from tickrig.host.monitor.transmit.transmit_list import ON, TransmitList, render_transmit
 from tickrig.host.tui.line_view import plain
 from tickrig.wire.can import CanFrame, Frames
 
 
-def read_row(settings: Mapping[str, Any]) -> TransmitWords:
+def read_row(settings: Mapping[str, Any]) -> RowText:
     """Return what a row says; SettingError if a setting is none."""
-    return TransmitWords(
+    return RowText(
         text_of(settings, "send", ""),
         text_of(settings, "every", ""),
         texts_of(settings, "counter"),
@@ -36,7 +36,7 @@ def read_row(settings: Mapping[str, Any]) -> TransmitWords:
     )
 
 
-def row_settings(words: TransmitWords) -> dict[str, Any]:
+def row_settings(words: RowText) -> dict[str, Any]:
     """Return it as settings; what is empty is None, so that a workspace leaves it out."""
     return {
         "send": words.frame,
@@ -65,9 +65,9 @@ class TransmitTask:
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
         self.channel = channel
-        self.words: list[TransmitWords] = []
+        self.words: list[RowText] = []
         self.list = TransmitList()
-        self._pdos = PdoWords(eds)
+        self._pdos = PdoFrames(eds)
         self._out: list[CanFrame] = []
 
     @property
@@ -75,12 +75,12 @@ class TransmitTask:
         """When it next wants to be called."""
         return NOW if self._out else self.list.due_us
 
-    def add(self, words: TransmitWords) -> None:
+    def add(self, words: RowText) -> None:
         """Add a row at the end; ValueError if it cannot be sent."""
         self.list.rows.append(words.row(self._pdos))
         self.words.append(words)
 
-    def change(self, number: int, words: TransmitWords) -> None:
+    def change(self, number: int, words: RowText) -> None:
         """Put another row in the place of one, which sends no more; ValueError as `add`."""
         self.list.rows[number] = words.row(self._pdos)
         self.words[number] = words
@@ -103,7 +103,7 @@ class TransmitTask:
         self.list.armed = armed
         self._out += self.list.once(number)
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Return what is due."""
         out, self._out = self._out, []
         return (*out, *self.list.tick(now_us))
@@ -153,7 +153,7 @@ class TransmitPanel(Panel):
         """Lay out the list."""
         yield TitleLine("head")
         yield ChoiceView()
-        yield AskLine()
+        yield PromptLine()
 
     @property
     def chosen(self) -> int:
@@ -197,13 +197,13 @@ class TransmitPanel(Panel):
 
     def action_add(self) -> None:
         """Write a new row."""
-        self.query_one(AskLine).ask(QUESTION, "", self._add)
+        self.query_one(PromptLine).ask(QUESTION, "", self._add)
 
     def action_edit(self) -> None:
         """Write the chosen row anew."""
         number = self.chosen
         if number < len(self.transmit.words):
-            self.query_one(AskLine).ask(
+            self.query_one(PromptLine).ask(
                 QUESTION, str(self.transmit.words[number]), lambda text: self._change(number, text)
             )
 
@@ -236,14 +236,14 @@ class TransmitPanel(Panel):
         self.look()
 
     def _add(self, text: str) -> None:
-        words = parse_words(text)
+        words = parse_row_text(text)
         with self.session.lock:
             self.transmit.add(words)
         self.look()
         self.query_one(ChoiceView).choose(len(self.transmit.words) - 1)
 
     def _change(self, number: int, text: str) -> None:
-        words: TransmitWords = parse_words(text)
+        words: RowText = parse_row_text(text)
         with self.session.lock:
             self.transmit.change(number, words)
         self.look()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import Meant
-from tickrig.host.canopen.dialogue import Dialogue, Failure, Job
+from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.monitor.decode.decoder import Decoder
@@ -84,16 +84,16 @@ class DictionaryTask:
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take values and answers; return requests."""
-        for one, decoded in heard:
+        for one, decoded in records:
             if decoded.node is None:
                 continue
             node = one.channel, decoded.node
             if decoded.transfers or decoded.kind[1:4] == "pdo":
                 self.objects(node).take(one.at_us, decoded)
             if node == self._node and decoded.kind == "sdo" and isinstance(one.frame, CanFrame):
-                self._hear(now_us, one.frame)
+                self._receive(now_us, one.frame)
         self._dialogue.tick(now_us)
         if now_us >= self._watch_us:
             self._read_watched(now_us)
@@ -115,9 +115,9 @@ class DictionaryTask:
             for entry in sorted(self.watched):
                 self.read(now_us, entry)
 
-    def _hear(self, now_us: int, frame: CanFrame) -> None:
+    def _receive(self, now_us: int, frame: CanFrame) -> None:
         if self._node and frame.can_id == RESPONSE_COB_ID + self._node[1] and not frame.remote:
-            self._dialogue.hear_sdo(now_us, frame.data)
+            self._dialogue.receive_sdo(now_us, frame.data)
 
     def _send(self, can_id: int, data: bytes) -> None:
         self._out.append(CanFrame(can_id, data))
@@ -130,7 +130,7 @@ class DictionaryTask:
             self._ended(str(failure))
 
         self.left += 1
-        self._dialogue.start(now_us, Job(what, script, done, failed))
+        self._dialogue.start(now_us, QueuedScript(what, script, done, failed))
 
     def _ended(self, said: str) -> None:
         self.left -= 1

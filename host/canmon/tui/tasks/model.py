@@ -9,11 +9,11 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Heard, Listened
+from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.trace import Trace
 
-Meant = tuple[Heard, Decoded]
+Meant = tuple[Record, Decoded]
 """A frame and what it means."""
 
 
@@ -53,20 +53,20 @@ class Model:
         self.frames = self.now_us = self.lost = self.unread = 0
         self.failed, self.ended = "", False
 
-    def take(self, heards: Sequence[Listened]) -> list[Meant]:
+    def take(self, records: Sequence[AnyRecord]) -> list[Meant]:
         """Take what was heard; return the frames with what they mean."""
         meant: list[Meant] = []
-        for heard in heards:
-            if isinstance(heard, Heard):
-                decoded = self.decoder.take(heard)
-                self.board.take(heard, decoded)
-                self.trace.take(heard, decoded)
-                meant.append((heard, decoded))
+        for record in records:
+            if isinstance(record, Record):
+                decoded = self.decoder.take(record)
+                self.board.take(record, decoded)
+                self.trace.take(record, decoded)
+                meant.append((record, decoded))
             else:
-                self.trace.take(heard, heard.decoded)
-                self.top.take((heard,))
-        self.top.take_meant(meant)
+                self.trace.take(record, record.decoded)
+                self.top.take((record,))
+        self.top.take_decoded(meant)
         self.frames += len(meant)
-        if heards:
-            self.now_us = heards[-1].at_us
+        if records:
+            self.now_us = records[-1].at_us
         return meant

@@ -11,11 +11,11 @@ from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.source import open_any
-from tickrig.host.canmon.sources.source_word import BusWord, LineWord, parse_source
+from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec, parse_source
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Send, Session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.frames.record import Listened
+from tickrig.host.monitor.frames.record import AnyRecord
 
 TERMINAL: Final = "/dev/tty"
 
@@ -28,20 +28,20 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
         SourceFailed: a bus or file that cannot be opened.
     """
     parsed = [parse_source(word) for word in words]
-    buses = [word for word in parsed if isinstance(word, BusWord)]
-    lines = [word for word in parsed if isinstance(word, LineWord)]
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    lines = [word for word in parsed if isinstance(word, LineSpec)]
     if parsed == [None]:
         return Session(StdinSource(_take_pipe()), model)
     if len(buses) + len(lines) < len(parsed) or not (words or options):
         return Session(open_any(words, options), model)
     if not lines:
-        buses = buses or [BusWord()]
+        buses = buses or [BusSpec()]
     return Session(*_open_live(buses, lines, options, model))
 
 
 def _open_live(
-    buses: Sequence[BusWord], lines: Sequence[LineWord], options: BusOptions, model: Model
-) -> tuple[LiveSource[Listened], Model, dict[str, Send]]:
+    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions, model: Model
+) -> tuple[LiveSource[AnyRecord], Model, dict[str, Send]]:
     from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415
     from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
         merged,
@@ -51,7 +51,7 @@ def _open_live(
     from tickrig.host.canmon.sources.line_source import open_port  # noqa: PLC0415 - pyserial
 
     sends: dict[str, Send] = {}
-    readers: list[Reader[Listened]] = []
+    readers: list[Reader[AnyRecord]] = []
     try:
         for word in buses:
             bus, interface, name = open_bus(merged(word, options))

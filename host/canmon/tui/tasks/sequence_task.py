@@ -16,11 +16,11 @@ from typing import Any, Final
 from tickrig.host.canmon.tui.settings import below, tables, text_of
 from tickrig.host.canmon.tui.tasks.model import Meant
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.sequence.conditions import HeardCondition
+from tickrig.host.monitor.sequence.conditions import DecodedCondition
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import Mark, Note, SequenceRun
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceEvent, SequenceRun
 from tickrig.host.monitor.sequence.steps import Sequence as Steps
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
@@ -88,8 +88,8 @@ class SequenceTask:
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
         self.channel = channel
-        self.notes: deque[Note] = deque(maxlen=KEPT)
-        self._pdos, self._heard = PdoWords(eds), HeardCondition()
+        self.notes: deque[SequenceEvent] = deque(maxlen=KEPT)
+        self._pdos, self._heard = PdoFrames(eds), DecodedCondition()
         self._run: SequenceRun | None = None
         self._begin_us: int | None = None
 
@@ -117,7 +117,7 @@ class SequenceTask:
         self.notes.clear()
         self._begin_us, self._run = None, SequenceRun(sequence)
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take what was heard; return what the sequence sends."""
         run = self._run
         if run is None:
@@ -125,7 +125,7 @@ class SequenceTask:
         if self._begin_us is None:
             self._begin_us = now_us
         out = list(run.tick(now_us))
-        for one, decoded in heard:
+        for one, decoded in records:
             self._heard.take(one, decoded)
             out += run.tick(now_us, (one,))
         begin_us = self._begin_us
@@ -140,4 +140,4 @@ class SequenceTask:
         if self._run is not None:
             self._run = None
             at_us = self.notes[-1].at_us if self.notes else 0
-            self.notes.append(Note(at_us, Mark.END, "stopped"))
+            self.notes.append(SequenceEvent(at_us, EventType.END, "stopped"))

@@ -12,7 +12,7 @@ from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.monitor.frames.record import Heard, Listened
+from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
@@ -36,12 +36,12 @@ class Task(Protocol):
         """When it next wants to be called without a frame; `NEVER` if not."""
         ...
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take what was heard, those that this program sent among it; return what to send.
 
         Args:
             now_us: the session's time, not that of the frames.
-            heard: frames since the last call.
+            records: frames since the last call.
         """
         ...
 
@@ -73,7 +73,7 @@ class Session:
 
     def __init__(
         self,
-        source: AnySource[Listened],
+        source: AnySource[AnyRecord],
         model: Model,
         buses: Mapping[str, Send] | None = None,
         clock: Callable[[], int] = lambda: time.monotonic_ns() // 1_000,
@@ -84,7 +84,7 @@ class Session:
         self.armed, self.trouble = False, ""
         self.sent = self.withheld = 0
         self._clock, self._watch = clock, Stopwatch()
-        self._echo: list[Heard] = []
+        self._echo: list[Record] = []
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
         self._thread: Future[None] | None = None
 
@@ -128,9 +128,9 @@ class Session:
     def step(self, timeout_us: int = 0) -> None:
         """Wait for a first frame or a task that is due, and take all that is there."""
         due_us = min((task.due_us for task in self.tasks), default=NEVER)
-        heards = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
+        records = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
         with self.lock:
-            out = self._take([*self._echo, *heards])
+            out = self._take([*self._echo, *records])
             model, source = self.model, self.source
             model.lost, model.unread = source.lost, source.unread
             model.failed, model.ended = source.failed, source.ended
@@ -143,10 +143,10 @@ class Session:
             if self.source.ended:
                 self._stop.wait(POLL_US / 1e6)
 
-    def _take(self, heards: Sequence[Listened]) -> list[tuple[str, CanFrame]]:
+    def _take(self, records: Sequence[AnyRecord]) -> list[tuple[str, CanFrame]]:
         self._echo = []
-        self._watch.take(heards)
-        meant = self.model.take(heards)
+        self._watch.take(records)
+        meant = self.model.take(records)
         if self.source.live:
             self.model.now_us = self._source_us()
         now_us = self._clock()
@@ -173,7 +173,7 @@ class Session:
             self.trouble = error.message
             return
         self.sent += 1
-        self._echo.append(Heard(self._source_us(), name, frame, sent=True))
+        self._echo.append(Record(self._source_us(), name, frame, sent=True))
 
     def _source_us(self) -> int:
         """Return the time at the source: that of this machine until a frame has told it."""

@@ -6,7 +6,7 @@ from dataclasses import fields
 from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
-from tickrig.host.monitor.frames.record import HeardLine
+from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.check import strip_check
@@ -27,11 +27,11 @@ class RrcLines:
         self._channel = channel
         self._splitters = {True: LineSplitter(), False: LineSplitter()}
 
-    def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[HeardLine]:
+    def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
         """Take bytes of one direction; return the lines that are whole now."""
         decode = decode_command if to_device else decode_reply
         return [
-            HeardLine(at_us, self._channel, to_device, line, decode(line))
+            LineRecord(at_us, self._channel, to_device, line, decode(line))
             for line in self._splitters[to_device].push(data)
         ]
 

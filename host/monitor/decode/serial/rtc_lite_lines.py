@@ -6,7 +6,7 @@ from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.object_text import write_bytes
-from tickrig.host.monitor.frames.record import HeardLine
+from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_lite.codes import Command, LinkFault, State, Status
 from tickrig.wire.rtc_lite.decoder import Decoder
@@ -40,7 +40,7 @@ class RtcLiteLine:
         self._decoders = {True: Decoder(REQUESTS, checksum), False: Decoder(REPLIES, checksum)}
         self._heard_us = {True: 0, False: 0}
 
-    def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[HeardLine]:
+    def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
         """Take bytes of one direction; return the frames that are whole now."""
         decoder, gap_us = self._decoders[to_device], at_us - self._heard_us[to_device]
         if gap_us >= (LOST_GAP_US if decoder.lost else FRAME_GAP_US):
@@ -48,12 +48,12 @@ class RtcLiteLine:
         self._heard_us[to_device] = at_us
         return [self._line(at_us, to_device, found) for found in decoder.push(data)]
 
-    def _line(self, at_us: int, to_device: bool, found: Frame | LinkFault) -> HeardLine:
+    def _line(self, at_us: int, to_device: bool, found: Frame | LinkFault) -> LineRecord:
         if isinstance(found, LinkFault):
             decoded = Decoded(KIND, None, f"no frame: {found.name.lower()}")
-            return HeardLine(at_us, self._channel, to_device, b"", decoded)
+            return LineRecord(at_us, self._channel, to_device, b"", decoded)
         decoded = decode_request(found) if to_device else decode_answer(found)
-        return HeardLine(at_us, self._channel, to_device, found.body, decoded)
+        return LineRecord(at_us, self._channel, to_device, found.body, decoded)
 
 
 def decode_request(frame: Frame) -> Decoded:

@@ -19,8 +19,8 @@ from typing import Any, BinaryIO, Final, TextIO
 import can
 from can.io.blf import BLFParseError
 
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.logs.can_record import to_heard
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.log_file import LogFormat
 from tickrig.host.monitor.logs.notation import UNNAMED
 from tickrig.host.monitor.logs.reading.blf_damage import BlfReader, missing_end
@@ -134,7 +134,7 @@ class CanLogReader:
         """Lines that are none of the log, so far."""
         return self.tally.bad_lines
 
-    def __iter__(self) -> Iterator[Heard]:
+    def __iter__(self) -> Iterator[Record]:
         """Read the file."""
         self.tally = Tally()
         names: dict[Any, str] = {}
@@ -143,9 +143,9 @@ class CanLogReader:
                 names[message.channel] = self._name(message.channel)
             if message.is_error_frame and self._kind is LogFormat.ASC:
                 message.arbitration_id = BUS_ERROR
-            heard = to_heard(message, names[message.channel], self.tally)
-            if heard is not None:
-                yield heard
+            record = to_record(message, names[message.channel], self.tally)
+            if record is not None:
+                yield record
 
     def _name(self, channel: object) -> str:
         """Return the name of a bus; of TRC alone python-can leaves the count from one."""

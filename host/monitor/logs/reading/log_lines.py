@@ -5,8 +5,8 @@ r"""Lines of a log as they come in, in pieces of any size.
 (b'one\n', b'', b'two\n', b'')
 
 >>> tally = Tally()
->>> heard = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
->>> heard.at_us, heard.channel, str(heard.frame), heard.sent
+>>> record = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
+>>> record.at_us, record.channel, str(record.frame), record.sent
 (10000, 'vcan0', '705#7F', True)
 >>> parse_log_line("(0000000000.020000) vcan0 123##1AABB", 2, tally), tally.passed_over
 (None, Counter({'CAN FD frames': 1}))
@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
 from tickrig.host.monitor.logs.reading.screen_line import ScreenClock, parse_screen_line
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
@@ -69,7 +69,7 @@ _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 
 def parse_log_line(
     line: str, number: int, tally: Tally, clock: ScreenClock | None = None
-) -> Heard | None:
+) -> Record | None:
     """Read a line; None if it holds no frame, and then the tally says why.
 
     Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault.
@@ -83,13 +83,13 @@ def parse_log_line(
     text = line.strip()
     if not text or text.startswith(COMMENTS):
         return None
-    heard = _parsed(line, text, tally, clock or ScreenClock())
-    if heard is None:
+    record = _parsed(line, text, tally, clock or ScreenClock())
+    if record is None:
         tally.bad_lines.add(number, line.rstrip("\r"))
-    return heard if isinstance(heard, Heard) else None
+    return record if isinstance(record, Record) else None
 
 
-def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Heard | str | None:
+def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted instead, or None for a bad line."""
     if text.startswith("{"):
         return parse_json_line(text, tally)
@@ -98,7 +98,7 @@ def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Heard | s
     return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally)
 
 
-def _logged(match: re.Match[str], tally: Tally) -> Heard | str | None:
+def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
     """Return what a line of `candump -L` says."""
     seconds, fraction, channel, notation, direction = match.groups()
     for kind, pattern in ((CAN_FD, _FD), (CAN_XL, _XL)):
@@ -107,7 +107,7 @@ def _logged(match: re.Match[str], tally: Tally) -> Heard | str | None:
             return kind
     at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
     try:
-        return Heard(at_us, channel, parse_frame(notation), direction == "T")
+        return Record(at_us, channel, parse_frame(notation), direction == "T")
     except WireError:
         return None
 
@@ -139,17 +139,17 @@ class LogLines:
         """Whether stamps count from frame to frame: only all of the log tells the time."""
         return self._clock is not None and self._clock.deltas
 
-    def push(self, data: bytes, /) -> list[Heard]:
+    def push(self, data: bytes, /) -> list[Record]:
         """Return the frames of the lines that end in these bytes."""
         lines = self._whole.push(data)
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
-    def finish(self) -> list[Heard]:
+    def finish(self) -> list[Record]:
         """Return the frame of a last line without LF."""
         rest = self._whole.finish()
         return self._frames(rest.decode("latin-1")) if rest else []
 
-    def _frames(self, text: str) -> list[Heard]:
+    def _frames(self, text: str) -> list[Record]:
         count, begin = text.count("\n") + 1, self._number
         self._number += count
         usual = _USUAL.findall(text)
@@ -158,13 +158,13 @@ class LogLines:
         clock = self._clock = self._clock or ScreenClock.of(text)
         lines = enumerate(text.split("\n"), begin + 1)
         frames = (parse_log_line(line, number, self.tally, clock) for number, line in lines)
-        return [heard for heard in frames if heard]
+        return [record for record in frames if record]
 
 
-def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Heard]:
+def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
     """Return the frames of what `_USUAL` found; made without the constructors, for speed."""
-    heard: list[Heard] = []
-    add, new, unhex = heard.append, tuple.__new__, bytes.fromhex
+    records: list[Record] = []
+    add, new, unhex = records.append, tuple.__new__, bytes.fromhex
     second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()
     for seconds, micros, channel, ident, data, direction in lines:
         if seconds != second:
@@ -173,5 +173,5 @@ def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Hear
             idents[ident] = int(ident, 16), len(ident) == 8
         can_id, extended = idents[ident]
         frame = new(CanFrame, (can_id, unhex(data), False, extended, 0))
-        add(new(Heard, (second_us + int(micros), channel, frame, direction == "T")))
-    return heard
+        add(new(Record, (second_us + int(micros), channel, frame, direction == "T")))
+    return records

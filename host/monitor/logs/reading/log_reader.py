@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol, cast
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, log_format
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 from tickrig.host.monitor.logs.tally import BadLines, Tally
@@ -38,7 +38,7 @@ class LogReader(Protocol):
         """Lines that are none of the log, so far."""
         ...
 
-    def __iter__(self) -> Iterator[Heard]: ...
+    def __iter__(self) -> Iterator[Record]: ...
 
 
 def read_log(path: Path) -> LogReader:
@@ -75,7 +75,7 @@ class TextLogReader:
         """Lines that are none of the log, so far."""
         return self.tally.bad_lines
 
-    def __iter__(self) -> Iterator[Heard]:
+    def __iter__(self) -> Iterator[Record]:
         """Read the file."""
         lines = LogLines()
         self.tally = lines.tally

@@ -2,8 +2,8 @@
 
 >>> tally, clock = Tally(), ScreenClock()
 >>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
->>> heard = parse_screen_line(shown, tally, clock)
->>> heard.at_us, heard.channel, str(heard.frame), heard.sent
+>>> record = parse_screen_line(shown, tally, clock)
+>>> record.at_us, record.channel, str(record.frame), record.sent
 (250, 'can0', '705#7F', True)
 """
 
@@ -13,7 +13,7 @@ import re
 from itertools import pairwise
 from typing import Final
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import parse_frame
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, SERIAL_LINES, Tally
 from tickrig.wire.errors import WireError
@@ -80,7 +80,7 @@ class ScreenClock:
         return self._now_us
 
 
-def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Heard | str | None:
+def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted or is no fault instead, or None for a bad line."""
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
@@ -97,7 +97,7 @@ def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Heard | st
     except (WireError, ValueError, OverflowError, OSError):
         return None
     tally.untimed += fraction is None
-    return Heard(at_us, channel, frame, direction == "T")
+    return Record(at_us, channel, frame, direction == "T")
 
 
 def _beside(line: str, text: str, tally: Tally) -> str | None:

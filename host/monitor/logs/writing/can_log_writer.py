@@ -12,7 +12,7 @@ from typing import Any, Final, TextIO
 
 import can
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
 from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat
 from tickrig.host.monitor.logs.reading.log_reader import LogError
@@ -150,13 +150,13 @@ class CanLogWriter:
             path.unlink()
             raise LogError(f"{path}: {' '.join(str(error).split())}") from error
 
-    def write(self, heard: Heard, /) -> None:
+    def write(self, record: Record, /) -> None:
         """Add a frame."""
-        if what := _not_held(heard, self._kind):
+        if what := _not_held(record, self._kind):
             self._passed_over[what] += 1
-            if self._kind is LogFormat.TRC or heard.at_us >= END_US:
+            if self._kind is LogFormat.TRC or record.at_us >= END_US:
                 return
-        self._writer.on_message_received(to_can(heard, self._number(heard.channel)))
+        self._writer.on_message_received(to_can(record, self._number(record.channel)))
 
     def flush(self) -> None:
         """Give what was added to the operating system; the end of some formats is still missing."""
@@ -204,12 +204,12 @@ class _Text(io.TextIOWrapper):
         return self._name
 
 
-def _not_held(heard: Heard, kind: LogFormat) -> str:
+def _not_held(record: Record, kind: LogFormat) -> str:
     """Return what a format cannot hold; empty if it can."""
-    if heard.at_us >= END_US:
+    if record.at_us >= END_US:
         return "frames of the year 2500 and later"
-    if isinstance(heard.frame, ErrorFrame):
+    if isinstance(record.frame, ErrorFrame):
         return {LogFormat.TRC: "error frames", LogFormat.ASC: "classes of error frames"}.get(
             kind, ""
         )
-    return "remote frames" if kind is LogFormat.TRC and heard.frame.remote else ""
+    return "remote frames" if kind is LogFormat.TRC and record.frame.remote else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO, Final, Protocol, cast
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, LogFormat, log_format
 from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
 from tickrig.wire.candump import LogLine
@@ -16,7 +16,7 @@ BLOCK_LINES: Final = 256
 class LogWriter(Protocol):
     """A log file that is written."""
 
-    def write(self, heard: Heard, /) -> None:
+    def write(self, record: Record, /) -> None:
         """Add a frame."""
         ...
 
@@ -60,10 +60,10 @@ def create(path: Path) -> BinaryIO:
     return cast("BinaryIO", gzip.open(path, "wb"))  # it is written like one
 
 
-def log_line(heard: Heard) -> str:
+def log_line(record: Record) -> str:
     """Write a frame as `candump -L` does; what we sent ends in T, as `candump -L -x` has it."""
-    line = str(LogLine(heard.at_us, heard.channel, heard.frame))
-    return f"{line} T" if heard.sent else line
+    line = str(LogLine(record.at_us, record.channel, record.frame))
+    return f"{line} T" if record.sent else line
 
 
 _LINES: Final = {
@@ -80,9 +80,9 @@ class TextLogWriter:
         self._file, self._lines = file, list[str]()
         self._text = _LINES[kind]
 
-    def write(self, heard: Heard, /) -> None:
+    def write(self, record: Record, /) -> None:
         """Add a line."""
-        self._lines.append(self._text(heard))
+        self._lines.append(self._text(record))
         if len(self._lines) >= BLOCK_LINES:
             self._give()
 
@@ -114,10 +114,10 @@ class CsvLogWriter(TextLogWriter):
         self._name, self._channels = path.name, dict[str, None]()
         self._lines.append(LOG_HEADER)
 
-    def write(self, heard: Heard, /) -> None:
+    def write(self, record: Record, /) -> None:
         """Add a row."""
-        self._channels[heard.channel] = None
-        super().write(heard)
+        self._channels[record.channel] = None
+        super().write(record)
 
     def words(self) -> list[str]:
         """Say which buses became one."""

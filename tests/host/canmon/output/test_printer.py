@@ -5,11 +5,11 @@ import pytest
 from tickrig.host.canmon.output.printer import Output, printer_of
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.frames.record import HeardLine
+from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 
 
-def line(data: bytes) -> HeardLine:
+def line(data: bytes) -> LineRecord:
     (found,) = RrcLines("tty").take(1_500_000, data, to_device=True)
     return found
 

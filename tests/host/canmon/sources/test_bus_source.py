@@ -15,12 +15,12 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.source import Source, open_source
-from tickrig.host.canmon.sources.source_word import BusWord
+from tickrig.host.canmon.sources.source_spec import BusSpec
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -33,10 +33,10 @@ class Fed:
 
     name, lost, stepped = "fed", 0, False
 
-    def __init__(self, *batches: list[Heard]) -> None:
+    def __init__(self, *batches: list[Record]) -> None:
         self.tally, self._batches, self.closed = Tally(), iter(batches), False
 
-    def read(self, timeout_us: int, /) -> list[Heard]:
+    def read(self, timeout_us: int, /) -> list[Record]:
         for batch in self._batches:
             return batch
         raise LinkClosed("fed: Network is down")
@@ -51,17 +51,17 @@ def bench() -> Iterator[can.BusABC]:
         yield bus
 
 
-def wait(source: Source, done: Callable[[list[Heard]], bool]) -> list[Heard]:
-    heard: list[Heard] = []
+def wait(source: Source, done: Callable[[list[Record]], bool]) -> list[Record]:
+    records: list[Record] = []
     deadline = time.monotonic() + PATIENCE_US / 1e6
-    while not done(heard):
+    while not done(records):
         assert time.monotonic() < deadline
-        heard += source.poll(100_000)
-    return heard
+        records += source.poll(100_000)
+    return records
 
 
-def heard(count: int) -> list[Heard]:
-    return [Heard(number, "fed", CanFrame(number)) for number in range(count)]
+def record(count: int) -> list[Record]:
+    return [Record(number, "fed", CanFrame(number)) for number in range(count)]
 
 
 @pytest.mark.realtime
@@ -86,7 +86,7 @@ def test_options_name_a_bus_as_well_and_can_fd_is_counted(bench: can.BusABC) -> 
 
 @pytest.mark.realtime
 def test_frames_that_nobody_fetches_are_lost_and_counted() -> None:
-    reader = Fed(heard(4), heard(4))
+    reader = Fed(record(4), record(4))
     source = BusSource([reader], [None], queue_frames=5)
     wait(source, lambda _: source.lost == 3)
     source.close()
@@ -95,7 +95,7 @@ def test_frames_that_nobody_fetches_are_lost_and_counted() -> None:
 
 @pytest.mark.realtime
 def test_what_came_before_the_bus_was_unplugged_is_still_returned() -> None:
-    source = BusSource([Fed(heard(2))], [None])
+    source = BusSource([Fed(record(2))], [None])
     assert len(wait(source, lambda _: source.ended)) == 2
     assert source.failed == "fed: Network is down"
     source.close()
@@ -139,7 +139,7 @@ def test_a_bus_over_udp_stays_on_this_machine() -> None:
         bus.send(can.Message(arbitration_id=5, is_extended_id=False))
         (one,) = wait(source, bool)
     assert (one.channel, one.frame) == (group, CanFrame(5))
-    assert merged(BusWord("udp_multicast", group), BusOptions()).bus_kwargs == ("hop_limit=0",)
+    assert merged(BusSpec("udp_multicast", group), BusOptions()).bus_kwargs == ("hop_limit=0",)
     source.close()
 
 
@@ -156,13 +156,13 @@ def test_groups_on_one_port_do_not_hear_each_other(groups: tuple[str, str]) -> N
     for group, frame in sent:
         with can.Bus(interface="udp_multicast", channel=group, port=PORT, hop_limit=0) as bus:
             bus.send(to_message(frame))
-    heard = wait(source, lambda came: all(one in named(came) for one in sent[2:]))
-    assert sorted(named(heard), key=str) == sorted(sent, key=str)
+    record = wait(source, lambda came: all(one in named(came) for one in sent[2:]))
+    assert sorted(named(record), key=str) == sorted(sent, key=str)
     source.close()
 
 
-def named(heard: Sequence[Heard]) -> list[tuple[str, CanFrame | ErrorFrame]]:
-    return [(one.channel, one.frame) for one in heard]
+def named(records: Sequence[Record]) -> list[tuple[str, CanFrame | ErrorFrame]]:
+    return [(one.channel, one.frame) for one in records]
 
 
 def test_a_rig_in_virtual_time_is_a_bus_whose_time_passes_while_it_is_polled() -> None:

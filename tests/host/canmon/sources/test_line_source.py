@@ -15,9 +15,9 @@ from click.testing import CliRunner, Result
 from tests.emulators.serial.test_realtime import Child
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources.source import AnySource, open_any
-from tickrig.host.canmon.sources.source_word import LineWord, parse_source
+from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.frames.record import HeardLine, Listened
+from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
 from tickrig.wire.rtc_lite.codes import Command
 from tickrig.wire.rtc_lite.frame import Checksum, Frame
 
@@ -52,16 +52,16 @@ def ports() -> Iterator[tuple[Port, Port]]:
 
 
 def wait(
-    source: AnySource[Listened], done: Callable[[list[Listened]], bool], again: Callable[[], None]
-) -> list[Listened]:
+    source: AnySource[AnyRecord], done: Callable[[list[AnyRecord]], bool], again: Callable[[], None]
+) -> list[AnyRecord]:
     """Poll until it is done; opening a port drops what had come before, so feed it again."""
-    heard: list[Listened] = []
+    records: list[AnyRecord] = []
     deadline = time.monotonic() + PATIENCE_S
-    while not done(heard):
+    while not done(records):
         assert time.monotonic() < deadline
         again()
-        heard += source.poll(10_000)
-    return heard
+        records += source.poll(10_000)
+    return records
 
 
 @contextmanager
@@ -89,16 +89,16 @@ def canmon(*words: str) -> Result:
 @pytest.mark.parametrize(
     ("word", "parsed"),
     [
-        ("serial:/dev/ttyUSB0,rrc", LineWord("/dev/ttyUSB0", None, "rrc")),
-        ("serial:COM3@9600,rtc-lite,host", LineWord("COM3", 9_600, "rtc-lite", from_host=True)),
+        ("serial:/dev/ttyUSB0,rrc", LineSpec("/dev/ttyUSB0", None, "rrc")),
+        ("serial:COM3@9600,rtc-lite,host", LineSpec("COM3", 9_600, "rtc-lite", from_host=True)),
         (
             "serial:socket://127.0.0.1:7@1M,rtc-lite-xor8",
-            LineWord("socket://127.0.0.1:7", 1_000_000, "rtc-lite-xor8"),
+            LineSpec("socket://127.0.0.1:7", 1_000_000, "rtc-lite-xor8"),
         ),
     ],
 )
 def test_a_word_names_a_port_its_rate_its_protocol_and_its_direction(
-    word: str, parsed: LineWord
+    word: str, parsed: LineSpec
 ) -> None:
     assert parse_source(word) == parsed
 
@@ -113,9 +113,9 @@ def test_both_directions_of_a_line_and_a_bus_are_one_trace(ports: tuple[Port, Po
         device.write(b"EV:PowerOn\n")
         host.write(b"output1eff\n")
 
-    heard = wait(source, lambda heard: len({one.channel for one in heard}) > 1, feed)
+    record = wait(source, lambda record: len({one.channel for one in record}) > 1, feed)
     source.close()
-    lines = [one for one in heard if isinstance(one, HeardLine)]
+    lines = [one for one in record if isinstance(one, LineRecord)]
     assert {(one.channel, one.sent, one.decoded.text) for one in lines} == {
         (device.name, False, "event PowerOn"),
         (host.name, True, "output v_pct=30 w_pct=-1"),
@@ -129,7 +129,7 @@ def test_frames_of_rtc_lite_are_told_with_their_checksum(ports: tuple[Port, Port
     frame = Frame(Command.ACTIVATE).encode(Checksum.XOR8)
     first = wait(source, bool, lambda: port.write(frame))[0]
     source.close()
-    assert isinstance(first, HeardLine)
+    assert isinstance(first, LineRecord)
     assert first.decoded.text == "activate"
 
 
@@ -171,15 +171,15 @@ def test_what_rrc_emu_says_is_shown_and_counted(tmp_path: Path) -> None:
         child.wait_until_up()
         source = open_any([f"serial:{child.link},rrc"], BusOptions())
         child.ctl("press", "power_button")
-        heard = wait(source, lambda heard: "event PowerOnSuccess" in texts(heard), lambda: None)
+        record = wait(source, lambda record: "event PowerOnSuccess" in texts(record), lambda: None)
         source.close()
     finally:
         child.end()
-    assert texts(heard)[-2:] == ["event PowerOnTrigger", "event PowerOnSuccess"]
+    assert texts(record)[-2:] == ["event PowerOnTrigger", "event PowerOnSuccess"]
 
 
-def texts(heard: list[Listened]) -> list[str]:
-    return [one.decoded.text for one in heard if isinstance(one, HeardLine)]
+def texts(records: list[AnyRecord]) -> list[str]:
+    return [one.decoded.text for one in records if isinstance(one, LineRecord)]
 
 
 @pytest.mark.realtime

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketReader
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -54,13 +54,13 @@ def sender(bus: Bus) -> Iterator[Sender]:
     sender.socket.close()
 
 
-def read(reader: SocketReader, count: int) -> list[Heard]:
-    heard: list[Heard] = []
-    while len(heard) < count:
+def read(reader: SocketReader, count: int) -> list[Record]:
+    records: list[Record] = []
+    while len(records) < count:
         batch = reader.read(PATIENCE_US)
         assert batch
-        heard += batch
-    return heard
+        records += batch
+    return records
 
 
 @pytest.mark.realtime
@@ -72,15 +72,15 @@ def test_frames_of_every_kind_are_read_with_the_time_of_the_kernel(
     sender.frame(0x8000_0605, 2, b"\x01\x02")
     sender.frame(0x4000_0123, 5)
     sender.frame(0x2000_0088, 8, b"\0\0\1")
-    heard = read(reader, 4)
-    assert [one.frame for one in heard] == [
+    record = read(reader, 4)
+    assert [one.frame for one in record] == [
         CanFrame(0x705, b"\x7f"),
         CanFrame(0x605, b"\x01\x02", extended=True),
         CanFrame(0x123, remote=True, remote_length=5),
         ErrorFrame(0x88, b"\0\0\1\0\0\0\0\0"),
     ]
-    assert all(0 <= one.at_us - before_us < PATIENCE_US for one in heard)
-    assert {one.channel for one in heard} == {"can0"}
+    assert all(0 <= one.at_us - before_us < PATIENCE_US for one in record)
+    assert {one.channel for one in record} == {"can0"}
 
 
 @pytest.mark.realtime

@@ -10,7 +10,7 @@ from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import StdinSource
 from tickrig.host.canmon.sources.source import Source, open_source
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import parse_log
 
@@ -21,11 +21,11 @@ LOG = """\
 """
 
 
-def drained(source: Source) -> list[Heard]:
-    heard = []
+def drained(source: Source) -> list[Record]:
+    record = []
     while not source.ended:
-        heard += source.poll(0)
-    return heard
+        record += source.poll(0)
+    return record
 
 
 def log(folder: Path, text: str, name: str = "run.log") -> str:
@@ -36,7 +36,7 @@ def log(folder: Path, text: str, name: str = "run.log") -> str:
 
 def test_a_file_gives_its_frames_and_says_which_lines_are_none(tmp_path: Path) -> None:
     source = open_source([log(tmp_path, LOG)])
-    assert [str(heard.frame) for heard in drained(source)] == ["705#7F", "080#"]
+    assert [str(record.frame) for record in drained(source)] == ["705#7F", "080#"]
     assert source.words() == [
         f"{tmp_path}/run.log: line 2 is no frame: '(0000000000.020000) can0 185#3702R'"
     ]
@@ -60,12 +60,12 @@ def test_a_compressed_file_that_was_cut_fails_with_what_it_held(tmp_path: Path) 
 def test_files_are_merged_by_time(tmp_path: Path) -> None:
     one = log(tmp_path, "(0000000001.000000) a 001#\n(0000000003.000000) a 003#\n", "one.log")
     two = log(tmp_path, "(0000000002.000000) b 002#\n", "two.log")
-    assert [heard.channel for heard in drained(open_source([one, two]))] == ["a", "b", "a"]
+    assert [record.channel for record in drained(open_source([one, two]))] == ["a", "b", "a"]
 
 
 def test_filters_of_candump_hold_for_files(tmp_path: Path) -> None:
     source = open_source([log(tmp_path, LOG) + ",080:7FF"])
-    assert [str(heard.frame) for heard in drained(source)] == ["080#"]
+    assert [str(record.frame) for record in drained(source)] == ["080#"]
 
 
 def test_a_line_that_comes_in_pieces_is_one_line() -> None:
@@ -74,9 +74,9 @@ def test_a_line_that_comes_in_pieces_is_one_line() -> None:
     assert source.poll(0) == []
     for piece in (LOG[:20], LOG[20:40]):
         os.write(write, piece.encode())
-        heard = source.poll(0)
+        records = source.poll(0)
     (line,) = parse_log(LOG[:32])
-    assert heard == [Heard(line.at_us, line.channel, CanFrame(0x705, b"\x7f"))]
+    assert records == [Record(line.at_us, line.channel, CanFrame(0x705, b"\x7f"))]
     os.close(write)
     assert source.poll(0) == []
     assert source.ended
@@ -138,4 +138,4 @@ def test_joined_filters_must_all_hold(tmp_path: Path) -> None:
 def test_error_frames_pass_by_their_mask_alone(tmp_path: Path) -> None:
     text = "(0.1) can0 20000088#\n(0.2) can0 20000004#\n(0.3) can0 123#\n"
     source = open_source([log(tmp_path, text) + ",7FF:7FF,#80"])
-    assert [str(heard.frame) for heard in drained(source)] == ["20000088#0000000000000000"]
+    assert [str(record.frame) for record in drained(source)] == ["20000088#0000000000000000"]

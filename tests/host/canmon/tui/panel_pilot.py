@@ -61,7 +61,7 @@ class Desk(Generic[P]):
 
     @property
     def asked(self) -> bool:
-        return bool(self.panel.query_one("AskLine").display)
+        return bool(self.panel.query_one("PromptLine").display)
 
 
 Act = Callable[[Desk[P]], Awaitable[None]]

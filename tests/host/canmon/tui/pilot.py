@@ -10,9 +10,9 @@ from typing import Any
 from textual.app import App
 
 from tests.host.canmon.wire import Wire
-from tickrig.host.canmon.monitor_setup import Bench
+from tickrig.host.canmon.monitor_setup import PanelSettings
 from tickrig.host.canmon.sources.file_source import FileSource
-from tickrig.host.canmon.sources.source_word import FileWord
+from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.panel import Panel
@@ -35,7 +35,7 @@ Act = Callable[[Monitor, Any], Awaitable[None]]
 
 def drive_session() -> Session:
     """A session on the recorded drive, all of it taken."""
-    session = Session(FileSource([FileWord(DRIVE)]), Model())
+    session = Session(FileSource([FileSpec(DRIVE)]), Model())
     while not session.model.ended:
         session.step()
     return session
@@ -63,7 +63,7 @@ def on_monitor(
     *,
     panels: Iterable[type[Panel]] = OURS,
     size: tuple[int, int] = SIZE,
-    bench: Callable[[list[Panel]], Bench] | None = None,
+    bench: Callable[[list[Panel]], PanelSettings] | None = None,
 ) -> Monitor:
     """Run a monitor while something is done with it."""
 

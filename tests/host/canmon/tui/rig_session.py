@@ -13,7 +13,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.decode.node_memory import read_eds
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
@@ -29,9 +29,9 @@ class RigSource:
     def __init__(self, host: CanHost) -> None:
         self._host = host
 
-    def poll(self, timeout_us: int, /) -> list[Heard]:
+    def poll(self, timeout_us: int, /) -> list[Record]:
         frames: Sequence[CanFrame] = self._host.receive(max(1, timeout_us))
-        return [Heard(self._host.now_us, BUS, frame) for frame in frames]
+        return [Record(self._host.now_us, BUS, frame) for frame in frames]
 
     def words(self) -> list[str]:
         return []

@@ -20,7 +20,7 @@ from tests.host.canmon.tui.pilot import (
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.monitor_setup import Bench, BenchSetup
+from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.panels import PANELS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
@@ -138,7 +138,7 @@ class Beacon:
     def __init__(self) -> None:
         self.stops = 0
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         return (CanFrame.parse("000#0105"),)
 
     def stop(self) -> None:
@@ -283,7 +283,7 @@ def test_what_a_workspace_has_beside_is_told_and_a_foreign_change_too(tmp_path: 
     on_monitor(
         drive_session(),
         act,
-        bench=lambda panels: Bench(Workspace.read(path), BenchSetup(), panels),
+        bench=lambda panels: PanelSettings(Workspace.read(path), MonitorSetup(), panels),
     )
 
 
@@ -293,7 +293,7 @@ def test_what_ends_the_session_ends_the_monitor() -> None:
     class Broken(Beacon):
         due_us = 0
 
-        def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
             raise ZeroDivisionError
 
     session.tasks.append(Broken())

@@ -15,9 +15,9 @@ from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
 from tickrig.host.monitor.check.alarms import render_alarms
 from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.dictionary.node_dictionary import render_dictionary
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
-from tickrig.host.monitor.graph.signal_word import parse_signal
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
+from tickrig.host.monitor.graph.signal_spec import parse_signal
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -34,7 +34,7 @@ def test_whatever_is_heard_can_be_shown(
 ) -> None:
     model = Model()
     objects, alarms, sequence = DictionaryTask(model.decoder), AlarmTask(model), SequenceTask({})
-    graph = LiveGraph(Sight.ALL)
+    graph = LiveGraph(ViewMode.ALL)
     graph.add(parse_signal("185[0:2]s"))
     graph.add(parse_signal("5.statusword@2"))
     alarms.hold(parse_rules(RULES))
@@ -45,7 +45,7 @@ def test_whatever_is_heard_can_be_shown(
     else:
         objects.read(0, (0x1008, 0))
     for number, frame in enumerate(frames, 1):
-        meant = model.take([Heard(number * 100_000, BUS, frame)])
+        meant = model.take([Record(number * 100_000, BUS, frame)])
         for task in (objects, alarms, sequence, GraphTask(graph)):
             task.tick(number * 100_000, meant)
     assert render_dictionary(objects.objects((BUS, NODE)).rows(), model.now_us)

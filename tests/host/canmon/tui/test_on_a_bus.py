@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.node_memory import read_eds
-from tickrig.host.monitor.transmit.row_text import parse_words
+from tickrig.host.monitor.transmit.row_text import parse_row_text
 
 STEPS = 1_000
 
@@ -42,7 +42,7 @@ def test_tasks_reach_our_drive_over_an_interface_of_python_can() -> None:
         (bus,) = session.buses
         client.choose((bus, NODE))
         client.read(session.now_us, (0x1008, 0))
-        sender.add(parse_words("000#0105"))
+        sender.add(parse_row_text("000#0105"))
         sender.once(0, armed=session.armed)
         until(session, lambda: client.said == "read 1008h:00: done" and session.sent == 2)
         (row,) = client.objects((bus, NODE)).rows("1008")

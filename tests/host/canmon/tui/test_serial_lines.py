@@ -16,8 +16,8 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
-from tickrig.host.monitor.frames.record import Heard, HeardLine
-from tickrig.host.monitor.views.trace import Sieve
+from tickrig.host.monitor.frames.record import LineRecord, Record
+from tickrig.host.monitor.views.trace import DisplayFilter
 from tickrig.host.tui.line_view import line_text
 from tickrig.wire.can import CanFrame
 
@@ -30,7 +30,7 @@ def taken() -> Model:
     model, rrc = Model(), RrcLines("ttyS0")
     (event,) = rrc.take(1_100_000, b"EV:PowerOn\r\n", to_device=False)
     (command,) = rrc.take(1_200_000, b"output0000\n", to_device=True)
-    assert model.take([Heard(1_000_000, "can0", CanFrame.parse("705#05")), event, command])
+    assert model.take([Record(1_000_000, "can0", CanFrame.parse("705#05")), event, command])
     return model
 
 
@@ -46,8 +46,8 @@ def test_lines_stand_in_the_trace_of_the_frames() -> None:
 
 
 def test_a_filter_passes_lines_and_each_direction_is_a_row_of_its_own() -> None:
-    sieve = Sieve(taken().trace, parse_filter("kind=rrc"))
-    assert [(one.row.heard.sent, one.frames) for one in sieve.latest()] == [(False, 1), (True, 1)]
+    sieve = DisplayFilter(taken().trace, parse_filter("kind=rrc"))
+    assert [(one.row.record.sent, one.frames) for one in sieve.latest()] == [(False, 1), (True, 1)]
 
 
 def test_a_long_line_moves_what_it_means() -> None:
@@ -55,7 +55,7 @@ def test_a_long_line_moves_what_it_means() -> None:
     assert line_text(TraceLines().line(row)).endswith("x" * 40)
 
 
-def _line(data: bytes) -> HeardLine:
+def _line(data: bytes) -> LineRecord:
     (line,) = RrcLines("ttyS0").take(0, data + b"\r\n", to_device=False)
     return line
 
@@ -73,7 +73,7 @@ def test_a_port_and_a_bus_are_heard_together_and_the_bus_sends() -> None:
             wire.send("705#05")
             session.step(POLL_US)
             rows = session.model.trace.rows(0, session.model.trace.count)
-            if {row.heard.channel for row in rows} == {wire.name, Path(os.ttyname(near)).name}:
+            if {row.record.channel for row in rows} == {wire.name, Path(os.ttyname(near)).name}:
                 break
         else:
             raise AssertionError(rows)

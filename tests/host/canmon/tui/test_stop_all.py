@@ -3,7 +3,7 @@ from __future__ import annotations
 from tests.host.canmon.tui.rig_session import BUS, RigSession
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.monitor.transmit.row_text import parse_words
+from tickrig.host.monitor.transmit.row_text import parse_row_text
 from tickrig.wire.can import CanFrame
 
 
@@ -13,7 +13,7 @@ def sending(frames: int) -> RigSession:
     task = TransmitTask({})
     session.tasks.append(task)
     session.arm()
-    task.add(parse_words("080#"))
+    task.add(parse_row_text("080#"))
     for _ in range(frames):
         task.once(0, armed=True)
     return session

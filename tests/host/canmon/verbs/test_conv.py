@@ -47,7 +47,7 @@ def test_logs_are_merged_and_filtered(tmp_path: Path) -> None:
     two = log(tmp_path, "(0000000002.000000) b 002#\n", "two.log")
     out = tmp_path / "both.jsonl.gz"
     assert canmon("conv", one, two, out, "-F", "001-002").exit_code == 0
-    assert [str(heard.frame) for heard in read_log(out)] == ["001#", "002#"]
+    assert [str(record.frame) for record in read_log(out)] == ["001#", "002#"]
 
 
 def test_info_tells_what_a_log_is_from_its_ends(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.check.alarms import (
     GRACE_US,
     KEPT,
@@ -23,9 +23,9 @@ def alarms(**words: object) -> Alarms:
 
 
 def taken(made: Alarms, text: str) -> Alarms:
-    for heard in hear(text):
-        made.take(heard)
-        made.look(heard.at_us)
+    for record in hear(text):
+        made.take(record)
+        made.look(record.at_us)
     return made
 
 

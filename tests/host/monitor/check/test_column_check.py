@@ -10,7 +10,7 @@ from tickrig.host.monitor.check.column_check import check_columns
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 BIT_RATE = 1_000
@@ -28,16 +28,16 @@ ALL = Rules(
 )
 
 
-def one_by_one(heards: list[Heard], rules: Rules) -> list[Finding]:
+def one_by_one(records: list[Record], rules: Rules) -> list[Finding]:
     checker = Checker(rules, BIT_RATE)
-    found = [finding for heard in heards for finding in checker.take(heard)]
-    return found + checker.end(heards[-1].at_us if heards else 0, ["a line is none"])
+    found = [finding for record in records for finding in checker.take(record)]
+    return found + checker.end(records[-1].at_us if records else 0, ["a line is none"])
 
 
 @given(traffic())
-def test_a_log_at_once_has_the_same_findings_as_frame_by_frame(heards: list[Heard]) -> None:
-    found = check_columns(columns(heards), ALL, BIT_RATE, ["a line is none"])
-    assert found == one_by_one(heards, ALL)
+def test_a_log_at_once_has_the_same_findings_as_frame_by_frame(records: list[Record]) -> None:
+    found = check_columns(columns(records), ALL, BIT_RATE, ["a line is none"])
+    assert found == one_by_one(records, ALL)
 
 
 @given(
@@ -50,9 +50,9 @@ def test_a_log_at_once_has_the_same_findings_as_frame_by_frame(heards: list[Hear
     )
 )
 def test_boots_and_heartbeats_are_judged_the_same(steps: list[tuple[int, str]]) -> None:
-    at_us, heards = 0, []
+    at_us, records = 0, []
     for step_us, text in steps:
         at_us += step_us
-        heards.append(Heard(at_us, "can0", CanFrame.parse(text)))
-    found = check_columns(columns(heards), ALL, BIT_RATE, ["a line is none"])
-    assert found == one_by_one(heards, ALL)
+        records.append(Record(at_us, "can0", CanFrame.parse(text)))
+    found = check_columns(columns(records), ALL, BIT_RATE, ["a line is none"])
+    assert found == one_by_one(records, ALL)

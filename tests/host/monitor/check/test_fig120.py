@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from tests.host.monitor.column_log import columns
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.emulators.fig120.demo import run_demo
 from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
 from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
@@ -15,7 +15,7 @@ from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
 from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 RULES = parse_rules(
@@ -37,23 +37,23 @@ S = 1_000_000
 
 
 @pytest.fixture(scope="module")
-def trace() -> list[Heard]:
-    stage, heard = VirtualStage(), list[Heard]()
-    stage.wire.observers.append(lambda at_us, frame: heard.append(Heard(at_us, "can0", frame)))
+def trace() -> list[Record]:
+    stage, record = VirtualStage(), list[Record]()
+    stage.wire.observers.append(lambda at_us, frame: record.append(Record(at_us, "can0", frame)))
     run_demo(stage, lambda text: None)
-    return heard
+    return record
 
 
-def findings(heards: list[Heard], lost: tuple[str, ...] = ()) -> list[Finding]:
+def findings(records: list[Record], lost: tuple[str, ...] = ()) -> list[Finding]:
     checker = Checker(RULES, BIT_RATE)
-    found = [finding for heard in heards for finding in checker.take(heard)]
-    found += checker.end(heards[-1].at_us, lost)
-    assert check_columns(columns(heards), RULES, BIT_RATE, lost) == found
+    found = [finding for record in records for finding in checker.take(record)]
+    found += checker.end(records[-1].at_us, lost)
+    assert check_columns(columns(records), RULES, BIT_RATE, lost) == found
     return found
 
 
-def with_frames(trace: list[Heard], text: str) -> list[Heard]:
-    return sorted([*trace, *hear(text)], key=lambda heard: heard.at_us)
+def with_frames(trace: list[Record], text: str) -> list[Record]:
+    return sorted([*trace, *hear(text)], key=lambda record: record.at_us)
 
 
 def test_all_rules_are_held_against_it() -> None:
@@ -62,7 +62,7 @@ def test_all_rules_are_held_against_it() -> None:
         assert getattr(RULES, field.name) != getattr(default, field.name)
 
 
-def test_nothing_is_found(trace: list[Heard]) -> None:
+def test_nothing_is_found(trace: list[Record]) -> None:
     assert findings(trace) == []
 
 
@@ -75,69 +75,69 @@ def test_nothing_is_found(trace: list[Heard]) -> None:
     ],
 )
 def test_a_frame_that_is_put_in_is_found(
-    trace: list[Heard], frame: str, rule: str, text: str
+    trace: list[Record], frame: str, rule: str, text: str
 ) -> None:
     found = [one for one in findings(with_frames(trace, f"2 {frame}")) if one.rule != "known"]
     assert [one.rule for one in found] == [rule]
     assert all(one.text.startswith(text) for one in found)
 
 
-def test_an_unknown_identifier_is_found(trace: list[Heard]) -> None:
+def test_an_unknown_identifier_is_found(trace: list[Record]) -> None:
     (found,) = findings(with_frames(trace, "2 123#00"))
     assert (found.rule, found.text, found.at_us) == ("known", "123 is not expected", 2 * S)
 
 
-def without(trace: list[Heard], can_id: int, begin_us: int, end_us: int) -> list[Heard]:
+def without(trace: list[Record], can_id: int, begin_us: int, end_us: int) -> list[Record]:
     return [
-        heard
-        for heard in trace
+        record
+        for record in trace
         if not (
-            isinstance(heard.frame, CanFrame)
-            and heard.frame.can_id == can_id
-            and begin_us <= heard.at_us < end_us
+            isinstance(record.frame, CanFrame)
+            and record.frame.can_id == can_id
+            and begin_us <= record.at_us < end_us
         )
     ]
 
 
-def without_node(trace: list[Heard], node: int) -> list[Heard]:
+def without_node(trace: list[Record], node: int) -> list[Record]:
     for function in (0x080, 0x180, 0x280, 0x580, 0x700):
         trace = without(trace, function + node, 0, 99 * S)
     return trace
 
 
-def test_a_heartbeat_that_is_missing_is_found(trace: list[Heard]) -> None:
+def test_a_heartbeat_that_is_missing_is_found(trace: list[Record]) -> None:
     (found,) = findings(without(trace, 0x700 + MOTOR, 2 * S, 2 * S + 100_000))
     assert found.rule == "heartbeat 32"
     assert "200.0" in found.text
 
 
-def test_a_node_that_dies_is_found(trace: list[Heard]) -> None:
+def test_a_node_that_dies_is_found(trace: list[Record]) -> None:
     (found,) = findings(without(trace, 0x700 + PALETTE, 3 * S, 99 * S))
     assert (found.rule, found.at_us) == ("heartbeat 16", trace[-1].at_us)
 
 
-def test_a_node_that_is_not_there_is_found(trace: list[Heard]) -> None:
+def test_a_node_that_is_not_there_is_found(trace: list[Record]) -> None:
     found = findings(without_node(trace, MOTOR))
     assert [one.rule for one in found] == ["heartbeat 32", "nodes"]
 
 
-def test_a_pdo_that_is_missing_is_found(trace: list[Heard]) -> None:
+def test_a_pdo_that_is_missing_is_found(trace: list[Record]) -> None:
     (found,) = findings(without(trace, LINK, 4 * S, 4 * S + 60_000))
     assert found.rule == "max-gap 290"
 
 
-def test_a_boot_in_between_is_found(trace: list[Heard]) -> None:
-    beat = next(h for h in trace if h.at_us > 3 * S and str(h.frame) == "710#05")
-    found = findings(with_frames(trace, f"{beat.at_us / 1e6 + 0.01:.6f} 710#00"))
+def test_a_boot_in_between_is_found(trace: list[Record]) -> None:
+    heartbeat = next(h for h in trace if h.at_us > 3 * S and str(h.frame) == "710#05")
+    found = findings(with_frames(trace, f"{heartbeat.at_us / 1e6 + 0.01:.6f} 710#00"))
     assert [one.rule for one in found] == ["no-reboot"]
 
 
-def test_a_bus_that_is_too_busy_is_found(trace: list[Heard]) -> None:
+def test_a_bus_that_is_too_busy_is_found(trace: list[Record]) -> None:
     burst = "\n".join(f"{2.5 + n * 1e-4:.6f} 290#0040" for n in range(2_000))
     (found,) = findings(with_frames(trace, burst))
     assert found.rule == "max-load"
 
 
-def test_a_line_that_is_lost_is_found(trace: list[Heard]) -> None:
+def test_a_line_that_is_lost_is_found(trace: list[Record]) -> None:
     (found,) = findings(trace, ("line 7 is no frame",))
     assert (found.rule, found.text) == ("no-loss", "line 7 is no frame")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rules import Rules
@@ -14,9 +14,9 @@ def broken(
     rules: Rules, text: str, end_s: float | None = None, bit_rate: int | None = None
 ) -> list[str]:
     """Return what is found, as text with the time in seconds before it."""
-    checker, heards = Checker(rules, bit_rate), hear(text)
-    found = [finding for heard in heards for finding in checker.take(heard)]
-    found += checker.end(round(end_s * 1e6) if end_s else heards[-1].at_us)
+    checker, records = Checker(rules, bit_rate), hear(text)
+    found = [finding for record in records for finding in checker.take(record)]
+    found += checker.end(round(end_s * 1e6) if end_s else records[-1].at_us)
     return [f"{finding.at_us / 1e6:g} {finding.text}" for finding in found]
 
 
@@ -103,9 +103,9 @@ def test_a_long_gap_is_found_and_one_that_lasts() -> None:
 
 def test_gaps_are_those_of_one_bus() -> None:
     checker = Checker(parse_rules({"max_gap": "181=20ms"}))
-    heards = sorted(hear("1 181#\n1.02 181#", "can0") + hear("1.01 181#\n1.1 181#", "can1"))
-    found = [finding for heard in heards for finding in checker.take(heard)]
-    assert [(finding.at_us, finding.heard and finding.heard.channel) for finding in found] == [
+    records = sorted(hear("1 181#\n1.02 181#", "can0") + hear("1.01 181#\n1.1 181#", "can1"))
+    found = [finding for record in records for finding in checker.take(record)]
+    assert [(finding.at_us, finding.record and finding.record.channel) for finding in found] == [
         (1_100_000, "can1")
     ]
 
@@ -130,8 +130,8 @@ def test_what_others_send_to_a_node_is_not_the_node(frame: str) -> None:
 
 def test_a_node_of_another_bus_is_another_node() -> None:
     checker = Checker(Rules(no_reboot=True))
-    heards = hear("1 183#", "can0") + hear("2 703#00", "can1")
-    assert [finding for heard in heards for finding in checker.take(heard)] == []
+    records = hear("1 183#", "can0") + hear("2 703#00", "can1")
+    assert [finding for record in records for finding in checker.take(record)] == []
 
 
 @pytest.mark.parametrize("command", ["8103", "8200"])

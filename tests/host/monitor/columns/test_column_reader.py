@@ -66,10 +66,10 @@ def rows_of(columns: Columns) -> list[tuple[object, ...]]:
 def rows_by_line(path: Path) -> tuple[list[tuple[object, ...]], Tally]:
     reader = read_log(path)
     rows: list[tuple[object, ...]] = []
-    for heard in reader:
-        length = getattr(heard.frame, "dlc", len(heard.frame.data))
-        payload = int.from_bytes(heard.frame.data, "little")
-        rows.append((heard.at_us, flagged_id(heard), length, payload, heard.channel))
+    for record in reader:
+        length = getattr(record.frame, "dlc", len(record.frame.data))
+        payload = int.from_bytes(record.frame.data, "little")
+        rows.append((record.at_us, flagged_id(record), length, payload, record.channel))
     return rows, reader.tally
 
 
@@ -94,9 +94,9 @@ def test_columns_are_what_single_lines_give(lines: list[str], end: str) -> None:
 def test_usual_lines_take_the_fast_way(line: str) -> None:
     rows, channels = Rows(1), ChannelNames()
     CandumpBlock(f"{line}\r\n".encode()).take(rows, channels)
-    (heard,) = LogLines().push(f"{line}\n".encode())
-    assert (rows.known.tolist(), rows.at_us.tolist()) == ([True], [heard.at_us])
-    assert rows.ident.tolist() == [flagged_id(heard)]
+    (record,) = LogLines().push(f"{line}\n".encode())
+    assert (rows.known.tolist(), rows.at_us.tolist()) == ([True], [record.at_us])
+    assert rows.ident.tolist() == [flagged_id(record)]
 
 
 def test_lines_longer_than_a_block_and_files_without_end_are_whole(tmp_path: Path) -> None:

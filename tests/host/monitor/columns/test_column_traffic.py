@@ -5,23 +5,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.column_log import columns
-from tests.host.monitor.heard_log import hear, snapshot
+from tests.host.monitor.record_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
 from tickrig.host.monitor.columns.column_traffic import column_buckets, snapshot_of
-from tickrig.host.monitor.columns.columns import heards as rows_of
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.columns.columns import records as rows_of
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.gaps import bucket_of
 
 
 @given(traffic())
-def test_a_log_at_once_gives_the_same_as_frame_by_frame(heards: list[Heard]) -> None:
-    assert snapshot_of(columns(heards)) == snapshot(heards)
+def test_a_log_at_once_gives_the_same_as_frame_by_frame(records: list[Record]) -> None:
+    assert snapshot_of(columns(records)) == snapshot(records)
 
 
 @given(traffic())
-def test_a_row_of_columns_is_the_frame_that_it_was(heards: list[Heard]) -> None:
-    log = columns(heards)
-    assert rows_of(log, np.arange(len(heards))) == heards
+def test_a_row_of_columns_is_the_frame_that_it_was(records: list[Record]) -> None:
+    log = columns(records)
+    assert rows_of(log, np.arange(len(records))) == records
 
 
 def test_a_log_of_error_frames_alone_has_no_rows() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.candump import parse_log
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "canmon"
@@ -15,15 +15,15 @@ TRACE = GOLDEN / "drive.log"
 NOISE = GOLDEN / "noise.log"
 
 
-def heard(path: Path = TRACE) -> list[Heard]:
+def record(path: Path = TRACE) -> list[Record]:
     """Return the frames."""
-    return [Heard(*line) for line in parse_log(path.read_text())]
+    return [Record(*line) for line in parse_log(path.read_text())]
 
 
 def decoded(path: Path = TRACE) -> list[Decoded]:
     """Return what our decoder says of each."""
     decoder = Decoder()
-    return [decoder.take(item) for item in heard(path)]
+    return [decoder.take(item) for item in record(path)]
 
 
 def peer(name: str) -> list[dict[str, str]]:
@@ -32,7 +32,7 @@ def peer(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file, delimiter="|"))
 
 
-def line(item: Heard, found: Decoded) -> str:
+def line(item: Record, found: Decoded) -> str:
     """Write a frame as the golden text has it."""
     head = f"{item.frame!s:22}{found.kind:10}{found.node or '-':>3} {found.source or '-':5}"
     return f"{head}{found.text}".rstrip()

@@ -8,7 +8,7 @@ from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard, NodeStatus
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 WIDE = 300
@@ -17,8 +17,8 @@ WIDE = 300
 def board_of(text: str) -> NodeBoard:
     decoder = Decoder()
     board = NodeBoard(decoder)
-    for heard in trace(text):
-        board.take(heard, decoder.take(heard))
+    for record in trace(text):
+        board.take(record, decoder.take(record))
     return board
 
 
@@ -31,16 +31,16 @@ def beats(*at_ms: int) -> NodeBoard:
     decoder = Decoder()
     board = NodeBoard(decoder)
     for at in at_ms:
-        heard = Heard(at * 1_000, "can0", CanFrame.parse("705#05"))
-        board.take(heard, decoder.take(heard))
+        record = Record(at * 1_000, "can0", CanFrame.parse("705#05"))
+        board.take(record, decoder.take(record))
     return board
 
 
 def test_the_board_of_a_drive_reads_like_this() -> None:
     decoder = Decoder()
     board = NodeBoard(decoder)
-    for heard in drive_trace.heard()[:-4]:
-        board.take(heard, decoder.take(heard))
+    for record in drive_trace.record()[:-4]:
+        board.take(record, decoder.take(record))
     head, row, *history = render_board(board, board.now_us, WIDE, 10)
     assert head.split("  ")[0] == "NODE"
     assert " ".join(row.split()) == (
@@ -90,21 +90,21 @@ def test_a_gap_between_heartbeats_is_counted() -> None:
 
 def test_a_boot_up_that_nobody_asked_for_is_counted() -> None:
     row = status("705#00 705#7F 705#00")
-    assert (row.boots, row.unasked_boots, row.state_text) == (2, 1, "pre-operational")
+    assert (row.boots, row.unrequested_boots, row.state_text) == (2, 1, "pre-operational")
 
 
 def test_a_node_that_sent_a_pdo_of_its_own_boots_again() -> None:
     mapped = {(0x1A00, 0): b"\1", (0x1A00, 1): bytes.fromhex("10004160")}
     decoder = Decoder({5: EdsObjects(values=mapped)})
     board = NodeBoard(decoder)
-    for heard in trace("185#3702 705#00"):
-        board.take(heard, decoder.take(heard))
-    assert board.rows()[0].unasked_boots == 1
+    for record in trace("185#3702 705#00"):
+        board.take(record, decoder.take(record))
+    assert board.rows()[0].unrequested_boots == 1
 
 
 def test_a_boot_up_after_a_reset_was_asked_for() -> None:
     row = status("705#00 000#8105 705#00 000#8200 705#00")
-    assert (row.boots, row.unasked_boots) == (3, 0)
+    assert (row.boots, row.unrequested_boots) == (3, 0)
 
 
 def test_a_command_shows_behind_an_arrow_until_the_node_confirms_it() -> None:
@@ -126,8 +126,8 @@ def test_a_heartbeat_time_of_0_by_sdo_means_none_and_by_an_eds_nothing() -> None
     assert status(told).period_us is None
     decoder = Decoder({5: EdsObjects(values={(0x1017, 0): bytes(2)})})
     board = NodeBoard(decoder, {5: ""})
-    for heard in trace("705#05 705#05"):
-        board.take(heard, decoder.take(heard))
+    for record in trace("705#05 705#05"):
+        board.take(record, decoder.take(record))
     assert board.rows()[0].period_us == STEP_US
 
 
@@ -149,16 +149,16 @@ def test_an_unanswered_request_is_an_error_of_a_node_that_was_heard() -> None:
 def test_a_node_that_is_expected_is_on_the_board_from_the_beginning() -> None:
     decoder = Decoder()
     board = NodeBoard(decoder, {7: "a drive"})
-    for heard in trace("705#05"):
-        board.take(heard, decoder.take(heard))
+    for record in trace("705#05"):
+        board.take(record, decoder.take(record))
     assert [(row.node, row.name) for row in board.rows()] == [(5, ""), (7, "a drive")]
 
 
 def test_nodes_of_several_buses_are_told_apart() -> None:
     decoder = Decoder()
     board = NodeBoard(decoder)
-    for heard in (*trace("705#05", "can1"), *trace("705#7F", "can0")):
-        board.take(heard, decoder.take(heard))
+    for record in (*trace("705#05", "can1"), *trace("705#7F", "can0")):
+        board.take(record, decoder.take(record))
     lines = render_board(board, 0, WIDE, 10)
     assert [line.split("  ")[0] for line in lines] == ["NODE", "can0 5", "can1 5"]
 

@@ -16,8 +16,8 @@ DBC = GOLDEN / "engine.dbc"
 
 
 def said(text: str) -> Decoded:
-    (heard,) = trace(text)
-    return Decoder(dbc=[DBC]).take(heard)
+    (record,) = trace(text)
+    return Decoder(dbc=[DBC]).take(record)
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_messages_of_one_name_keep_their_own_signals(tmp_path: Path) -> None:
         'BO_ 386 TPDO1: 1 B\n SG_ level : 0|8@1+ (1,0) [0|0] "%" A\n'
     )
     decoder = Decoder(dbc=[path])
-    texts = [decoder.take(heard).text for heard in trace("181#05 182#06")]
+    texts = [decoder.take(record).text for record in trace("181#05 182#06")]
     assert texts == ["TPDO1 speed=5rpm", "TPDO1 level=6%"]
 
 
@@ -54,8 +54,10 @@ def test_what_a_dbc_file_does_not_name_is_decoded_as_ever() -> None:
 
 
 def test_a_filter_asks_for_signals_of_a_dbc_file() -> None:
-    (heard,) = trace("123#E8030100")
-    assert parse_filter("dbc and Speed > 499 and Gear = first").matches(heard, said("123#E8030100"))
+    (record,) = trace("123#E8030100")
+    assert parse_filter("dbc and Speed > 499 and Gear = first").matches(
+        record, said("123#E8030100")
+    )
 
 
 def test_a_file_that_is_no_dbc_is_refused(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from tests.host.monitor.decode.test_pdos import WRITTEN
 from tests.host.monitor.decode.traces import trace
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.filter import FilterError, parse_filter
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_error import ErrorFrame
 
 TRAFFIC = (
@@ -16,15 +16,15 @@ TRAFFIC = (
     " 185#3802D2040000 285#01 181#00 600#00 18FF0000#01"
     " 605#4041600000000000 585#8041600000000206"
 )
-ERROR = Heard(99_000, "can0", ErrorFrame(0x20))
+ERROR = Record(99_000, "can0", ErrorFrame(0x20))
 
 
 def passed(text: str) -> str:
     """Return the frames behind the mapping that pass a filter."""
     decoder, chosen = Decoder(), parse_filter(text)
     frames = [*trace(TRAFFIC), ERROR]
-    taken = [(heard, decoder.take(heard)) for heard in frames]
-    wanted = [heard.frame for heard, decoded in taken[8:] if chosen.matches(heard, decoded)]
+    taken = [(record, decoder.take(record)) for record in frames]
+    wanted = [record.frame for record, decoded in taken[8:] if chosen.matches(record, decoded)]
     return " ".join(str(frame) for frame in wanted)
 
 
@@ -109,10 +109,10 @@ def test_a_wrong_filter_is_refused_with_its_column(text: str, column: int, reaso
 
 def test_a_request_that_ends_another_transfer_passes_for_both_objects() -> None:
     decoder = Decoder()
-    heard = trace("605#4000100000000000 605#4001100000000000")
-    decoded = [decoder.take(item) for item in heard]
-    assert parse_filter("sdo[1000h] and sdo.unanswered").matches(heard[1], decoded[1])
-    assert parse_filter("sdo[1001h:00]").matches(heard[1], decoded[1])
+    record = trace("605#4000100000000000 605#4001100000000000")
+    decoded = [decoder.take(item) for item in record]
+    assert parse_filter("sdo[1000h] and sdo.unanswered").matches(record[1], decoded[1])
+    assert parse_filter("sdo[1001h:00]").matches(record[1], decoded[1])
 
 
 def test_a_filter_says_which_signals_it_asks_for() -> None:
@@ -129,5 +129,5 @@ def test_any_text_is_a_filter_or_refused(text: str) -> None:
     except FilterError:
         return
     decoder = Decoder()
-    for heard in (*trace("185#00 605#4041600000000000"), ERROR):
-        assert chosen.matches(heard, decoder.take(heard)) in (True, False)
+    for record in (*trace("185#00 605#4041600000000000"), ERROR):
+        assert chosen.matches(record, decoder.take(record)) in (True, False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.host.monitor.decode.drive_trace import GOLDEN, NOISE, decoded, heard, line, peer
+from tests.host.monitor.decode.drive_trace import GOLDEN, NOISE, decoded, line, peer, record
 
 WIRESHARK_KINDS = {
     "nmt": ("NMT:",),
@@ -29,7 +29,7 @@ LENS_KINDS = {"boot-up": "HEARTBEAT", "guard": "HEARTBEAT", "unmapped": "TPDO2"}
 
 
 def test_the_trace_of_a_drive_reads_like_this() -> None:
-    lines = [line(*pair) for pair in zip(heard(), decoded(), strict=True)]
+    lines = [line(*pair) for pair in zip(record(), decoded(), strict=True)]
     assert "\n".join(lines) + "\n" == (GOLDEN / "drive.txt").read_text()
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.decode.drive_trace import heard
+from tests.host.monitor.decode.drive_trace import record
 from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -35,7 +35,7 @@ ERRORS = st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8
 FRAMES = st.lists(st.one_of(SDO, SDO, ANY, REMOTE, WIDE, ERRORS), max_size=60)
 
 
-def watch(frames: list[Heard]) -> NodeBoard:
+def watch(frames: list[Record]) -> NodeBoard:
     """Decode frames, and show what comes of them."""
     decoder = Decoder()
     board = NodeBoard(decoder)
@@ -51,12 +51,12 @@ def watch(frames: list[Heard]) -> NodeBoard:
 
 @given(FRAMES)
 def test_any_frames_are_decoded_or_said_to_be_wrong(frames: list[CanFrame | ErrorFrame]) -> None:
-    watch([Heard(number, "can0", frame) for number, frame in enumerate(frames)])
+    watch([Record(number, "can0", frame) for number, frame in enumerate(frames)])
 
 
 @given(st.data())
 def test_a_trace_with_holes_is_decoded(data: st.DataObject) -> None:
-    frames = heard()
+    frames = record()
     begin = data.draw(st.integers(0, len(frames)))
     lost = data.draw(st.sets(st.integers(0, len(frames)), max_size=20))
     left = [item for number, item in enumerate(frames) if number >= begin and number not in lost]

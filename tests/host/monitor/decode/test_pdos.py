@@ -164,7 +164,7 @@ def test_who_sends_a_pdo_is_named_before_who_receives_it() -> None:
 
 def test_each_bus_has_nodes_of_its_own() -> None:
     decoder = Decoder()
-    for heard in trace(WRITTEN):
-        decoder.take(heard)
+    for record in trace(WRITTEN):
+        decoder.take(record)
     (other,) = trace("185#3702D2040000", "can1")
     assert decoder.take(other).kind == "unmapped"

@@ -9,7 +9,7 @@ from tests.emulators.sim_bench import SimBench
 from tests.host.monitor.decode.traces import decode, last, transfers
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.sdo.transfer import Direction, Mode, Outcome, Transfer
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -28,12 +28,12 @@ class Listener:
         self.found: list[Transfer] = []
         self.lose = frozenset[int]()
         self._count = 0
-        self.bench.wire.observers.append(self._hear)
+        self.bench.wire.observers.append(self._receive)
 
-    def _hear(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+    def _receive(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
         self._count += 1
         if self._count not in self.lose:
-            self.found += self.decoder.take(Heard(at_us, "can0", frame)).transfers
+            self.found += self.decoder.take(Record(at_us, "can0", frame)).transfers
 
 
 @pytest.fixture
@@ -168,7 +168,7 @@ def test_a_request_without_answer_is_unanswered_when_the_next_one_comes() -> Non
 
 def test_a_transfer_that_runs_at_the_end_is_pending() -> None:
     decoder = Decoder()
-    decoder.take(Heard(1_000, "can0", CanFrame.parse("605#4000100000000000")))
+    decoder.take(Record(1_000, "can0", CanFrame.parse("605#4000100000000000")))
     (pending,) = decoder.pending(501_000)
     assert (pending.outcome, pending.duration_us) == (Outcome.UNANSWERED, 500_000)
     assert pending.name == "device_type"

@@ -5,7 +5,7 @@ import pytest
 from tests.host.monitor.decode.traces import decode, last
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame
 
 
@@ -66,7 +66,7 @@ def test_a_frame_says_this(frames: str, kind: str, node: int | None, text: str) 
     ],
 )
 def test_an_error_frame_says_this(frame: ErrorFrame, text: str) -> None:
-    decoded = Decoder().take(Heard(0, "can0", frame))
+    decoded = Decoder().take(Record(0, "can0", frame))
     assert (decoded.kind, decoded.text) == ("error", text)
 
 

@@ -8,16 +8,16 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.decode.sdo.transfer import Transfer
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 STEP_US = 1_000
 
 
-def trace(text: str, channel: str = "can0") -> list[Heard]:
+def trace(text: str, channel: str = "can0") -> list[Record]:
     """Return frames of candump text, one a millisecond."""
     return [
-        Heard(number * STEP_US, channel, CanFrame.parse(word))
+        Record(number * STEP_US, channel, CanFrame.parse(word))
         for number, word in enumerate(text.split())
     ]
 
@@ -25,7 +25,7 @@ def trace(text: str, channel: str = "can0") -> list[Heard]:
 def decode(text: str, eds: Mapping[int, EdsObjects] | None = None) -> list[Decoded]:
     """Decode candump text."""
     decoder = Decoder(eds or {})
-    return [decoder.take(heard) for heard in trace(text)]
+    return [decoder.take(record) for record in trace(text)]
 
 
 def last(text: str, eds: Mapping[int, EdsObjects] | None = None) -> Decoded:

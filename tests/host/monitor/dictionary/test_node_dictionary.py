@@ -3,7 +3,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import read_eds
 from tickrig.host.monitor.dictionary.node_dictionary import (
@@ -28,10 +28,10 @@ MAPPED = """\
 def dictionary(text: str, *, eds: bool = False) -> NodeDictionary:
     decoder = Decoder({5: read_eds(EPOS, 5)} if eds else {})
     made = NodeDictionary(decoder.memory("can0", 5))
-    for heard in hear(text):
-        decoded = decoder.take(heard)
+    for record in hear(text):
+        decoded = decoder.take(record)
         if decoded.node == 5:
-            made.take(heard.at_us, decoded)
+            made.take(record.at_us, decoded)
     return made
 
 

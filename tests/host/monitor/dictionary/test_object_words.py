@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.dictionary.encode_value import encode_words
+from tickrig.host.monitor.dictionary.encode_value import encode_value
 from tickrig.wire.canopen.datatypes import DataType
 
 
@@ -27,7 +27,7 @@ from tickrig.wire.canopen.datatypes import DataType
     ],
 )
 def test_a_value_is_written_as_it_is_read(text: ObjectText, words: str, data: str) -> None:
-    assert encode_words(text, words).hex() == data
+    assert encode_value(text, words).hex() == data
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_value_is_written_as_it_is_read(text: ObjectText, words: str, data: st
 )
 def test_what_is_no_value_is_refused(text: ObjectText, words: str, refusal: str) -> None:
     with pytest.raises(ValueError, match=refusal):
-        encode_words(text, words)
+        encode_value(text, words)
 
 
 @given(st.integers(-0x8000, 0x7FFF), st.sampled_from([1.0, 0.1, 0.25, 1e-3]))
@@ -53,10 +53,10 @@ def test_a_number_that_was_read_is_written_as_it_was(number: int, factor: float)
     text = ObjectText("x", DataType.INTEGER16, "", factor)
     data = DataType.INTEGER16.encode(number)
     shown = text.read(data)[1]
-    assert encode_words(text, shown) == data
+    assert encode_value(text, shown) == data
 
 
 @given(st.text(max_size=12), st.sampled_from([None, *DataType]), st.sampled_from([1.0, 0.1]))
 def test_any_words_are_bytes_or_refused(words: str, kind: DataType | None, factor: float) -> None:
     with suppress(ValueError):
-        assert isinstance(encode_words(ObjectText("x", kind, "", factor), words), bytes)
+        assert isinstance(encode_value(ObjectText("x", kind, "", factor), words), bytes)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.collector import Collector
-from tickrig.host.monitor.graph.signal_word import parse_signal
+from tickrig.host.monitor.graph.signal_spec import parse_signal
 from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
@@ -35,14 +35,14 @@ def collected(*words: str, eds: dict[int, Path] | None = None) -> Collector:
     return Collector([parse_signal(word) for word in words], Decoder(eds or {}))
 
 
-def heard(*texts: str) -> list[Heard]:
-    return [Heard(n * 1_000, "can0", CanFrame.parse(text)) for n, text in enumerate(texts)]
+def record(*texts: str) -> list[Record]:
+    return [Record(n * 1_000, "can0", CanFrame.parse(text)) for n, text in enumerate(texts)]
 
 
 def test_a_slice_is_taken_of_each_data_frame_that_holds_it() -> None:
     collector = collected("181[2:6]s", "00000181[0]", "mode=181[0]@2")
-    collector.take_all(heard("181#3702FEFFFFFF", "00000181#07", "181#R", "181#3702"))
-    collector.take(Heard(9, "can0", NO_ACK))
+    collector.take_all(record("181#3702FEFFFFFF", "00000181#07", "181#R", "181#3702"))
+    collector.take(Record(9, "can0", NO_ACK))
     assert [list(one.values) for one in collector.series] == [[-2], [7], [0x37, 0x37]]
     assert [(one.label, one.axis) for one in collector.series] == [
         ("181[2:6]s", 1),
@@ -53,7 +53,7 @@ def test_a_slice_is_taken_of_each_data_frame_that_holds_it() -> None:
 
 def test_an_object_is_taken_by_its_name_or_how_that_begins() -> None:
     collector = collected("5.position", "5.statusword.fault", "s=5.status", eds={5: EPOS})
-    frames = heard("185#3F020A000000", "185#37020B000000", "185#3702", "186#37020C000000")
+    frames = record("185#3F020A000000", "185#37020B000000", "185#3702", "186#37020C000000")
     collector.take_all(frames)
     position, fault, status = collector.series
     assert [list(one.values) for one in (fault, status)] == [[1, 0], [0x23F, 0x237]]
@@ -65,14 +65,14 @@ def test_a_name_that_began_with_one_object_keeps_to_it() -> None:
     collector = collected("5.target", eds={5: EPOS})
     velocity = ("605#40FF600000000000", "585#43FF6000E8030000")
     position = ("605#407A600000000000", "585#437A600001000000")
-    collector.take_all(heard(*velocity, *position, *velocity))
+    collector.take_all(record(*velocity, *position, *velocity))
     (target,) = collector.series
     assert (target.label, list(target.values)) == ("5.target_velocity", [1_000, 1_000])
 
 
 def test_a_name_alone_means_the_first_node_that_has_it() -> None:
     collector = collected("position", "statusword.fault", eds={5: EPOS, 6: EPOS})
-    collector.take_all(heard("185#37020A000000", "186#37020B000000"))
+    collector.take_all(record("185#37020A000000", "186#37020B000000"))
     assert [(one.label, list(one.values)) for one in collector.series] == [
         ("5.position_actual_value", [10]),
         ("5.statusword.fault", [0]),
@@ -81,7 +81,7 @@ def test_a_name_alone_means_the_first_node_that_has_it() -> None:
 
 def test_a_signal_of_a_dbc_file_has_a_curve_with_its_unit() -> None:
     collector = Collector([parse_signal("speed")], Decoder(dbc=[DBC]))
-    collector.take_all(heard("123#E8030100", "123#E803"))
+    collector.take_all(record("123#E8030100", "123#E803"))
     (speed,) = collector.series
     assert (speed.label, speed.unit, list(speed.values)) == ("Speed", "rpm", [500, 500])
 
@@ -100,7 +100,7 @@ def test_a_log_as_columns_gives_the_same(tmp_path: Path) -> None:
 
 def test_what_is_no_number_has_no_curve() -> None:
     collector = collected("5.manufacturer", "6.manufacturer", eds={5: EPOS, 6: EPOS})
-    collector.take_all(heard("605#4008100000000000", "585#4308100041424344"))
+    collector.take_all(record("605#4008100000000000", "585#4308100041424344"))
     five, six = collector.series
     assert (five.label, len(five)) == ("5.manufacturer_device_name", 0)
     assert (six.label, len(six)) == ("6.manufacturer", 0)
@@ -131,11 +131,11 @@ def test_any_text_is_a_signal_or_refused(text: str) -> None:
 
 def test_signals_come_and_go_while_others_go_on() -> None:
     collector = Collector([parse_signal("181[0]")])
-    collector.take(Heard(1, "can0", CanFrame.parse("181#07")))
+    collector.take(Record(1, "can0", CanFrame.parse("181#07")))
     collector.join(Collector([parse_signal("181[0]*2"), parse_signal("5.position")]))
-    collector.take(Heard(2, "can0", CanFrame.parse("181#08")))
+    collector.take(Record(2, "can0", CanFrame.parse("181#08")))
     assert [list(series.values) for series in collector.series] == [[7, 8], [16], []]
     collector.remove(2)
     collector.remove(0)
-    collector.take(Heard(3, "can0", CanFrame.parse("181#09")))
+    collector.take(Record(3, "can0", CanFrame.parse("181#09")))
     assert [list(series.values) for series in collector.series] == [[16, 18]]

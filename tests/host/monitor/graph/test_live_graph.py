@@ -4,22 +4,22 @@ import re
 
 import pytest
 
-from tests.host.monitor.heard_log import hear
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.graph.live_graph import LiveGraph, Sight
-from tickrig.host.monitor.graph.signal_word import parse_signal
+from tests.host.monitor.record_log import hear
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
+from tickrig.host.monitor.graph.signal_spec import parse_signal
 from tickrig.wire.can import CanFrame
 
 S = 1_000_000
 RAMP = "".join(f"{second}.0 181#{second:02X}\n" for second in range(1, 21))
 
 
-def graph(*words: str, sight: Sight = Sight.LIVE) -> LiveGraph:
-    made = LiveGraph(sight)
+def graph(*words: str, mode: ViewMode = ViewMode.LIVE) -> LiveGraph:
+    made = LiveGraph(mode)
     for word in words or ("181[0]",):
         made.add(parse_signal(word))
-    for heard in hear(RAMP):
-        made.take(heard, None)
+    for record in hear(RAMP):
+        made.take(record, None)
     made.now_us = 20 * S
     return made
 
@@ -48,19 +48,19 @@ def test_a_live_graph_shows_the_latest_window() -> None:
 
 
 def test_all_of_a_log_is_seen() -> None:
-    assert span_s(graph(sight=Sight.ALL)) == (1, 20)
+    assert span_s(graph(mode=ViewMode.ALL)) == (1, 20)
 
 
 def test_zooming_a_live_window_keeps_its_end() -> None:
     made = graph()
     made.zoom(2)
-    assert (span_s(made), made.sight) == ((15, 20), Sight.LIVE)
+    assert (span_s(made), made.mode) == ((15, 20), ViewMode.LIVE)
 
 
 def test_zooming_goes_to_the_cursor_else_to_the_middle() -> None:
-    made = graph(sight=Sight.ALL)
+    made = graph(mode=ViewMode.ALL)
     made.zoom(2)
-    assert (span_s(made), made.sight) == ((5.75, 15.25), Sight.HELD)
+    assert (span_s(made), made.mode) == ((5.75, 15.25), ViewMode.HELD)
     made.move_cursor(-1)
     made.zoom(2)
     assert span_s(made) == (5.75, 10.5)
@@ -71,32 +71,32 @@ def test_moving_stops_the_picture() -> None:
     made.move(-0.5)
     made.now_us = 30 * S
     assert span_s(made) == (5, 15)
-    made.show(Sight.LIVE)
+    made.show(ViewMode.LIVE)
     assert span_s(made) == (20, 30)
 
 
 def test_the_cursor_begins_in_the_middle_stays_in_sight_and_stops_the_picture() -> None:
     made = graph()
     made.move_cursor(0)
-    assert (made.cursor_us, made.sight) == (15 * S, Sight.HELD)
+    assert (made.cursor_us, made.mode) == (15 * S, ViewMode.HELD)
     assert "181[0] 15" in made.render(34, 7)[0]
     made.move_cursor(-0.2)
     assert made.cursor_us == 13 * S
     made.move_cursor(9)
     assert made.cursor_us == 20 * S
-    made.show(Sight.ALL)
+    made.show(ViewMode.ALL)
     assert made.cursor_us is None
 
 
 def test_holding_keeps_what_is_seen() -> None:
     made = graph()
-    made.show(Sight.HELD)
+    made.show(ViewMode.HELD)
     made.now_us = 40 * S
     assert span_s(made) == (10, 20)
 
 
 def test_one_axis_is_stretched_and_moved_and_fits_again() -> None:
-    made = graph("181[0]", "181[0]*10@2", sight=Sight.ALL)
+    made = graph("181[0]", "181[0]*10@2", mode=ViewMode.ALL)
     made.next_axis()
     made.stretch(2)
     assert made.view().ranges == {2: (57.5, 152.5)}
@@ -110,7 +110,7 @@ def test_one_axis_is_stretched_and_moved_and_fits_again() -> None:
 
 
 def test_an_axis_is_never_stretched_to_nothing() -> None:
-    made = graph(sight=Sight.ALL)
+    made = graph(mode=ViewMode.ALL)
     for _ in range(200):
         made.stretch(2)
     low, high = made.view().ranges[1]
@@ -119,9 +119,9 @@ def test_an_axis_is_never_stretched_to_nothing() -> None:
 
 def test_a_signal_that_comes_later_has_its_past() -> None:
     made = graph()
-    past = [(heard, None) for heard in hear(RAMP)]
+    past = [(record, None) for record in hear(RAMP)]
     made.add(parse_signal("181[0]*2"), past)
-    made.take(Heard(21 * S, "can0", CanFrame.parse("181#15")), None)
+    made.take(Record(21 * S, "can0", CanFrame.parse("181#15")), None)
     assert list(made.series[1].values) == [2.0 * n for n in range(1, 22)]
     made.remove(0)
     assert ([word.text for word in made.words], len(made.series)) == (["181[0]*2"], 1)
@@ -133,9 +133,9 @@ def test_clearing_forgets_the_samples_alone() -> None:
     assert ([len(one) for one in made.series], len(made.words)) == ([0], 1)
 
 
-@pytest.mark.parametrize("sight", list(Sight))
-def test_without_a_signal_all_keys_do_no_harm(sight: Sight) -> None:
-    made = LiveGraph(sight)
+@pytest.mark.parametrize("mode", list(ViewMode))
+def test_without_a_signal_all_keys_do_no_harm(mode: ViewMode) -> None:
+    made = LiveGraph(mode)
     made.zoom(2)
     made.move(1)
     made.move_cursor(1)

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.replay.replay_plan import Lateness, ReplayPlan
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
 
 SYNC = CanFrame(0x080)
-LOG = [Heard(5_000_000 + n * 10_000, "can0", CanFrame(0x100 + n)) for n in range(5)]
+LOG = [Record(5_000_000 + n * 10_000, "can0", CanFrame(0x100 + n)) for n in range(5)]
 BACK = {"can0": "vcan2"}.get
 
 
@@ -56,14 +56,14 @@ def test_an_endless_replay_of_nothing_ends() -> None:
 
 
 def test_error_frames_and_other_buses_are_left_out_and_counted() -> None:
-    log = [Heard(0, "can0", SYNC), Heard(1, "can0", NO_ACK), Heard(2, "can1", SYNC)]
+    log = [Record(0, "can0", SYNC), Record(1, "can0", NO_ACK), Record(2, "can1", SYNC)]
     plan = ReplayPlan(log, BACK)
     assert (len(list(plan)), plan.left_out) == (1, 2)
 
 
 @given(st.lists(st.integers(0, 10**9), max_size=30), st.floats(0.01, 100))
 def test_time_never_goes_back(times_us: list[int], speed: float) -> None:
-    plan = ReplayPlan([Heard(at_us, "can0", SYNC) for at_us in times_us], BACK, speed)
+    plan = ReplayPlan([Record(at_us, "can0", SYNC) for at_us in times_us], BACK, speed)
     due = [one.at_us for one in plan]
     assert due == sorted(due)
     assert len(due) == len(times_us)

@@ -9,10 +9,10 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.verbs.seq import Watch
 from tickrig.host.monitor.decode.node_memory import read_eds
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
-from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.wire.can import Frames
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
@@ -26,28 +26,28 @@ def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
     drive = epos.Epos.of(slave)
     host = CanHost(Rig(Station(slave, wire.end())), wire.end())
     watch = Watch({5: read_eds(EXAMPLES / "eds/epos.eds", 5)})
-    resolve = PdoWords(watch.eds).frame
+    resolve = PdoFrames(watch.eds).frame
     sequence = TomlSequence(text, START.name, resolve=resolve, condition=watch.condition).parse()
     run = SequenceRun(sequence)
 
     def send(frames: Frames) -> None:
         host.send(frames)
         for frame in frames:
-            watch.take(Heard(host.now_us, "can0", frame, sent=True))
+            watch.take(Record(host.now_us, "can0", frame, sent=True))
 
     send(run.tick(host.now_us))
     while not run.done:
         for frame in host.receive(run.due_us - host.now_us):
-            heard = Heard(host.now_us, "can0", frame)
-            watch.take(heard)
-            send(run.tick(host.now_us, (heard,)))
+            record = Record(host.now_us, "can0", frame)
+            watch.take(record)
+            send(run.tick(host.now_us, (record,)))
         send(run.tick(host.now_us))
     return run, drive
 
 
 def test_the_example_turns_our_drive() -> None:
     run, drive = carried_out(START.read_text())
-    assert [note.text for note in run.notes if note.mark is Mark.MISSED] == []
+    assert [note.text for note in run.notes if note.mark is EventType.MISSED] == []
     assert (run.done, run.met) == (True, 5)
     assert drive.read("shaft_deg") != 0
 

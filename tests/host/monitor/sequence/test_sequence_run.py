@@ -3,9 +3,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import Mark, SequenceRun
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
@@ -33,8 +33,8 @@ def run(text: str, **variables: int) -> SequenceRun:
     return SequenceRun(TomlSequence(text, "start.toml", variables).parse())
 
 
-def heard(*texts: str, sent: bool = False) -> list[Heard]:
-    return [Heard(0, "vcan0", CanFrame.parse(text), sent) for text in texts]
+def record(*texts: str, sent: bool = False) -> list[Record]:
+    return [Record(0, "vcan0", CanFrame.parse(text), sent) for text in texts]
 
 
 def frames(*texts: str) -> Frames:
@@ -49,8 +49,8 @@ def test_a_sequence_sends_waits_expects_and_repeats() -> None:
     start = run(START)
     assert start.tick(1_000) == frames("000#0103")
     assert start.due_us == 301_000
-    assert start.tick(50_000, heard("703#7F", "704#05")) == ()
-    assert start.tick(70_000, heard("703#05")) == ()
+    assert start.tick(50_000, record("703#7F", "704#05")) == ()
+    assert start.tick(70_000, record("703#05")) == ()
     assert start.due_us == 80_000
     assert start.tick(80_000) == frames("080#")
     assert start.tick(100_000) == frames("080#")
@@ -105,12 +105,12 @@ def test_several_frames_are_expected_in_any_order() -> None:
     text = '[[step]]\nexpect = ["701#05", "702#05"]\nwithin = "1s"\n'
     both = run(text)
     both.tick(0)
-    both.tick(10, heard("702#05", "702#05"))
+    both.tick(10, record("702#05", "702#05"))
     assert not both.done
-    both.tick(20, heard("701#05"))
+    both.tick(20, record("701#05"))
     assert (both.done, both.met) == (True, 1)
     half = run(text)
-    half.tick(0, heard("702#05"))
+    half.tick(0, record("702#05"))
     half.tick(1_000_000)
     assert half.notes[-2].text == "start.toml:2: no 701#05 within 1000 ms"
 
@@ -119,14 +119,14 @@ def test_two_answers_in_one_call_meet_two_expectations() -> None:
     text = '[[step]]\nexpect = "581#60*"\n[[step]]\nexpect = "582#??"\n'
     two = run(text)
     two.tick(0)
-    two.tick(5, heard("581#60001000", "582#AA"))
+    two.tick(5, record("581#60001000", "582#AA"))
     assert (two.done, two.met) == (True, 2)
 
 
 def test_what_this_program_sent_meets_nothing() -> None:
     echo = run('[[step]]\nexpect = "080#"\n')
     echo.tick(0)
-    echo.tick(10, heard("080#", sent=True))
+    echo.tick(10, record("080#", sent=True))
     assert not echo.done
 
 
@@ -153,8 +153,8 @@ def test_calling_more_often_changes_nothing(steps_us: list[int]) -> None:
         now_us += step_us
         sent += dense.tick(now_us)
     answer = now_us + 1
-    sent += dense.tick(answer, heard("703#05"))
-    other = [*sparse.tick(0), *sparse.tick(answer, heard("703#05"))]
+    sent += dense.tick(answer, record("703#05"))
+    other = [*sparse.tick(0), *sparse.tick(answer, record("703#05"))]
     while not sparse.done:
         other += sparse.tick(sparse.due_us)
     for now_us in range(answer, answer + 60_000, 500):
@@ -168,7 +168,7 @@ def test_lines_send_at_their_times_as_often_as_they_say() -> None:
     assert lines.due_us == 2_600
     assert lines.tick(2_600) == frames("080#", "000#0105")
     assert lines.tick(5_100) == frames("080#")
-    assert (lines.done, lines.notes[-1].mark) == (True, Mark.END)
+    assert (lines.done, lines.notes[-1].mark) == (True, EventType.END)
 
 
 def test_lines_may_go_on_for_ever() -> None:

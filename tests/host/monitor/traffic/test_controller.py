@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.monitor.traffic.controller import Controller
+from tickrig.host.monitor.traffic.controller import ErrorStatistics
 from tickrig.wire.can_error import ErrorFrame, ErrorState
 
 
-def controller(*frames: str) -> Controller:
-    found = Controller()
+def controller(*frames: str) -> ErrorStatistics:
+    found = ErrorStatistics()
     for text in frames:
         found.take(ErrorFrame.parse(text))
     return found

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
-from tickrig.host.monitor.frames.record import Heard, HeardLine
+from tickrig.host.monitor.frames.record import LineRecord, Record
 from tickrig.host.monitor.traffic.line_traffic import LineTraffic, line_table
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.wire.can import CanFrame
@@ -17,7 +17,7 @@ TALK = (
 )
 
 
-def talk() -> list[HeardLine]:
+def talk() -> list[LineRecord]:
     lines = RrcLines("tty")
     return [line for at_us, sent, data in TALK for line in lines.take(at_us, data, to_device=sent)]
 
@@ -51,7 +51,7 @@ def test_noise_has_one_row() -> None:
 
 def test_top_shows_lines_below_frames_and_holds_and_clears_both() -> None:
     model = TopModel()
-    model.take([Heard(0, "can0", CanFrame(0x705, b"\x05")), *talk()])
+    model.take([Record(0, "can0", CanFrame(0x705, b"\x05")), *talk()])
     shown = model.lines(1_000_000, 0, 80, 24)
     assert any(line.startswith("705") for line in shown)
     assert shown[-1].startswith("tty > device")
@@ -66,6 +66,6 @@ def test_top_shows_lines_below_frames_and_holds_and_clears_both() -> None:
 
 def test_a_table_for_paper_has_the_ages_at_the_last_line() -> None:
     model = TopModel()
-    model.take_meant((line, line.decoded) for line in talk())
+    model.take_decoded((line, line.decoded) for line in talk())
     ages = [line.split()[6] for line in model.final(0) if line.startswith("tty < status")]
     assert ages == ["0.0"]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.monitor.heard_log import hear, snapshot
+from tests.host.monitor.record_log import hear, snapshot
 from tickrig.host.monitor.frames.ident import EXTENDED, REMOTE, ident_text, parse_ident
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.wire.can import CanFrame
@@ -40,17 +40,17 @@ def test_what_is_no_identifier_is_said(text: str) -> None:
 
 
 def test_rows_of_two_buses_stand_apart() -> None:
-    heards = hear("0 181#00", "can1") + hear("0 181#01", "can0")
-    assert [(row.channel, str(row.frame)) for row in snapshot(heards).rows] == [
+    records = hear("0 181#00", "can1") + hear("0 181#01", "can0")
+    assert [(row.channel, str(row.frame)) for row in snapshot(records).rows] == [
         ("can0", "181#01"),
         ("can1", "181#00"),
     ]
 
 
 def test_bits_of_a_bus_are_those_of_its_frames() -> None:
-    heards = hear("0 181#00\n0.1 181#00\n0.2 701#05\n0.3 181#FFFF")
-    found = snapshot(heards)
-    frames = [heard.frame for heard in heards if isinstance(heard.frame, CanFrame)]
+    records = hear("0 181#00\n0.1 181#00\n0.2 701#05\n0.3 181#FFFF")
+    found = snapshot(records)
+    frames = [record.frame for record in records if isinstance(record.frame, CanFrame)]
     assert found.buses[0].load.bits == sum(map(frame_bits, frames))
     assert sum(row.bits for row in found.rows) == found.buses[0].load.bits
 
@@ -71,19 +71,19 @@ def test_time_that_goes_back_is_counted_and_is_no_gap() -> None:
 
 def test_a_cleared_model_begins_anew() -> None:
     traffic = Traffic()
-    for heard in hear("0 181#00\n0.1 181#01"):
-        traffic.take(heard)
+    for record in hear("0 181#00\n0.1 181#01"):
+        traffic.take(record)
     traffic.clear()
-    for heard in hear("5 181#00"):
-        traffic.take(heard)
+    for record in hear("5 181#00"):
+        traffic.take(record)
     (row,) = traffic.snapshot().rows
     assert (row.frames, row.first_us) == (1, 5_000_000)
 
 
 def test_a_notch_is_for_all_rows() -> None:
     traffic = Traffic()
-    for heard in hear("0 181#00\n0.1 181#01"):
-        traffic.take(heard)
+    for record in hear("0 181#00\n0.1 181#01"):
+        traffic.take(record)
     traffic.notch()
     assert traffic.snapshot().rows[0].changed.changed == 0
 

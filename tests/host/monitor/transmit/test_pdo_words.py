@@ -8,16 +8,16 @@ import pytest
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
 from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.wire.canopen.datatypes import DataType
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 
 
 @pytest.fixture(scope="module")
-def words() -> PdoWords:
-    return PdoWords({5: read_eds(EPOS, 5), 6: made()})
+def words() -> PdoFrames:
+    return PdoFrames({5: read_eds(EPOS, 5), 6: made()})
 
 
 def made(**values: bytes) -> EdsObjects:
@@ -46,13 +46,13 @@ def made(**values: bytes) -> EdsObjects:
         ("6.rpdo1 torque=2", "206#0000004010"),
     ],
 )
-def test_a_pdo_is_made_of_the_names_of_its_objects(words: PdoWords, text: str, frame: str) -> None:
+def test_a_pdo_is_made_of_the_names_of_its_objects(words: PdoFrames, text: str, frame: str) -> None:
     assert str(words.frame(text)) == frame
 
 
-def test_what_is_sent_by_name_is_decoded_by_the_same_names(words: PdoWords) -> None:
+def test_what_is_sent_by_name_is_decoded_by_the_same_names(words: PdoFrames) -> None:
     frame = words.frame("5.rpdo1 controlword=6 target_velocity=123456")
-    decoded = Decoder({5: EPOS}).take(Heard(0, "can0", frame))
+    decoded = Decoder({5: EPOS}).take(Record(0, "can0", frame))
     assert decoded.kind == "rpdo1"
     assert [(signal.name, signal.value) for signal in decoded.signals] == [
         ("controlword", 6),
@@ -82,7 +82,7 @@ def test_what_is_sent_by_name_is_decoded_by_the_same_names(words: PdoWords) -> N
     ],
 )
 def test_what_cannot_be_sent_is_told_with_what_there_is(
-    words: PdoWords, text: str, said: str
+    words: PdoFrames, text: str, said: str
 ) -> None:
     with pytest.raises(ValueError, match=re.escape(said)):
         words.frame(text)

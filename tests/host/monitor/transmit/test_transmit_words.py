@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.decode.node_memory import read_eds
-from tickrig.host.monitor.transmit.pdo_frames import PdoWords
-from tickrig.host.monitor.transmit.row_text import TransmitWords, parse_words
+from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
+from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
 from tickrig.host.monitor.transmit.transmit_list import TransmitRow, render_transmit
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
@@ -20,17 +20,17 @@ ROWS = (
 
 
 def row(text: str) -> TransmitRow:
-    return parse_words(text).row(PdoWords({5: read_eds(EPOS, 5)}))
+    return parse_row_text(text).row(PdoFrames({5: read_eds(EPOS, 5)}))
 
 
 @pytest.mark.parametrize("text", ROWS)
 def test_a_row_is_written_as_it_was_read(text: str) -> None:
-    assert str(parse_words(text)) == text
+    assert str(parse_row_text(text)) == text
 
 
 @given(
     st.builds(
-        TransmitWords,
+        RowText,
         st.sampled_from(["080#", "5.rpdo1 target=1", "123#R"]),
         st.sampled_from(["", "10ms"]),
         st.sampled_from([(), ("0:0..14",), ("0:0..14", "1:0..3")]),
@@ -38,8 +38,8 @@ def test_a_row_is_written_as_it_was_read(text: str) -> None:
         st.text(max_size=8),
     )
 )
-def test_any_row_comes_back(words: TransmitWords) -> None:
-    assert parse_words(str(words)) == words
+def test_any_row_comes_back(words: RowText) -> None:
+    assert parse_row_text(str(words)) == words
 
 
 def test_a_row_sends_what_it_says() -> None:

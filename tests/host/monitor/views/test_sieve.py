@@ -1,27 +1,27 @@
 from __future__ import annotations
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.filter import parse_filter
-from tickrig.host.monitor.views.trace import Sieve, Trace
+from tickrig.host.monitor.views.trace import DisplayFilter, Trace
 
 TEXT = "1 181#01\n2 705#7F\n3 181#02\n4 20000020#0000000000000000\n5 705#05"
 
 
 def feed(trace: Trace, text: str) -> None:
     decoder = Decoder()
-    for heard in hear(text):
-        trace.take(heard, decoder.take(heard))
+    for record in hear(text):
+        trace.take(record, decoder.take(record))
 
 
-def latest(sieve: Sieve) -> list[tuple[str, int]]:
-    return [(str(one.row.heard.frame), one.frames) for one in sieve.latest()]
+def latest(sieve: DisplayFilter) -> list[tuple[str, int]]:
+    return [(str(one.row.record.frame), one.frames) for one in sieve.latest()]
 
 
 def test_without_a_filter_all_rows_pass() -> None:
     trace = Trace()
     feed(trace, TEXT)
-    sieve = Sieve(trace)
+    sieve = DisplayFilter(trace)
     assert sieve.passed is trace
     assert [count for _, count in latest(sieve)] == [2, 2, 1]
     assert latest(sieve)[0] == ("181#02", 2)
@@ -30,7 +30,7 @@ def test_without_a_filter_all_rows_pass() -> None:
 def test_a_filter_counts_what_came_before_and_after_it() -> None:
     trace = Trace()
     feed(trace, TEXT)
-    sieve = Sieve(trace, parse_filter("heartbeat"))
+    sieve = DisplayFilter(trace, parse_filter("heartbeat"))
     feed(trace, "6 705#04\n7 181#03")
     sieve.follow()
     sieve.follow()
@@ -41,7 +41,7 @@ def test_a_filter_counts_what_came_before_and_after_it() -> None:
 def test_rows_without_a_meaning_pass_no_filter() -> None:
     trace = Trace()
     trace.take(hear("1 181#01")[0])
-    assert latest(Sieve(trace, parse_filter("181"))) == []
+    assert latest(DisplayFilter(trace, parse_filter("181"))) == []
 
 
 def test_a_copy_stays_as_it_is() -> None:
@@ -55,7 +55,7 @@ def test_a_copy_stays_as_it_is() -> None:
 def test_a_cleared_sieve_begins_anew_with_its_trace() -> None:
     trace = Trace()
     feed(trace, TEXT)
-    sieve = Sieve(trace, parse_filter("181"))
+    sieve = DisplayFilter(trace, parse_filter("181"))
     sieve.clear()
     assert (trace.count, sieve.passed.count, latest(sieve)) == (0, 0, [])
     feed(trace, "9 181#09")

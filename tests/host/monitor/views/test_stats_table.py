@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 
-from tests.host.monitor.heard_log import hear, snapshot
+from tests.host.monitor.record_log import hear, snapshot
 from tickrig.host.monitor.views.statistics import (
     bus_json,
     bus_lines,

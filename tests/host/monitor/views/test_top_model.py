@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.top_table import Order
 

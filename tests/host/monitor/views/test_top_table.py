@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.heard_log import hear, snapshot
+from tests.host.monitor.record_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.views.top_table import Order, View, render
 
 LOG = hear(
@@ -43,9 +43,9 @@ def test_the_bits_on_a_small_screen() -> None:
 
 
 def test_bytes_that_the_latest_frame_changed_are_reverse() -> None:
-    heards = hear("0 181#0011\n1 181#0111")
-    assert render(snapshot(heards), View(styled=True))[-1].endswith(" \x1b[7m01\x1b[0m 11")
-    assert render(snapshot(heards), View())[-1].endswith(" 01 11")
+    records = hear("0 181#0011\n1 181#0111")
+    assert render(snapshot(records), View(styled=True))[-1].endswith(" \x1b[7m01\x1b[0m 11")
+    assert render(snapshot(records), View())[-1].endswith(" 01 11")
 
 
 def test_bits_that_the_latest_frame_changed_are_reverse() -> None:
@@ -73,14 +73,14 @@ def test_two_buses_are_named() -> None:
     ],
 )
 def test_rows_are_sorted(order: Order, idents: str) -> None:
-    heards = hear("0 381#\n0.0 281#\n0.1 281#\n0.3 281#\n0.0 181#\n9.0 181#")
-    lines = render(snapshot(heards), View(order))[3:]
+    records = hear("0 381#\n0.0 281#\n0.1 281#\n0.3 281#\n0.0 181#\n9.0 181#")
+    lines = render(snapshot(records), View(order))[3:]
     assert " ".join(line.split()[0] for line in lines) == idents
 
 
 def test_rows_that_are_scrolled_past_are_left_out() -> None:
-    heards = hear("0 181#\n0 182#\n0 183#")
-    assert [line[:3] for line in render(snapshot(heards), View(top=1))[3:]] == ["182", "183"]
+    records = hear("0 181#\n0 182#\n0 183#")
+    assert [line[:3] for line in render(snapshot(records), View(top=1))[3:]] == ["182", "183"]
 
 
 def test_without_frames_there_is_a_head() -> None:
@@ -89,8 +89,8 @@ def test_without_frames_there_is_a_head() -> None:
 
 @given(traffic(), st.integers(1, 200), st.integers(1, 40), st.booleans())
 def test_no_line_leaves_the_screen(
-    heards: list[Heard], width: int, height: int, bits: bool
+    records: list[Record], width: int, height: int, bits: bool
 ) -> None:
-    lines = render(snapshot(heards), View(styled=True, bits=bits), 0, width, height)
+    lines = render(snapshot(records), View(styled=True, bits=bits), 0, width, height)
     assert len(lines) <= height
     assert all(len(re.sub(r"\x1b\[\d*m", "", line)) <= width for line in lines)

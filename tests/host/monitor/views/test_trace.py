@@ -3,14 +3,14 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.heard_log import hear
+from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.views.trace import Trace
 
 
 def trace(text: str, capacity: int = 100) -> Trace:
     found = Trace(capacity)
-    for heard in hear(text):
-        found.take(heard)
+    for record in hear(text):
+        found.take(record)
     return found
 
 
@@ -36,7 +36,7 @@ def test_old_frames_are_given_up_and_numbers_stay() -> None:
     found = trace("\n".join(f"{n} 181#{n:02X}" for n in range(10)), capacity=3)
     assert (found.first, found.count) == (7, 10)
     assert [row.number for row in found.rows(0, 9)] == [7, 8]
-    assert [str(row.heard.frame) for row in found.tail(2)] == ["181#08", "181#09"]
+    assert [str(row.record.frame) for row in found.tail(2)] == ["181#08", "181#09"]
 
 
 def test_a_cleared_trace_begins_with_number_0() -> None:

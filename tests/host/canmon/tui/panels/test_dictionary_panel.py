@@ -14,7 +14,7 @@ def row(desk: Desk[DictionaryPanel], begin: str) -> str:
     return next(line for line in desk.lines() if line[2:].startswith(begin))
 
 
-def heard(*, eds: bool = True) -> RigSession:
+def record(*, eds: bool = True) -> RigSession:
     """A session that has heard the boot-up of our drive."""
     session = RigSession(eds=eds)
     session.run(10_000)
@@ -42,7 +42,7 @@ def test_an_object_is_found_read_and_written() -> None:
         assert row(desk, "1017h:00").split()[-5] == "100"
         assert desk.static("#node").endswith("write 1017h:00: done")
 
-    at_desk(DictionaryPanel, act, session=heard())
+    at_desk(DictionaryPanel, act, session=record())
 
 
 def test_all_that_is_shown_is_read_and_a_watched_object_is_marked() -> None:
@@ -56,7 +56,7 @@ def test_all_that_is_shown_is_read_and_a_watched_object_is_marked() -> None:
         assert desk.lines()[0].startswith("* 1018h:00")
         assert float(desk.lines()[0].split()[-3]) < 1.1 < float(desk.lines()[1].split()[-3])
 
-    panel = at_desk(DictionaryPanel, act, session=heard(), settings={"filter": "1018"})
+    panel = at_desk(DictionaryPanel, act, session=record(), settings={"filter": "1018"})
     assert panel.save() == {"node": 0, "filter": "1018"}
 
 

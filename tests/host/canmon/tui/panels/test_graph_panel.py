@@ -9,8 +9,8 @@ from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.graph.live_graph import Sight
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.graph.live_graph import ViewMode
 from tickrig.wire.can import CanFrame
 
 S = 1_000_000
@@ -25,7 +25,7 @@ def ramp() -> RigSession:
 
 
 def hear(session: RigSession, seconds: range) -> None:
-    frames = [Heard(s * S, "can0", CanFrame(0x181, bytes([s]))) for s in seconds]
+    frames = [Record(s * S, "can0", CanFrame(0x181, bytes([s]))) for s in seconds]
     meant = session.model.take(frames)
     for task in session.tasks:
         task.tick(0, meant)
@@ -60,9 +60,9 @@ def test_keys_and_mouse_change_what_is_seen() -> None:
         desk.lines()
         assert span_s(desk) == (16, 20)
         await desk.press("plus", "minus", "minus")
-        assert (span_s(desk), desk.panel.graph.sight) == ((12, 20), Sight.LIVE)
+        assert (span_s(desk), desk.panel.graph.mode) == ((12, 20), ViewMode.LIVE)
         await desk.press("comma")
-        assert (span_s(desk), desk.panel.graph.sight) == ((10, 18), Sight.HELD)
+        assert (span_s(desk), desk.panel.graph.mode) == ((10, 18), ViewMode.HELD)
         await desk.press("full_stop", "right")
         assert (span_s(desk), desk.panel.graph.cursor_us) == ((12, 20), 16_080_000)
         await desk.press("shift+right", "left", "shift+left")
@@ -71,7 +71,7 @@ def test_keys_and_mouse_change_what_is_seen() -> None:
         await desk.press("h")
         assert span_s(desk) == (1, 20)
         await desk.press("space", "l")
-        assert desk.panel.graph.sight is Sight.LIVE
+        assert desk.panel.graph.mode is ViewMode.LIVE
         await desk.click("PictureView", (10, 3))
         assert desk.panel.graph.cursor_us == 12 * S
 
@@ -123,4 +123,4 @@ def test_a_setting_that_is_none_is_refused(settings: dict[str, Any], path: objec
 def test_of_a_log_all_is_seen_at_first() -> None:
     session = RigSession()
     session.source.live = False
-    assert GraphPanel(session).graph.sight is Sight.ALL
+    assert GraphPanel(session).graph.mode is ViewMode.ALL

@@ -22,12 +22,12 @@ class Echo:
 
     def __init__(self, channel: str = "") -> None:
         self.channel, self.due_us = channel, NEVER
-        self.heard: list[tuple[str, str, bool]] = []
+        self.record: list[tuple[str, str, bool]] = []
         self.stopped = False
 
-    def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
-        self.heard += [(one.channel, str(one.frame), one.sent) for one, _ in heard]
-        return tuple(CanFrame.parse("700#") for one, _ in heard if not one.sent)
+    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+        self.record += [(one.channel, str(one.frame), one.sent) for one, _ in records]
+        return tuple(CanFrame.parse("700#") for one, _ in records if not one.sent)
 
     def stop(self) -> None:
         self.stopped = True
@@ -59,7 +59,7 @@ def test_what_is_sent_is_heard_as_sent(wire: Wire, session: Session) -> None:
     hear(session, wire, "181#01")
     assert wire.next() == "700#"
     session.step()
-    assert task.heard == [(wire.name, "181#01", False), (wire.name, "700#", True)]
+    assert task.record == [(wire.name, "181#01", False), (wire.name, "700#", True)]
     assert (session.sent, session.model.frames) == (1, 2)
 
 
@@ -82,7 +82,7 @@ def test_a_task_that_is_due_is_called_without_a_frame(session: Session) -> None:
     class Alarm(Echo):
         calls = 0
 
-        def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
             assert now_us >= self.due_us
             self.calls, self.due_us = self.calls + 1, NEVER
             return ()
@@ -151,7 +151,7 @@ def test_the_thread_reads_until_it_is_closed(wire: Wire, session: Session) -> No
 
 def test_what_a_task_raises_is_raised_by_check(session: Session) -> None:
     class Broken(Echo):
-        def tick(self, now_us: int, heard: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
             raise ZeroDivisionError
 
     task = Broken()
@@ -166,7 +166,7 @@ def test_a_log_has_an_end_and_no_bus_to_send_on() -> None:
     session = drive_session()
     session.arm()
     assert (session.model.frames, session.model.ended, session.armed) == (134, True, False)
-    assert session.model.now_us == session.model.trace.tail(1)[0].heard.at_us
+    assert session.model.now_us == session.model.trace.tail(1)[0].record.at_us
     session.close()
 
 

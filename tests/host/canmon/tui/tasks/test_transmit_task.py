@@ -4,7 +4,7 @@ import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.monitor.transmit.row_text import parse_words
+from tickrig.host.monitor.transmit.row_text import parse_row_text
 
 
 class Sender:
@@ -15,7 +15,7 @@ class Sender:
         self.task = TransmitTask(self.session.model.eds)
         self.session.tasks.append(self.task)
         for row in rows:
-            self.task.add(parse_words(row))
+            self.task.add(parse_row_text(row))
 
     def enable(self, number: int) -> None:
         self.task.enable(number, self.session.now_us, armed=self.session.armed)
@@ -70,7 +70,7 @@ def test_a_row_is_changed_and_taken_out() -> None:
     sender = Sender("080# --every 10ms", "100#00")
     sender.session.arm()
     sender.enable(0)
-    sender.task.change(0, parse_words("081#"))
+    sender.task.change(0, parse_row_text("081#"))
     assert sender.sent(100_000) == []
     sender.task.remove(1)
     sender.once(0)
@@ -80,5 +80,5 @@ def test_a_row_is_changed_and_taken_out() -> None:
 def test_a_change_that_is_refused_leaves_the_row() -> None:
     sender = Sender("080#")
     with pytest.raises(ValueError, match="not a frame"):
-        sender.task.change(0, parse_words("xyz#"))
+        sender.task.change(0, parse_row_text("xyz#"))
     assert [str(words) for words in sender.task.words] == ["080#"]

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.logs.reading.test_log_lines import FRAMES
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogFormatError, log_format
 from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
 from tickrig.host.monitor.logs.writing.log_writer import write_log
@@ -62,11 +62,11 @@ def log(folder: Path, name: str, text: str) -> Path:
     return path
 
 
-def heards(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> list[Heard]:
+def records(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> list[Record]:
     at_us, found = START_US, []
     for gap_us, frame, sent in gaps:
         at_us += gap_us
-        found.append(Heard(at_us, "can0", frame, sent))
+        found.append(Record(at_us, "can0", frame, sent))
     return found
 
 
@@ -74,36 +74,36 @@ def heards(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> list[Heard]:
 def test_blf_holds_all_there_is(gaps: list[tuple[int, CanFrame | ErrorFrame, bool]]) -> None:
     with TemporaryDirectory() as folder:
         writer = write_log(path := Path(folder, "all.blf"))
-        for heard in heards(gaps):
-            writer.write(heard)
+        for record in records(gaps):
+            writer.write(record)
         writer.close()
-        kept = [one._replace(sent=False) if error(one) else one for one in heards(gaps)]
+        kept = [one._replace(sent=False) if error(one) else one for one in records(gaps)]
         assert list(read_log(path)) == kept
 
 
-def error(heard: Heard) -> bool:
+def error(record: Record) -> bool:
     """BLF does not say who made an error frame."""
-    return isinstance(heard.frame, ErrorFrame)
+    return isinstance(record.frame, ErrorFrame)
 
 
 @pytest.mark.parametrize("name", ["run.asc", "run.asc.gz", "run.trc", "run.csv"])
 def test_text_formats_hold_data_frames(name: str, tmp_path: Path) -> None:
     frames = [
-        Heard(START_US, "can0", CanFrame.parse("705#7F")),
-        Heard(START_US + 1, "can1", CanFrame.parse("00000605#0011223344556677")),
-        Heard(START_US + 2_000_000, "can0", CanFrame.parse("123#")),
+        Record(START_US, "can0", CanFrame.parse("705#7F")),
+        Record(START_US + 1, "can1", CanFrame.parse("00000605#0011223344556677")),
+        Record(START_US + 2_000_000, "can0", CanFrame.parse("123#")),
     ]
     path = tmp_path / name
     writer = write_log(path)
-    for heard in frames:
-        writer.write(heard)
+    for record in frames:
+        writer.write(record)
     writer.close()
     writer.close()
     read = list(read_log(path))
-    assert [heard.frame for heard in read] == [heard.frame for heard in frames]
-    assert [heard.at_us for heard in read] == [heard.at_us for heard in frames]
+    assert [record.frame for record in read] == [record.frame for record in frames]
+    assert [record.at_us for record in read] == [record.at_us for record in frames]
     channels = ["can0"] * 3 if name == "run.csv" else ["can0", "can1", "can0"]
-    assert [heard.channel for heard in read] == channels
+    assert [record.channel for record in read] == channels
 
 
 TIMES = st.one_of(
@@ -116,9 +116,9 @@ TIMES = st.one_of(
 def through(folder: Path, name: str, times: list[int]) -> list[int]:
     writer = write_log(path := folder / name)
     for at_us in times:
-        writer.write(Heard(at_us, "can0", CanFrame.parse("705#7F")))
+        writer.write(Record(at_us, "can0", CanFrame.parse("705#7F")))
     writer.close()
-    return [heard.at_us for heard in read_log(path)]
+    return [record.at_us for record in read_log(path)]
 
 
 @given(times=st.lists(TIMES, min_size=1, max_size=6))
@@ -166,18 +166,18 @@ def test_an_hour_that_the_clock_shows_twice_is_kept_in_asc(tmp_path: Path) -> No
 def test_frames_before_a_blf_log_begins_are_said(tmp_path: Path) -> None:
     writer = write_log(tmp_path / "run.blf")
     for at_us in (START_US, START_US - 100_000, START_US - 2_000_000):
-        writer.write(Heard(at_us, "can0", CanFrame.parse("705#7F")))
+        writer.write(Record(at_us, "can0", CanFrame.parse("705#7F")))
     writer.close()
     assert writer.words() == ["run.blf: 1 frames from before its start moved there"]
     begin_us = START_US // 1_000_000 * 1_000_000
-    read = [heard.at_us for heard in read_log(tmp_path / "run.blf")]
+    read = [record.at_us for record in read_log(tmp_path / "run.blf")]
     assert read == [START_US, START_US - 100_000, begin_us]
 
 
 @pytest.mark.parametrize("name", ["run.asc", "run.blf", "run.trc"])
 def test_frames_of_no_date_are_left_out_and_said(name: str, tmp_path: Path) -> None:
     writer = write_log(tmp_path / name)
-    writer.write(Heard(999_999_999_999_000_000, "can0", CanFrame.parse("705#7F")))
+    writer.write(Record(999_999_999_999_000_000, "can0", CanFrame.parse("705#7F")))
     writer.close()
     assert writer.words() == [f"{name}: 1 frames of the year 2500 and later left out"]
 
@@ -188,13 +188,13 @@ def test_what_is_no_time_is_no_frame(name: str, stamp: str, tmp_path: Path) -> N
     text = CSV.replace("1.5", stamp) if name == "run.csv" else TRC.replace("1841.0", stamp)
     text = text.replace(";$STARTTIME=43474.9876543210", ";$STARTTIME=25569").replace("1e12", "1e15")
     reader = read_log(log(tmp_path, name, text))
-    assert [str(heard.frame) for heard in reader] == ["00000605#0102"]
+    assert [str(record.frame) for record in reader] == ["00000605#0102"]
     assert reader.tally.unread == 2
 
 
 def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.asc", ASC))
-    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102", "123#R5"]
+    assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102", "123#R5"]
     assert reader.bad_lines.first == [(8, "   0.000300 1  705             Rx   d 1 ZZ")]
     assert reader.tally.passed_over == {"lines with other events": 1, "CAN FD frames": 1}
 
@@ -224,7 +224,7 @@ def test_a_line_that_its_reader_passes_over_is_bad_unless_it_is_an_event(
 
 def test_bad_lines_of_trc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.trc", TRC))
-    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
+    assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102"]
     assert [number for number, _ in reader.bad_lines.first] == [6]
     assert reader.tally.passed_over == {"lines with other events": 1}
 
@@ -238,7 +238,7 @@ def test_a_trc_log_whose_head_does_not_tell_the_columns_is_none(tmp_path: Path) 
 
 def test_bad_lines_of_csv_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.csv", CSV))
-    assert [str(heard.frame) for heard in reader] == ["705#7F", "00000605#0102"]
+    assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102"]
     assert reader.bad_lines.first == [(3, "oops")]
 
 
@@ -322,12 +322,12 @@ def test_noise_never_raises_anything_else(noise: bytes) -> None:
 def test_mf4_holds_all_there_is(tmp_path: Path) -> None:
     words = ("705#7F", "00000605#0011223344556677", "123#R5", "123#")
     frames = [
-        *(Heard(START_US + 10 * n, "can1", CanFrame.parse(word)) for n, word in enumerate(words)),
-        Heard(START_US + 2_000_000, "can0", ErrorFrame(0x88, bytes(8))),
+        *(Record(START_US + 10 * n, "can1", CanFrame.parse(word)) for n, word in enumerate(words)),
+        Record(START_US + 2_000_000, "can0", ErrorFrame(0x88, bytes(8))),
     ]
     writer = write_log(tmp_path / "run.mf4")
-    for heard in frames:
-        writer.write(heard)
+    for record in frames:
+        writer.write(record)
     writer.close()
     assert list(read_log(tmp_path / "run.mf4")) == frames
 

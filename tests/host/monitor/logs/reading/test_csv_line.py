@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.logs.reading.test_log_lines import FRAMES
 from tickrig.host.canmon.output.printer import csv_printer
-from tickrig.host.monitor.frames.record import Heard
-from tickrig.host.monitor.logs.can_record import to_heard
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.notation import DUMP_HEADER
 from tickrig.host.monitor.logs.reading.log_lines import LogLines
 from tickrig.host.monitor.logs.reading.log_reader import read_log
@@ -20,36 +20,36 @@ from tickrig.host.monitor.logs.writing.log_writer import write_log
 from tickrig.wire.can import CanFrame
 
 HEARDS = st.lists(
-    st.builds(Heard, st.integers(0, 4 * 10**15), st.just("can0"), FRAMES, st.booleans())
+    st.builds(Record, st.integers(0, 4 * 10**15), st.just("can0"), FRAMES, st.booleans())
 )
 
 
-@given(heards=HEARDS)
-def test_csv_holds_a_bus_with_who_sent_and_python_can_reads_it(heards: list[Heard]) -> None:
+@given(records=HEARDS)
+def test_csv_holds_a_bus_with_who_sent_and_python_can_reads_it(records: list[Record]) -> None:
     with TemporaryDirectory() as folder:
         writer = write_log(path := Path(folder, "run.csv"))
-        for heard in heards:
-            writer.write(heard)
+        for record in records:
+            writer.write(record)
         writer.close()
         reader = read_log(path)
-        assert (list(reader), reader.tally) == (heards, Tally())
+        assert (list(reader), reader.tally) == (records, Tally())
         with can.CSVReader(path) as foreign:
-            theirs = [to_heard(message, "can0", Tally()) for message in foreign]
-    assert theirs == [heard._replace(sent=False) for heard in heards]
+            theirs = [to_record(message, "can0", Tally()) for message in foreign]
+    assert theirs == [record._replace(sent=False) for record in records]
 
 
-@given(heards=HEARDS)
-def test_what_dump_prints_as_csv_is_read_again(heards: list[Heard]) -> None:
-    rows = [DUMP_HEADER, *(csv_printer(heard, None) for heard in heards)]
+@given(records=HEARDS)
+def test_what_dump_prints_as_csv_is_read_again(records: list[Record]) -> None:
+    rows = [DUMP_HEADER, *(csv_printer(record, None) for record in records)]
     lines = LogLines()
-    assert lines.push("".join(f"{row}\n" for row in rows).encode()) == heards
+    assert lines.push("".join(f"{row}\n" for row in rows).encode()) == records
     assert lines.tally == Tally()
 
 
 def test_buses_that_become_one_are_said(tmp_path: Path) -> None:
     writer = write_log(tmp_path / "run.csv")
     for name in ("can0", "can1"):
-        writer.write(Heard(0, name, CanFrame(1)))
+        writer.write(Record(0, name, CanFrame(1)))
     writer.close()
     assert writer.words() == ["run.csv: csv does not tell buses apart: can0, can1"]
 

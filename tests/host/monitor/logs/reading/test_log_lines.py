@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import json_line
 from tickrig.host.monitor.logs.reading.log_lines import (
     LONGEST,
@@ -26,7 +26,7 @@ FRAMES = st.one_of(
     st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8)),
 )
 HEARDS = st.builds(
-    Heard,
+    Record,
     st.integers(0, 4_000_000_000_000_000),
     st.from_regex(r"[!-~]{1,16}", fullmatch=True),
     FRAMES,
@@ -34,17 +34,17 @@ HEARDS = st.builds(
 )
 
 
-def read(line: str) -> tuple[Heard | None, Tally]:
+def read(line: str) -> tuple[Record | None, Tally]:
     tally = Tally()
     return parse_log_line(line, 1, tally), tally
 
 
 @given(st.lists(HEARDS), st.booleans())
-def test_what_is_written_is_read_again(heards: list[Heard], as_json: bool) -> None:
+def test_what_is_written_is_read_again(records: list[Record], as_json: bool) -> None:
     write = json_line if as_json else log_line
     lines = LogLines()
-    text = "".join(f"{write(heard)}\n" for heard in heards)
-    assert lines.push(text.encode()) == heards
+    text = "".join(f"{write(record)}\n" for record in records)
+    assert lines.push(text.encode()) == records
     assert lines.tally == Tally()
 
 
@@ -52,7 +52,7 @@ def test_what_is_written_is_read_again(heards: list[Heard], as_json: bool) -> No
 def test_noise_in_pieces_is_counted_as_in_one(pieces: list[bytes]) -> None:
     one, many = LogLines(), LogLines()
     whole = one.push(b"".join(pieces)) + one.finish()
-    assert [heard for piece in pieces for heard in many.push(piece)] + many.finish() == whole
+    assert [record for piece in pieces for record in many.push(piece)] + many.finish() == whole
     assert many.tally == one.tally
 
 
@@ -70,9 +70,9 @@ def test_noise_in_pieces_is_counted_as_in_one(pieces: list[bytes]) -> None:
     ],
 )
 def test_lines_of_other_programs_are_read(line: str, at_us: int, frame: str) -> None:
-    heard, tally = read(line)
-    assert heard is not None
-    assert (heard.at_us, str(heard.frame), tally) == (at_us, frame, Tally())
+    record, tally = read(line)
+    assert record is not None
+    assert (record.at_us, str(record.frame), tally) == (at_us, frame, Tally())
 
 
 @pytest.mark.parametrize("line", ["", "  ", "# made by hand", "; note", "// note", "\r"])
@@ -88,8 +88,8 @@ def test_empty_lines_and_comments_are_no_fault(line: str) -> None:
     ],
 )
 def test_frames_that_classic_can_does_not_have_are_passed_over(line: str, kind: str) -> None:
-    heard, tally = read(line)
-    assert (heard, tally.passed_over, tally.bad_lines.count) == (None, {kind: 1}, 0)
+    record, tally = read(line)
+    assert (record, tally.passed_over, tally.bad_lines.count) == (None, {kind: 1}, 0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from tests.host.monitor.logs.reading.test_log_lines import FRAMES
 from tickrig.host.canmon.verbs.info import read_head
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.reading.log_lines import LogLines, parse_log_line
 from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
@@ -41,32 +41,32 @@ READ = [
 GAPS = st.lists(st.tuples(st.integers(0, 5_000_000), FRAMES, st.booleans()), min_size=1, max_size=9)
 
 
-def read(text: str) -> tuple[list[Heard], Tally]:
+def read(text: str) -> tuple[list[Record], Tally]:
     lines = LogLines()
     return lines.push(text.encode()) + lines.finish(), lines.tally
 
 
-def heards(text: list[str]) -> list[Heard]:
+def records(text: list[str]) -> list[Record]:
     found = [parse_log_line(line, 1, Tally()) for line in text]
-    return [heard for heard in found if heard]
+    return [record for record in found if record]
 
 
 def test_what_candump_shows_is_read_as_its_log() -> None:
     frames, tally = read(CANDUMP)
-    assert frames == heards(READ)
+    assert frames == records(READ)
     assert (tally.passed_over, tally.bad_lines.count) == ({"CAN FD frames": 1}, 0)
 
 
 def test_without_stamps_frames_have_no_time_and_that_is_said() -> None:
     text = "".join(f"{line[22:]}\n" for line in CANDUMP.splitlines() if line.startswith(" "))
     frames, tally = read(text)
-    assert frames == [heard._replace(at_us=0) for heard in heards(READ)]
+    assert frames == [record._replace(at_us=0) for record in records(READ)]
     assert tally.words("run.txt")[-1] == "run.txt: 6 frames have no time"
 
 
 def test_colours_are_passed_over() -> None:
     frames, _ = read(" \x1b[31m(001.5)  can0\x1b[0m  705   [1]  \x1b[1m7F\x1b[0m\n")
-    assert frames == heards(["(1.5) can0 705#7F"])
+    assert frames == records(["(1.5) can0 705#7F"])
 
 
 @given(gaps=GAPS, stamp=st.sampled_from(list(Stamp)), text=st.sampled_from(["", "5 nmt FF 00"]))
@@ -76,9 +76,9 @@ def test_what_dump_shows_is_read_again(
     at_us, frames = 1_700_000_000_000_000, []
     for gap_us, frame, sent in gaps:
         at_us += gap_us
-        frames.append(Heard(at_us, "can0", frame, sent))
+        frames.append(Record(at_us, "can0", frame, sent))
     lines = DumpLines(stamp, extra=True)
-    found, tally = read("".join(f"{lines.line(heard, text)}\n" for heard in frames))
+    found, tally = read("".join(f"{lines.line(record, text)}\n" for record in frames))
     begin_us = frames[0].at_us if stamp in (Stamp.ZERO, Stamp.DELTA) else 0
     assert [one._replace(at_us=0) for one in found] == [one._replace(at_us=0) for one in frames]
     assert (tally.bad_lines.count, tally.untimed) == (0, len(frames) * (not stamp))

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from tickrig.host.monitor.frames.record import Heard
+from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.decode.decoder import Decoder
     from tickrig.host.monitor.decode.filter import Filter
     from tickrig.host.monitor.decode.filter_terms import MissingSignals
-    from tickrig.host.monitor.frames.record import Listened
+    from tickrig.host.monitor.frames.record import AnyRecord
 
-Meant = tuple["Listened", "Decoded | None"]
+Meant = tuple["AnyRecord", "Decoded | None"]
 """A frame or a line of a serial port, and what it means where somebody asked."""
 
 
-class Meaning:
+class FilteredDecoder:
     """Decodes frames and passes on those that are wanted.
 
     Args:
@@ -36,18 +36,18 @@ class Meaning:
 
             self._missing = MissingSignals(wanted.signals)
 
-    def take(self, heards: Sequence[Listened]) -> Iterator[Meant]:
+    def take(self, records: Sequence[AnyRecord]) -> Iterator[Meant]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
         decoder, wanted, missing = self._decoder, self._wanted, self._missing
-        for heard in heards:
+        for record in records:
             if decoder is None:
                 decoded = None
             else:
-                decoded = decoder.take(heard) if isinstance(heard, Heard) else heard.decoded
+                decoded = decoder.take(record) if isinstance(record, Record) else record.decoded
             if missing and decoded is not None:
                 missing.take(decoded)
-            if wanted is None or (decoded is not None and wanted.matches(heard, decoded)):
-                yield heard, decoded
+            if wanted is None or (decoded is not None and wanted.matches(record, decoded)):
+                yield record, decoded
 
     def words(self) -> list[str]:
         """Say which signals the filter asks for that never came, one line each."""

@@ -41,7 +41,7 @@ _FACTORS: Final = {"k": 1_000, "M": 1_000_000}
 
 
 @dataclass(frozen=True, slots=True)
-class FileWord:
+class FileSpec:
     """A log file, and which frames of it are wanted."""
 
     path: Path
@@ -49,7 +49,7 @@ class FileWord:
 
 
 @dataclass(frozen=True, slots=True)
-class BusWord:
+class BusSpec:
     """A bus, and which frames of it are wanted; what is None the options say."""
 
     interface: str | None = None
@@ -59,7 +59,7 @@ class BusWord:
 
 
 @dataclass(frozen=True, slots=True)
-class LineWord:
+class LineSpec:
     """A serial port, and the protocol of its line.
 
     Attributes:
@@ -75,7 +75,7 @@ class LineWord:
     from_host: bool = False
 
 
-def parse_source(word: str) -> FileWord | BusWord | LineWord | None:
+def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
     """Read a SOURCE word; None is standard input.
 
     Raises:
@@ -85,7 +85,7 @@ def parse_source(word: str) -> FileWord | BusWord | LineWord | None:
         return None
     if line := _LINE.fullmatch(word):
         baud = _bit_s(line["baud"]) if line["baud"] else None
-        return LineWord(line["port"], baud, line["protocol"], bool(line["host"]))
+        return LineSpec(line["port"], baud, line["protocol"], bool(line["host"]))
     if Path(word).is_file():
         return _file(word, "")
     name, _, filters = word.partition(",")
@@ -97,15 +97,15 @@ def parse_source(word: str) -> FileWord | BusWord | LineWord | None:
     return _bus(name, filters)
 
 
-def _file(name: str, filters: str) -> FileWord:
+def _file(name: str, filters: str) -> FileSpec:
     try:
         log_format(Path(name))
     except LogFormatError as error:
         raise Refused(str(error)) from None
-    return FileWord(Path(name), _chosen(filters))
+    return FileSpec(Path(name), _chosen(filters))
 
 
-def _bus(name: str, filters: str) -> BusWord:
+def _bus(name: str, filters: str) -> BusSpec:
     match = _BUS.fullmatch(name)
     if match is None or not name:
         raise Refused(f"SOURCE {name!r} is not a bus as can0 or slcan:/dev/ttyACM0@500k, nor a log")
@@ -114,7 +114,7 @@ def _bus(name: str, filters: str) -> BusWord:
         interface, channel = name, ""
     if interface == "udp":
         channel = channel or UDP_GROUP
-    return BusWord(
+    return BusSpec(
         INTERFACES.get(interface, interface),
         channel or None,
         _bit_s(bitrate) if bitrate else None,

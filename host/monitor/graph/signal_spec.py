@@ -198,7 +198,7 @@ class ObjectName:
 
 
 @dataclass(frozen=True, slots=True)
-class SignalWord:
+class SignalSpec:
     """A curve that is asked for.
 
     Attributes:
@@ -214,7 +214,7 @@ class SignalWord:
     text: str
 
 
-def parse_signal(text: str) -> SignalWord:
+def parse_signal(text: str) -> SignalSpec:
     """Read `[LABEL=]SIGNAL[@AXIS]`: a slice as 181[2:6]s*0.001, or an object as 3.position.
 
     Raises:
@@ -225,7 +225,7 @@ def parse_signal(text: str) -> SignalWord:
         raise ValueError(f"{text!r} is not [LABEL=]SIGNAL[@AXIS], as speed=181[2:6]s*0.001@2")
     label, signal, axis = match.groups()
     source = parse_slice(signal) if "[" in signal else _object(signal)
-    return SignalWord(label or "", source, int(axis or 1), signal)
+    return SignalSpec(label or "", source, int(axis or 1), signal)
 
 
 def _object(text: str) -> ObjectName:
