@@ -5,16 +5,16 @@ from __future__ import annotations
 from tickrig.emulators.rh3.cart.convoy import Convoy
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.game_pad import GamePad
-from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.pad import StickPosition
 
 SECOND_US = 1_000_000
-PUSHES = (Hand(forward=1.0), Hand(turn=1.0), Hand())
+PUSHES = (StickPosition(forward=1.0), StickPosition(turn=1.0), StickPosition())
 
 
 class Program:
     """Pushes forward for 5 s, then turns to the left for 5 s."""
 
-    def poll(self, now_us: int, /) -> Hand:
+    def poll(self, now_us: int, /) -> StickPosition:
         """Return where it pushes."""
         return PUSHES[min(2, now_us // (5 * SECOND_US))]
 

@@ -2,7 +2,7 @@
 
     python examples/rh3_goto.py
 
-Six components run in closed loop over an emulated base; `SerialRide` in place of
+Six components run in closed loop over an emulated base; `SerialBaseConnection` in place of
 `ClosedLoop` drives a real one.
 """
 
@@ -21,9 +21,9 @@ def main() -> None:
     for set_id in ("default", "tuned"):
         loop = ClosedLoop(BaseParameters(noise=0.05, seed=7))
         start(loop, set_id)
-        journey = drive(loop, [GOAL])
+        run = drive(loop, [GOAL])
         thought = loop.chain.odometry.pose
-        print(f"{set_id}: {journey.reached_s:.2f} s, {journey.error_m * 1e3:.1f} mm off the goal;")
+        print(f"{set_id}: {run.reached_s:.2f} s, {run.error_m * 1e3:.1f} mm off the goal;")
         print(f"  odometry thinks {thought.distance(GOAL) * 1e3:.1f} mm")
 
 

@@ -8,8 +8,8 @@ from typing import Final, Protocol
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.journey import Journey, Sample
 from tickrig.host.motion.least_time import least_time_s
+from tickrig.host.motion.motion_run import MotionRun, Sample
 from tickrig.wire.rtc_types.rh2 import RunMode
 
 PERIOD_US: Final = 20_000
@@ -23,10 +23,10 @@ PATIENCE: Final = 3
 """Times the least time that a way may take, and half a minute."""
 PATIENCE_S: Final = 30
 
-Watch = Callable[[Sample], None]
+OnSample = Callable[[Sample], None]
 
 
-class Ride(Protocol):
+class BaseConnection(Protocol):
     """A cart with its components, in virtual or real time."""
 
     @property
@@ -48,32 +48,32 @@ class Ride(Protocol):
         """Go on to a time."""
 
 
-def start(ride: Ride, set_id: str = "default") -> None:
+def start(connection: BaseConnection, set_id: str = "default") -> None:
     """Let a configuration set hold, and activate all components."""
-    ride.chain.use(set_id)
-    ride.chain.activate()
-    ride.run_to(ride.now_us + SETTLE_US)
+    connection.chain.use(set_id)
+    connection.chain.activate()
+    connection.run_to(connection.now_us + SETTLE_US)
 
 
-def stop(ride: Ride) -> None:
+def stop(connection: BaseConnection) -> None:
     """Deactivate all components; RefHardRh3 stops the base."""
-    ride.chain.deactivate()
-    ride.run_to(ride.now_us + 2 * PERIOD_US)
+    connection.chain.deactivate()
+    connection.run_to(connection.now_us + 2 * PERIOD_US)
 
 
 def drive(
-    ride: Ride,
+    connection: BaseConnection,
     points: Sequence[Pose],
-    watch: Watch = lambda sample: None,
+    watch: OnSample = lambda sample: None,
     timeout_us: int | None = None,
-) -> Journey:
+) -> MotionRun:
     """Let a cart go to a goal, or along a path of several points.
 
     It ends half a second after the goal is reached, when a component is in Error, or with
     the time-out.
 
     Args:
-        ride: its components are active.
+        connection: its components are active.
         points: one is a goal.
         watch: told each sample.
         timeout_us: when to give up; three times the least time and half a minute if left out.
@@ -81,34 +81,34 @@ def drive(
     Raises:
         ValueError: no point, or a number that is none.
     """
-    entered, start_us = ride.chain.position_input, ride.now_us
+    entered, start_us = connection.chain.position_input, connection.now_us
     finished = entered.finished
     entered.replace(*points)
-    journey = Journey(points[-1])
-    until_us = start_us + (timeout_us or _patience_us(ride, points))
-    while ride.now_us < until_us:
-        ride.run_to(min(ride.now_us + PERIOD_US, until_us))
-        journey.samples.append(sample(ride, (ride.now_us - start_us) / 1e6))
-        watch(journey.samples[-1])
-        if len(journey.samples) % LOOK == 0 and ride.chain.in_error:
+    run = MotionRun(points[-1])
+    until_us = start_us + (timeout_us or _patience_us(connection, points))
+    while connection.now_us < until_us:
+        connection.run_to(min(connection.now_us + PERIOD_US, until_us))
+        run.samples.append(sample(connection, (connection.now_us - start_us) / 1e6))
+        watch(run.samples[-1])
+        if len(run.samples) % LOOK == 0 and connection.chain.in_error:
             break
-        if entered.finished > finished and journey.reached_s is None:
-            journey.reached_s = journey.duration_s
-            until_us = ride.now_us + SETTLE_US
-    return journey
+        if entered.finished > finished and run.reached_s is None:
+            run.reached_s = run.duration_s
+            until_us = connection.now_us + SETTLE_US
+    return run
 
 
-def _patience_us(ride: Ride, points: Sequence[Pose]) -> int:
-    least_s = least_time_s(plan(ride.chain.odometry.pose, points))
+def _patience_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
+    least_s = least_time_s(plan(connection.chain.odometry.pose, points))
     return round((PATIENCE * least_s + PATIENCE_S) * 1e6)
 
 
-def sample(ride: Ride, time_s: float) -> Sample:
+def sample(connection: BaseConnection, time_s: float) -> Sample:
     """Return what a cart does now."""
-    follower = ride.chain.path_follower
+    follower = connection.chain.path_follower
     path = follower.path
     line = Pose(path.x, path.y, path.theta) if path.type == RunMode.LINEFOLLOW else None
-    return Sample(time_s, ride.pose, follower.twist, line)
+    return Sample(time_s, connection.pose, follower.twist, line)
 
 
 def expect(chain: MotionChain, response_s: float) -> None:

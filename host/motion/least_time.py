@@ -11,7 +11,7 @@ from tickrig.host.motion.geometry import Pose, wrap
 
 
 @dataclass(frozen=True, slots=True)
-class Abilities:
+class MotionLimits:
     """What a cart can do at most: m/s, rad/s, m/s2, rad/s2; as the default set has it."""
 
     v: float = 0.3
@@ -31,13 +31,13 @@ def way_time_s(way: float, speed: float, acceleration: float) -> float:
     return way / speed + speed / acceleration
 
 
-def least_time_s(relays: Sequence[Pose], can: Abilities | None = None) -> float:
+def least_time_s(relays: Sequence[Pose], can: MotionLimits | None = None) -> float:
     """Return the least time along a list of `omni_to_2wd.plan`.
 
     >>> round(least_time_s([Pose(), Pose(), Pose(3.0), Pose(3.0, 0.0, 0.3)]), 2)
     12.06
     """
-    can = can or Abilities()
+    can = can or MotionLimits()
     return sum(
         way_time_s(here.distance(there), can.v, can.acceleration)
         + way_time_s(abs(wrap(there.heading - here.heading)), can.w, can.angular_acceleration)

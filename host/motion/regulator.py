@@ -9,7 +9,7 @@ from math import atan2, copysign, hypot, pi
 from tickrig.host.motion.geometry import Pose, Twist, clip, wrap
 
 
-class Law(StrEnum):
+class ControlLaw(StrEnum):
     """How the angular velocity goes on from one command to the next."""
 
     IMPLICIT = "implicit"  # stable for any step; the designed dynamics
@@ -36,7 +36,7 @@ class Regulator:
     most_offset: float
     c1: float
     step_s: float
-    law: Law = Law.IMPLICIT
+    law: ControlLaw = ControlLaw.IMPLICIT
 
     def follow_line(self, line: Pose, pose: Pose, v: float, before: Twist) -> Twist:
         """Return the command along a line at a speed, positive or negative."""
@@ -55,9 +55,9 @@ class Regulator:
 
     def _steer(self, d: float, q: float, v: float, before: Twist, w_ff: float = 0.0) -> Twist:
         h, k3 = self.step_s, self.k3
-        way = copysign(1.0, v if self.law is Law.IMPLICIT else before.v)
+        way = copysign(1.0, v if self.law is ControlLaw.IMPLICIT else before.v)
         pull = way * self.k1 * clip(d, self.most_offset) + self.k2 * q
-        if self.law is Law.EXPLICIT:
+        if self.law is ControlLaw.EXPLICIT:
             return Twist(v, before.w - h * (pull + k3 * (before.w - w_ff)))
         w = (before.w + h * k3 * w_ff - h * pull) / (1 + h * k3)
         slower = abs(v) - self.c1 * abs(w - w_ff)

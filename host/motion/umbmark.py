@@ -12,7 +12,7 @@ from math import hypot, pi, sin
 from typing import Final
 
 from tickrig.host.motion.dead_reckoning import Wheels
-from tickrig.host.motion.drive import Ride, Watch, drive
+from tickrig.host.motion.drive import BaseConnection, OnSample, drive
 from tickrig.host.motion.geometry import Pose
 
 SIDE_M: Final = 4.0
@@ -71,11 +71,11 @@ def square(*, clockwise: bool, side_m: float = SIDE_M) -> list[Pose]:
 
 
 def run_umbmark(
-    begin: Callable[[int], Ride],
-    true_pose: Callable[[Ride], Pose] = lambda ride: ride.pose,
+    begin: Callable[[int], BaseConnection],
+    true_pose: Callable[[BaseConnection], Pose] = lambda connection: connection.pose,
     runs: int = 5,
     side_m: float = SIDE_M,
-    watch: Watch = lambda sample: None,
+    watch: OnSample = lambda sample: None,
 ) -> Umbmark:
     """Drive squares both ways, each from the origin.
 
@@ -93,10 +93,10 @@ def run_umbmark(
     returns = []
     for number in range(2 * runs):
         clockwise = number % 2 == 0
-        ride = begin(number)
-        if drive(ride, square(clockwise=clockwise, side_m=side_m), watch).reached_s is None:
+        connection = begin(number)
+        if drive(connection, square(clockwise=clockwise, side_m=side_m), watch).reached_s is None:
             raise TimeoutError(f"square {number + 1} did not end")
-        truth, thought = true_pose(ride), ride.chain.odometry.pose
+        truth, thought = true_pose(connection), connection.chain.odometry.pose
         errors[clockwise].append((truth.x - thought.x, truth.y - thought.y))
         returns.append(truth.distance(Pose()))
     return Umbmark(tuple(errors[True]), tuple(errors[False]), tuple(returns))

@@ -220,7 +220,7 @@ class Server:
     def _start(self) -> None:
         self._started = True
         self.manager.tick(self.now_us)
-        self.manager.run_context(self._context)
+        self.manager.add_context(self._context)
         self._context.start()
         self._error_control(NmtState.INITIALISING)
         self._heartbeat.start(self.now_us)

@@ -86,7 +86,7 @@ class Attachment:
     def __post_init__(self) -> None:
         """Make the first proxy, and have the manager tick this."""
         self.proxy = self._add_proxy()
-        self.manager.run_item(self)
+        self.manager.add_item(self)
 
     @property
     def due_us(self) -> int:
@@ -97,7 +97,7 @@ class Attachment:
         """Mind the proxy, or look for the device."""
         if self._lookout is not None:
             if self._lookout.tick():
-                self.manager.put_off(self._return)
+                self.manager.defer(self._return)
         else:
             self._mind(self.proxy)
 
@@ -115,11 +115,11 @@ class Attachment:
 
     def _mind(self, proxy: RtcLiteProxy) -> None:
         if not proxy.alive:
-            self.manager.drop_item(self)
+            self.manager.remove_item(self)
             return
         proxy.tick()
         if proxy.fatal_us is not None and self.link.now_us >= self._link_due_us:
-            self.manager.put_off(lambda: self._remove(proxy))
+            self.manager.defer(lambda: self._remove(proxy))
 
     def _remove(self, proxy: RtcLiteProxy) -> None:
         """Take a proxy out of the system (DECISION L15), unless somebody just did."""
@@ -130,7 +130,7 @@ class Attachment:
         if self.settings.rediscover:
             self._lookout = Lookout(self.link, self.settings)
         else:
-            self.manager.drop_item(self)
+            self.manager.remove_item(self)
 
     def _return(self) -> None:
         """Make a new proxy for a device that has answered, and so need not be waited for."""

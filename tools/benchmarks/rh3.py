@@ -36,8 +36,8 @@ def speed() -> None:
         loop = ClosedLoop()
         start(loop)
         began = time.process_time()
-        journey = drive(loop, GOAL)
-        values.append(journey.duration_s / (time.process_time() - began))
+        run = drive(loop, GOAL)
+        values.append(run.duration_s / (time.process_time() - began))
     row("a cart with its six components, line and base", values, "x real time")
 
 
@@ -45,10 +45,10 @@ def chain(name: str, points: Sequence[Pose], set_id: str) -> None:
     """Drive with the six components."""
     loop = ClosedLoop()
     start(loop, set_id)
-    journey = drive(loop, points)
-    assert journey.reached_s is not None
-    track = [s.pose for s in journey.samples if s.line is not None]
-    tell(f"{name}: RH3, {set_id}", journey.end, points, track, journey.reached_s)
+    run = drive(loop, points)
+    assert run.reached_s is not None
+    track = [s.pose for s in run.samples if s.line is not None]
+    tell(f"{name}: RH3, {set_id}", run.end, points, track, run.reached_s)
 
 
 def pursuit(name: str, points: Sequence[Pose], tolerance: Tolerance) -> None:

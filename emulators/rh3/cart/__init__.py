@@ -1,1 +1,1 @@
-"""Carts of Reference Hardware 3 that drive: closed loops, journeys, maps, the command `rh3`."""
+"""Carts of Reference Hardware 3 that drive: closed loops, runs, maps, the command `rh3`."""

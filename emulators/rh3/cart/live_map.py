@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final, TextIO
 
 from tickrig.emulators.rh3.cart.track_map import TrackMap
-from tickrig.host.motion.journey import Sample
+from tickrig.host.motion.motion_run import Sample
 
 EVERY: Final = 10
 """Samples from one drawing to the next."""

@@ -1,4 +1,4 @@
-"""What `rh3` does: journeys of the options of its command line."""
+"""What `rh3` does: runs of the options of its command line."""
 
 from __future__ import annotations
 
@@ -10,9 +10,14 @@ from typing import Any
 import click
 
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
-from tickrig.emulators.rh3.cart.journey_table import limits_of, table
-from tickrig.emulators.rh3.cart.outing import Outing, demand_arrival, stopped_at_the_end, watched
+from tickrig.emulators.rh3.cart.options import (
+    MotionOptions,
+    demand_arrival,
+    stopping_at_the_end,
+    watched,
+)
 from tickrig.emulators.rh3.cart.path_file import FARTHEST_M, read_path, within_reach
+from tickrig.emulators.rh3.cart.run_table import limits_of, table
 from tickrig.emulators.rh3.cart.squares import Size, play_squares
 from tickrig.emulators.rh3.cart.track_plot import write_track
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -28,7 +33,7 @@ def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
         raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
     if not within_reach(goal := Pose(x, y, theta)):
         raise Refused(f"{x:g} {y:g} {theta:g} is beyond {FARTHEST_M} m")
-    _drive(_outing(options), [goal], f"rh3 goto {x:g} {y:g} {theta:g}")
+    _drive(_checked(options), [goal], f"rh3 goto {x:g} {y:g} {theta:g}")
 
 
 def go_along(file: Path, options: dict[str, Any]) -> None:
@@ -39,39 +44,39 @@ def go_along(file: Path, options: dict[str, Any]) -> None:
         refuse_path("path", error)
     except ValueError as error:
         raise Refused(str(error)) from None
-    _drive(_outing(options), points, f"rh3 path {file.name}")
+    _drive(_checked(options), points, f"rh3 path {file.name}")
 
 
 def go_round(
     runs: int | None, side_m: float | None, save: Path | None, options: dict[str, Any]
 ) -> None:
     """Drive squares both ways, `runs` times or as often as is of use."""
-    outing = _outing(options)
-    by_chance = outing.device is not None or outing.base.noise
-    play_squares(outing, Size(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
+    checked = _checked(options)
+    by_chance = checked.device is not None or checked.base.noise
+    play_squares(checked, Size(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
 
 
-def _outing(options: dict[str, Any]) -> Outing:
+def _checked(options: dict[str, Any]) -> MotionOptions:
     given = {name: options.pop(name) for name in (*NAMES, "seed")}
     if options["device"] is not None and options["pace"] is not None:
         raise Refused("--pace is for the emulated base; a --device has real time")
     if options["show_map"] is None:
         options["show_map"] = sys.stdout.isatty()
-    outing = Outing(**options, base=read_parameters(given))
-    outing.check()
-    return outing
+    checked = MotionOptions(**options, base=read_parameters(given))
+    checked.check()
+    return checked
 
 
-def _drive(outing: Outing, points: Sequence[Pose], title: str) -> None:
-    ride = outing.begin()
-    began = ride.chain.odometry.pose
-    with watched(outing, [began, *points]) as watcher, stopped_at_the_end(ride):
-        journey = drive(ride, points, watcher.watch)
-        demand_arrival(ride, journey)
-    for line in table(journey, began, points, limits_of(ride.chain)):
+def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
+    connection = options.begin()
+    began = connection.chain.odometry.pose
+    with watched(options, [began, *points]) as watcher, stopping_at_the_end(connection):
+        run = drive(connection, points, watcher.watch)
+        demand_arrival(connection, run)
+    for line in table(run, began, points, limits_of(connection.chain)):
         click.echo(line)
-    if outing.plot is not None:
+    if options.plot is not None:
         try:
-            write_track(journey, points, title, outing.plot)
+            write_track(run, points, title, options.plot)
         except OSError as error:
             refuse_path("plot", error)

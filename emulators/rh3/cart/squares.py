@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import click
 
-from tickrig.emulators.rh3.cart.outing import Outing, Watcher, watched
+from tickrig.emulators.rh3.cart.options import MotionOptions, RunWatcher, watched
 from tickrig.host.cli.options import NumberRange
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.motion.dead_reckoning import Wheels
-from tickrig.host.motion.drive import Ride, stop
+from tickrig.host.motion.drive import BaseConnection, stop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
 
@@ -30,20 +30,20 @@ class Size(NamedTuple):
 
 
 class Squares:
-    """Squares of one outing, each with a cart at the origin.
+    """Squares of one run of `rh3`, each with a cart at the origin.
 
     Args:
-        outing: the options.
+        options: the options.
         size: how many, and how large.
         watcher: told each sample.
 
     Attributes:
-        latest: the ride of the latest square.
+        latest: the connection of the latest square.
     """
 
-    def __init__(self, outing: Outing, size: Size, watcher: Watcher) -> None:
-        self._outing, self._size, self._watcher = outing, size, watcher
-        self.latest: Ride | None = None
+    def __init__(self, options: MotionOptions, size: Size, watcher: RunWatcher) -> None:
+        self._options, self._size, self._watcher = options, size, watcher
+        self.latest: BaseConnection | None = None
 
     def run(self, wheels: Wheels | None = None) -> Umbmark:
         """Drive squares; with other radii and axle if they are given."""
@@ -64,17 +64,17 @@ class Squares:
         if self.latest is not None:
             stop(self.latest)
 
-    def _begin(self, wheels: Wheels | None) -> Ride:
+    def _begin(self, wheels: Wheels | None) -> BaseConnection:
         self.stop()
-        if self._outing.device is not None:
+        if self._options.device is not None:
             with self._watcher.asking():
                 click.pause("Put the cart at its start, and press a key.")
-        self.latest = self._outing.begin(wheels)
+        self.latest = self._options.begin(wheels)
         return self.latest
 
-    def _true_pose(self, ride: Ride) -> Pose:
-        if self._outing.device is None:
-            return ride.pose
+    def _true_pose(self, connection: BaseConnection) -> Pose:
+        if self._options.device is None:
+            return connection.pose
         with self._watcher.asking():
             x_mm, y_mm = (
                 click.prompt(f"Measured {axis} of the cart from its start, mm", type=NumberRange())
@@ -83,10 +83,10 @@ class Squares:
         return Pose(x_mm / 1e3, y_mm / 1e3)
 
 
-def play_squares(outing: Outing, size: Size, save: Path | None) -> None:
+def play_squares(options: MotionOptions, size: Size, save: Path | None) -> None:
     """Drive, calibrate, drive again, and tell."""
-    with watched(outing, size.corners) as watcher:
-        squares = Squares(outing, size, watcher)
+    with watched(options, size.corners) as watcher:
+        squares = Squares(options, size, watcher)
         try:
             before = squares.run()
             assert squares.latest is not None

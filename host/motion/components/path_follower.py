@@ -9,7 +9,7 @@ from tickrig.host.motion.dead_reckoning import twist_of
 from tickrig.host.motion.geometry import Pose, Twist, clip
 from tickrig.host.motion.limiter import Limits, steps
 from tickrig.host.motion.ports import newest, sound, to_pose
-from tickrig.host.motion.regulator import Law, Regulator
+from tickrig.host.motion.regulator import ControlLaw, Regulator
 from tickrig.host.motion.turning import ReferenceSpin, TimeOptimalSpin
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
@@ -92,7 +92,7 @@ class PathFollower(RtComponent):
             self.line_dist.value,
             self.line_c1.value,
             h,
-            Law(self.law.value),
+            ControlLaw(self.law.value),
         )
         self._spin: ReferenceSpin | TimeOptimalSpin = ReferenceSpin(alpha)
         if self.spin.value == "time-optimal":

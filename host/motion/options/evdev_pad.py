@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.pad import StickPosition
 
 EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
@@ -37,10 +37,10 @@ class Axes:
             self._values[code] = min(max((value - middle) / half, -1.0), 1.0)
 
     @property
-    def hand(self) -> Hand:
+    def hand(self) -> StickPosition:
         """Left stick along is forward, across is turning; right stick across is sideways."""
         across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
-        return Hand(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
+        return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
 
 
 class EvdevPad:
@@ -64,7 +64,7 @@ class EvdevPad:
             raise LinkClosed(f"cannot open game pad {path}: {error.strerror}") from error
         self._axes = Axes({code: (info.min, info.max) for code, info in limits.items()})
 
-    def poll(self, now_us: int, /) -> Hand:
+    def poll(self, now_us: int, /) -> StickPosition:
         """Return where the sticks stand."""
         try:
             while (event := self._device.read_one()) is not None:

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 from tickrig.host.links.errors import LinkError
 from tickrig.host.motion.options.evdev_pad import EvdevPad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad
-from tickrig.host.motion.options.pad import Hand, Pad, PadOpener
+from tickrig.host.motion.options.pad import GamePadDevice, GamePadOpener, StickPosition
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -19,7 +19,7 @@ KEYBOARD: Final = "keyboard"
 _LOG: Final = log_of(__name__)
 
 
-def open_pad(name: str) -> Pad:
+def open_pad(name: str) -> GamePadDevice:
     """Open `keyboard`, or a device such as `/dev/input/event5`; LinkClosed if it cannot be."""
     return KeyboardPad() if name == KEYBOARD else EvdevPad(name)
 
@@ -36,7 +36,7 @@ class GamePad(RtComponent):
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GamePad", "Velocities from a game pad or keyboard")
 
-    def __init__(self, instance_name: str, opener: PadOpener = open_pad) -> None:
+    def __init__(self, instance_name: str, opener: GamePadOpener = open_pad) -> None:
         super().__init__(instance_name)
         bind = self.configuration.bind
         self.device = bind("DeviceFileName", KEYBOARD)
@@ -46,7 +46,7 @@ class GamePad(RtComponent):
         self.dead_zone = bind("dead_zone", 0.1, "0<=x<=1")
         self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
         self._opener = opener
-        self._pad: Pad | None = None
+        self._pad: GamePadDevice | None = None
         self._pushed = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -77,21 +77,21 @@ class GamePad(RtComponent):
         forward, left, turn = (self._lively(part) for part in hand)
         pushed = any((forward, left, turn))
         if pushed or self._pushed:
-            self._write(ec, Hand(forward, left, turn))
+            self._write(ec, StickPosition(forward, left, turn))
         self._pushed = pushed
         return ReturnCode.RTC_OK
 
     def _lively(self, part: float) -> float:
         return part if abs(part) > self.dead_zone.value else 0.0
 
-    def _write(self, ec: ExecutionContext, hand: Hand) -> None:
+    def _write(self, ec: ExecutionContext, hand: StickPosition) -> None:
         vx, vy = hand.forward * self.max_v.value, hand.left * self.max_vy.value
         data = Velocity2D(vx, vy, hand.turn * self.max_w.value)
         self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
 
     def _let_go(self, ec: ExecutionContext) -> None:
         if self._pushed:
-            self._write(ec, Hand())
+            self._write(ec, StickPosition())
         if self._pad is not None:
             self._pad.close()
         self._pad, self._pushed = None, False

@@ -9,16 +9,16 @@ from typing import Final
 
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.terminal import take_keys
-from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.pad import StickPosition
 
-KEYS: Final[Mapping[str, Hand]] = {
-    "w": Hand(forward=1.0),
-    "s": Hand(forward=-1.0),
-    "a": Hand(turn=1.0),
-    "d": Hand(turn=-1.0),
-    "q": Hand(left=1.0),
-    "e": Hand(left=-1.0),
-    " ": Hand(),
+KEYS: Final[Mapping[str, StickPosition]] = {
+    "w": StickPosition(forward=1.0),
+    "s": StickPosition(forward=-1.0),
+    "a": StickPosition(turn=1.0),
+    "d": StickPosition(turn=-1.0),
+    "q": StickPosition(left=1.0),
+    "e": StickPosition(left=-1.0),
+    " ": StickPosition(),
 }
 
 HOLD_US: Final = 300_000
@@ -44,11 +44,11 @@ class KeyboardPad:
             self.close = take_keys(self._fd)
         except OSError as error:
             raise LinkClosed(f"the keyboard is no terminal: {error.strerror}") from error
-        self._hand, self._until_us = Hand(), 0
+        self._hand, self._until_us = StickPosition(), 0
 
-    def poll(self, now_us: int, /) -> Hand:
+    def poll(self, now_us: int, /) -> StickPosition:
         """Return where the latest key pushes."""
         for key in os.read(self._fd, 256).decode("latin-1"):
             if key in KEYS:
                 self._hand, self._until_us = KEYS[key], now_us + HOLD_US
-        return self._hand if now_us < self._until_us else Hand()
+        return self._hand if now_us < self._until_us else StickPosition()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 
-class Hand(NamedTuple):
+class StickPosition(NamedTuple):
     """Where a hand pushes, each -1..1: forward, to the left, turning to the left."""
 
     forward: float = 0.0
@@ -14,10 +14,10 @@ class Hand(NamedTuple):
     turn: float = 0.0
 
 
-class Pad(Protocol):
+class GamePadDevice(Protocol):
     """A device with sticks or keys; reading it does not wait."""
 
-    def poll(self, now_us: int, /) -> Hand:
+    def poll(self, now_us: int, /) -> StickPosition:
         """Return where the hand pushes now; LinkClosed if the device is gone."""
         ...
 
@@ -25,5 +25,5 @@ class Pad(Protocol):
         """Give the device back."""
 
 
-PadOpener = Callable[[str], Pad]
+GamePadOpener = Callable[[str], GamePadDevice]
 """Opens the pad that DeviceFileName names; LinkClosed if it cannot."""

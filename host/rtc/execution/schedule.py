@@ -10,7 +10,7 @@ from tickrig.host.rtc.ports.connector import Connector
 from tickrig.wire.instant import NEVER
 
 
-class Item(Protocol):
+class ScheduledItem(Protocol):
     """Something that a schedule ticks beside execution contexts and connectors."""
 
     @property
@@ -36,10 +36,10 @@ class Schedule:
 
     def __init__(self) -> None:
         self.now_us = 0
-        self._items: tuple[Item, ...] = ()
+        self._items: tuple[ScheduledItem, ...] = ()
         self._contexts: list[ExecutionContext] = []
         self._publishing: list[Connector[Any]] = []
-        self._put_off: list[Callable[[], None]] = []
+        self._deferred: list[Callable[[], None]] = []
         self._ticking = False
 
     @property
@@ -65,8 +65,8 @@ class Schedule:
         for connector in self._publishing:
             connector.tick(now_us)
         self._ticking = False
-        while self._put_off:
-            self._put_off.pop(0)()
+        while self._deferred:
+            self._deferred.pop(0)()
 
     def run_to(self, t_us: int) -> None:
         """Run all that is due up to and at `t_us`, without waiting."""
@@ -80,32 +80,32 @@ class Schedule:
         """Run what is due in the next `duration_us`."""
         self.run_to(self.now_us + duration_us)
 
-    def put_off(self, action: Callable[[], None]) -> None:
+    def defer(self, action: Callable[[], None]) -> None:
         """Do something at once, or at the end of the tick if one is running."""
         if self._ticking:
-            self._put_off.append(action)
+            self._deferred.append(action)
         else:
             action()
 
-    def run_context(self, context: ExecutionContext) -> None:
+    def add_context(self, context: ExecutionContext) -> None:
         """Run an execution context from now on; one that is run already is no error."""
         if context not in self._contexts:
             context.tick(self.now_us)
             self._contexts.append(context)
 
-    def drop_context(self, context: ExecutionContext) -> None:
+    def remove_context(self, context: ExecutionContext) -> None:
         """Run an execution context no more."""
         self._contexts.remove(context)
 
-    def run_item(self, item: Item) -> None:
+    def add_item(self, item: ScheduledItem) -> None:
         """Tick something else, too, from now on."""
         self._items += (item,)
 
-    def drop_item(self, item: Item) -> None:
+    def remove_item(self, item: ScheduledItem) -> None:
         """Tick it no more."""
         self._items = tuple(other for other in self._items if other is not item)
 
-    def run_connector(self, connector: Connector[Any]) -> None:
+    def add_connector(self, connector: Connector[Any]) -> None:
         """Let a connector push from now on, if it pushes later than it is written to."""
         self._publishing = [other for other in self._publishing if other.joined]
         if connector.publishes:

@@ -22,7 +22,7 @@ LEASE_US: Final = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class NumberedValue:
     """A value that an OutPort wrote; numbers count from 1 on, for each time it is watched."""
 
     number: int
@@ -36,12 +36,12 @@ class _Watch:
     port: InPort[Any]
     asked_us: int
     count: int = 0
-    seen: deque[Seen] = field(default_factory=lambda: deque(maxlen=HELD))
+    seen: deque[NumberedValue] = field(default_factory=lambda: deque(maxlen=HELD))
 
     def take(self) -> None:
         while self.port.is_new and (value := self.port.read()) is not None:
             self.count += 1
-            self.seen.append(Seen(self.count, value))
+            self.seen.append(NumberedValue(self.count, value))
 
 
 class Probes:
@@ -59,7 +59,7 @@ class Probes:
         self._watches: dict[AnyPort, _Watch] = {}
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
-    def seen(self, name: str, since: int = 0) -> tuple[tuple[Seen, ...], int]:
+    def seen(self, name: str, since: int = 0) -> tuple[tuple[NumberedValue, ...], int]:
         """Return what an OutPort wrote; it is watched from the first call on.
 
         Args:

@@ -108,10 +108,10 @@ class Manager(Schedule):
             raise RtcRefused(f"a component {name!r} is there already")
         if context is None:
             component.own(own := ExecutionContext(rate_hz))
-            self.run_context(own)
+            self.add_context(own)
         else:
             context.add_component(component)
-            self.run_context(context)
+            self.add_context(context)
         if (code := component.initialize()) is not ReturnCode.RTC_OK:
             self._leave(component)
             raise RtcRefused(f"on_initialize of {name} returned {code.name}", code)
@@ -126,7 +126,7 @@ class Manager(Schedule):
             RtcRefused: no such component.
         """
         component = self.find(name)
-        self.put_off(lambda: self._end(component))
+        self.defer(lambda: self._end(component))
 
     def find(self, name: str) -> RtComponent:
         """Return a component by its instance name or its path; RtcRefused if there is none."""
@@ -156,7 +156,7 @@ class Manager(Schedule):
         """Join two ports by their names; see `connect.connect` and `port`."""
         connector = connect(self.port(first), self.port(second), properties, name=name)
         if isinstance(connector, Connector):
-            self.run_connector(connector)
+            self.add_connector(connector)
         return connector.profile
 
     def disconnect(self, first: str, second: str) -> None:
@@ -216,13 +216,13 @@ class Manager(Schedule):
             contexts = tuple(component.own_contexts)
             component.exit()
             for context in contexts:
-                self.drop_context(context)
+                self.remove_context(context)
             self.names.unbind(self.path(name))
             del self._components[name]
 
     def _leave(self, component: RtComponent) -> None:
         """Take a component that could not be initialized out of its context."""
         for own in component.own_contexts:
-            self.drop_context(own)
+            self.remove_context(own)
         for context in tuple(component.contexts):
             context.remove_component(component)

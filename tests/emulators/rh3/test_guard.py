@@ -12,7 +12,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.game_pad import GamePad
 from tickrig.host.motion.options.guard import Guard
-from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.pad import StickPosition
 from tickrig.host.motion.options.switch_input import SwitchInput
 
 SECOND_US = 1_000_000
@@ -110,8 +110,12 @@ def test_a_cart_waits_until_another_has_left_its_way() -> None:
 class Push:
     """A hand that pushes back between two times."""
 
-    def poll(self, now_us: int, /) -> Hand:
-        return Hand(forward=-1.0) if 3 * SECOND_US < now_us < 4 * SECOND_US else Hand()
+    def poll(self, now_us: int, /) -> StickPosition:
+        return (
+            StickPosition(forward=-1.0)
+            if 3 * SECOND_US < now_us < 4 * SECOND_US
+            else StickPosition()
+        )
 
     def close(self) -> None:
         """Nothing is open."""

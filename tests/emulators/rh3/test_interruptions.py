@@ -21,7 +21,7 @@ NEAR = 0.040
 """m: what the faithful set keeps to."""
 
 
-class Ride:
+class DrivenCart:
     """A cart that has a goal a metre ahead and is on its way."""
 
     def __init__(self, goal: Pose = AHEAD, drive_us: int = 2_500_000) -> None:
@@ -60,149 +60,149 @@ class Ride:
 
 
 def test_a_new_goal_takes_the_place_of_the_old_one_without_a_stop() -> None:
-    ride = Ride()
-    ride.entered.replace(Pose(2.0))
-    ride.run(0.5)
-    assert ride.speed_m_s > 0.25
-    assert ride.arrives(Pose(2.0))
-    assert ride.entered.finished == 1
+    driven = DrivenCart()
+    driven.entered.replace(Pose(2.0))
+    driven.run(0.5)
+    assert driven.speed_m_s > 0.25
+    assert driven.arrives(Pose(2.0))
+    assert driven.entered.finished == 1
 
 
 def test_a_path_takes_the_place_of_a_goal() -> None:
-    ride = Ride()
-    ride.entered.replace(Pose(1.5), Pose(1.5, 1.0), Pose(1.0, 1.0))
-    assert ride.arrives(Pose(1.0, 1.0), timeout_s=60.0)
+    driven = DrivenCart()
+    driven.entered.replace(Pose(1.5), Pose(1.5, 1.0), Pose(1.0, 1.0))
+    assert driven.arrives(Pose(1.0, 1.0), timeout_s=60.0)
 
 
 def test_a_goal_entered_in_motion_waits() -> None:
-    ride = Ride()
-    ride.entered.goal(Pose(0.5))
-    ride.loop.run_until(lambda: ride.entered.finished == 1, 20_000_000)
-    assert ride.cart.truth.distance(AHEAD) < NEAR
-    ride.loop.run_until(lambda: ride.entered.finished == 2, 60_000_000)
-    assert ride.cart.truth.distance(Pose(0.5)) < NEAR
+    driven = DrivenCart()
+    driven.entered.goal(Pose(0.5))
+    driven.loop.run_until(lambda: driven.entered.finished == 1, 20_000_000)
+    assert driven.cart.truth.distance(AHEAD) < NEAR
+    driven.loop.run_until(lambda: driven.entered.finished == 2, 60_000_000)
+    assert driven.cart.truth.distance(Pose(0.5)) < NEAR
 
 
 def test_the_present_pose_as_goal_is_finished_at_once() -> None:
     """It turns for a period, as the state machine has it; goal_angle is 0.02 rad."""
-    ride = Ride(Pose(), drive_us=300_000)
-    assert ride.entered.finished == 1
-    ride.run(0.5)
-    assert not ride.moves
-    assert ride.cart.truth == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    driven = DrivenCart(Pose(), drive_us=300_000)
+    assert driven.entered.finished == 1
+    driven.run(0.5)
+    assert not driven.moves
+    assert driven.cart.truth == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
 
 
 def test_a_goal_that_is_no_number_changes_nothing() -> None:
-    ride = Ride()
+    driven = DrivenCart()
     goal = OutPort("goal", iis.TimedPose2D)
-    connect(goal, ride.chain.omni_to_2wd.goal)
+    connect(goal, driven.chain.omni_to_2wd.goal)
     goal.write(at(nan, 1.0))
-    assert ride.arrives(AHEAD)
-    assert ride.chain.omni_to_2wd.refused == 1
+    assert driven.arrives(AHEAD)
+    assert driven.chain.omni_to_2wd.refused == 1
 
 
 def test_an_empty_list_stops_the_cart() -> None:
-    ride = Ride()
+    driven = DrivenCart()
     path = OutPort("path", iis.TimedPath2DSeq)
-    connect(path, ride.chain.navigation.min_path)
+    connect(path, driven.chain.navigation.min_path)
     path.write(iis.TimedPath2DSeq())
-    ride.run(2.0)
-    assert not ride.moves
-    assert ride.cart.truth.x < 0.9
-    assert ride.entered.finished == 1
+    driven.run(2.0)
+    assert not driven.moves
+    assert driven.cart.truth.x < 0.9
+    assert driven.entered.finished == 1
 
 
 def test_an_unreachable_speed_is_the_highest_there_is() -> None:
     """10 rad/s at the wheels: 0.995 m/s over the ground."""
-    ride = Ride(Pose(8.0), drive_us=0)
-    ride.chain.navigation.configuration.set("max_vel", "5.0")
-    ride.chain.path_follower.configuration.set("max_v", "5.0")
+    driven = DrivenCart(Pose(8.0), drive_us=0)
+    driven.chain.navigation.configuration.set("max_vel", "5.0")
+    driven.chain.path_follower.configuration.set("max_v", "5.0")
     speeds = []
     for _ in range(100):
-        ride.run(0.1)
-        speeds.append(ride.speed_m_s)
+        driven.run(0.1)
+        speeds.append(driven.speed_m_s)
     assert max(speeds) == pytest.approx(0.995, abs=0.01)
-    assert not ride.cart.base.status & Status.CLIPPED
+    assert not driven.cart.base.status & Status.CLIPPED
 
 
 def test_a_cut_line_stops_the_cart_and_it_goes_on_when_it_is_restored() -> None:
-    ride = Ride()
-    ride.cart.port.arm("cut")
-    ride.run(0.4)
-    assert ride.state() == "ERROR"
-    ride.run(1.0)
-    assert not ride.moves
-    assert ride.cart.base.status & Status.WATCHDOG
-    ride.cart.port.clear("cut")
-    ride.restart()
-    assert ride.arrives(AHEAD)
+    driven = DrivenCart()
+    driven.cart.port.arm("cut")
+    driven.run(0.4)
+    assert driven.state() == "ERROR"
+    driven.run(1.0)
+    assert not driven.moves
+    assert driven.cart.base.status & Status.WATCHDOG
+    driven.cart.port.clear("cut")
+    driven.restart()
+    assert driven.arrives(AHEAD)
 
 
 def test_a_fault_of_the_base_stops_the_cart_until_it_is_cleared() -> None:
-    ride = Ride()
-    ride.cart.base.inputs.set("emergency_stop", 1)
-    ride.run(1.0)
-    assert (ride.state(), ride.moves) == ("ERROR", False)
-    ride.cart.base.inputs.set("emergency_stop", 0)
-    ride.restart()
-    assert ride.arrives(AHEAD)
+    driven = DrivenCart()
+    driven.cart.base.inputs.set("emergency_stop", 1)
+    driven.run(1.0)
+    assert (driven.state(), driven.moves) == ("ERROR", False)
+    driven.cart.base.inputs.set("emergency_stop", 0)
+    driven.restart()
+    assert driven.arrives(AHEAD)
 
 
 def test_a_loss_of_power_costs_no_more_than_the_way_it_rolled_on() -> None:
-    ride = Ride()
-    ride.cart.base.inputs.set("power_cut", 1)
-    ride.run(1.0)
-    ride.cart.base.inputs.set("power_cut", 0)
-    ride.restart()
-    assert ride.arrives(AHEAD)
+    driven = DrivenCart()
+    driven.cart.base.inputs.set("power_cut", 1)
+    driven.run(1.0)
+    driven.cart.base.inputs.set("power_cut", 0)
+    driven.restart()
+    assert driven.arrives(AHEAD)
 
 
 def test_the_bumper_holds_the_cart() -> None:
-    ride = Ride()
-    ride.cart.base.inputs.set("bumper", 1)
-    ride.run(1.0)
-    assert (ride.state(), ride.moves) == ("ACTIVE", False)
-    ride.cart.base.inputs.set("bumper", 0)
-    assert ride.arrives(AHEAD)
+    driven = DrivenCart()
+    driven.cart.base.inputs.set("bumper", 1)
+    driven.run(1.0)
+    assert (driven.state(), driven.moves) == ("ACTIVE", False)
+    driven.cart.base.inputs.set("bumper", 0)
+    assert driven.arrives(AHEAD)
 
 
 def test_stop_holds_the_cart_until_go() -> None:
-    ride = Ride()
-    ref_hard: RefHardRh3 = ride.chain.ref_hard
+    driven = DrivenCart()
+    ref_hard: RefHardRh3 = driven.chain.ref_hard
     ref_hard.Stop()
-    ride.run(3.0)
-    assert not ride.moves
+    driven.run(3.0)
+    assert not driven.moves
     ref_hard.Go()
-    assert ride.arrives(AHEAD)
+    assert driven.arrives(AHEAD)
 
 
 def test_deactivation_stops_the_cart() -> None:
-    ride = Ride()
-    ride.chain.deactivate()
-    ride.run(1.0)
-    assert not ride.moves
+    driven = DrivenCart()
+    driven.chain.deactivate()
+    driven.run(1.0)
+    assert not driven.moves
 
 
 def test_a_dead_host_stops_the_cart() -> None:
-    ride = Ride()
-    ride.loop.rig.run_for(1_000_000)  # nobody runs the components
-    assert not ride.moves
-    assert ride.cart.base.status & Status.WATCHDOG
+    driven = DrivenCart()
+    driven.loop.rig.run_for(1_000_000)  # nobody runs the components
+    assert not driven.moves
+    assert driven.cart.base.status & Status.WATCHDOG
 
 
 def test_deactivate_and_activate_sets_the_odometry_to_its_initial_pose() -> None:
-    ride = Ride()
-    assert ride.arrives(AHEAD)
-    odometry = ride.chain.odometry
-    ride.loop.manager.deactivate("Odometry")
-    ride.run(0.1)
+    driven = DrivenCart()
+    assert driven.arrives(AHEAD)
+    odometry = driven.chain.odometry
+    driven.loop.manager.deactivate("Odometry")
+    driven.run(0.1)
     odometry.configuration.set("initialPose_x", "5.0")
-    ride.loop.manager.activate("Odometry")
-    ride.run(0.1)
+    driven.loop.manager.activate("Odometry")
+    driven.run(0.1)
     assert odometry.pose == pytest.approx((5.0, 0.0, 0.0))
-    ride.entered.replace(Pose(6.0))
-    ride.loop.run_until(lambda: ride.entered.finished == 2, 30_000_000)
-    assert ride.cart.truth.x == pytest.approx(2.0, abs=2 * NEAR)
+    driven.entered.replace(Pose(6.0))
+    driven.loop.run_until(lambda: driven.entered.finished == 2, 30_000_000)
+    assert driven.cart.truth.x == pytest.approx(2.0, abs=2 * NEAR)
 
 
 @pytest.mark.parametrize("turned", [0, 1, 3])

@@ -16,9 +16,9 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.drive import drive, expect, start
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.journey import Journey
 from tickrig.host.motion.least_time import least_time_s
 from tickrig.host.motion.limiter import Limits
+from tickrig.host.motion.motion_run import MotionRun
 
 Points = tuple[Pose, ...]
 GOAL: Points = (Pose(1.0, 0.5, pi / 2),)
@@ -50,28 +50,28 @@ def driven(
     set_id: str,
     loop: ClosedLoop | None = None,
     loss: float = 0.0,
-) -> Journey:
-    """Return the journey of a cart from the origin; `loss` is that of whole exchanges."""
+) -> MotionRun:
+    """Return the run of a cart from the origin; `loss` is that of whole exchanges."""
     loop = loop or ClosedLoop(seed=7)
     start(loop, set_id)
     if loss:
         loop.cart.port.arm("drop", 1 - (1 - loss) ** (1 / EXCHANGE_BYTES))
-    journey = drive(loop, points)
-    assert journey.reached_s is not None
+    run = drive(loop, points)
+    assert run.reached_s is not None
     if loss:
-        requests = journey.duration_s * 50
+        requests = run.duration_s * 50
         assert loop.cart.chain.ref_hard.lost / requests == pytest.approx(loss, rel=0.35)
-    return journey
+    return run
 
 
 @cache
-def undisturbed(points: Points, set_id: str) -> Journey:
+def undisturbed(points: Points, set_id: str) -> MotionRun:
     return driven(points, set_id)
 
 
-def ratio(journey: Journey, points: Points) -> float:
-    assert journey.reached_s is not None
-    return journey.reached_s / least_time_s(plan(Pose(), points))
+def ratio(run: MotionRun, points: Points) -> float:
+    assert run.reached_s is not None
+    return run.reached_s / least_time_s(plan(Pose(), points))
 
 
 @pytest.mark.parametrize("set_id", TARGETS)
@@ -82,14 +82,14 @@ def test_targets_are_met(points: Points, set_id: str) -> None:
     Errors 34, 23 mm and 1.0, 0.9 mm; ratios 1.06, 1.17 and 1.08, 1.05; cross-track rms and most
     54, 76 and 13, 32 mm, and 0.0, 0.0 and 0.3, 0.9 mm.
     """
-    target, journey = TARGETS[set_id], undisturbed(points, set_id)
-    assert journey.error_m <= target.error
-    assert journey.heading_error_rad <= target.heading
-    assert journey.cross_track.rms <= target.rms
-    assert journey.cross_track.most <= target.most
-    assert ratio(journey, points) <= target.ratio
-    assert journey.turning_rad_s <= 5.0
-    assert journey.violations(LIMITS) == 0
+    target, run = TARGETS[set_id], undisturbed(points, set_id)
+    assert run.error_m <= target.error
+    assert run.heading_error_rad <= target.heading
+    assert run.cross_track.rms <= target.rms
+    assert run.cross_track.most <= target.most
+    assert ratio(run, points) <= target.ratio
+    assert run.turning_rad_s <= 5.0
+    assert run.violations(LIMITS) == 0
 
 
 def test_where_it_aligned_first_the_faithful_set_keeps_to_its_lines() -> None:
@@ -102,12 +102,12 @@ def test_where_it_aligned_first_the_faithful_set_keeps_to_its_lines() -> None:
 @pytest.mark.parametrize("loss", [0.05, 0.20])
 @pytest.mark.parametrize("set_id", TARGETS)
 def test_lost_frames_cost_at_most_5_mm(set_id: str, loss: float) -> None:
-    target, journey = TARGETS[set_id], driven(LINES, set_id, loss=loss)
-    assert journey.error_m <= target.error + 0.005
-    assert journey.heading_error_rad <= target.heading
-    assert journey.cross_track.rms <= target.rms + 0.005
-    assert ratio(journey, LINES) <= target.ratio
-    assert journey.violations(LIMITS) == 0
+    target, run = TARGETS[set_id], driven(LINES, set_id, loss=loss)
+    assert run.error_m <= target.error + 0.005
+    assert run.heading_error_rad <= target.heading
+    assert run.cross_track.rms <= target.rms + 0.005
+    assert ratio(run, LINES) <= target.ratio
+    assert run.violations(LIMITS) == 0
 
 
 @pytest.mark.parametrize("rate_hz", [1_000, 200, 25])
@@ -116,9 +116,9 @@ def test_the_rate_of_the_components_does_not_matter(set_id: str, rate_hz: int) -
     """OpenRTM's own default is 1000 Hz; the line takes 8 ms for an exchange."""
     loop = ClosedLoop()
     loop.chain.context.set_rate(rate_hz)
-    journey = driven(GOAL, set_id, loop)
-    assert journey.error_m <= TARGETS[set_id].error
-    assert journey.heading_error_rad <= TARGETS[set_id].heading
+    run = driven(GOAL, set_id, loop)
+    assert run.error_m <= TARGETS[set_id].error
+    assert run.heading_error_rad <= TARGETS[set_id].heading
 
 
 @pytest.mark.parametrize(
@@ -150,6 +150,6 @@ def test_an_integral_gain_carries_a_load(set_id: str) -> None:
     for side in ("left", "right"):
         loop.cart.base.inputs.set(f"load_{side}_nm", 5)
     loop.run_to(loop.now_us + 500_000)
-    journey = drive(loop, GOAL)
-    assert journey.error_m <= TARGETS[set_id].error
-    assert journey.heading_error_rad <= TARGETS[set_id].heading
+    run = drive(loop, GOAL)
+    assert run.error_m <= TARGETS[set_id].error
+    assert run.heading_error_rad <= TARGETS[set_id].heading

@@ -23,13 +23,13 @@ WRONG = BaseParameters(
 
 
 def begin(parameters: BaseParameters, wheels: Wheels = NOMINAL) -> Callable[[int], ClosedLoop]:
-    def ride(number: int) -> ClosedLoop:
+    def start_cart(number: int) -> ClosedLoop:
         loop = ClosedLoop(parameters)
         loop.chain.odometry.calibrate(wheels)
         start(loop, "tuned")
         return loop
 
-    return ride
+    return start_cart
 
 
 @pytest.mark.parametrize(("set_id", "most_m"), [("default", 0.040), ("tuned", 0.005)])

@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.least_time import Abilities, least_time_s, way_time_s
+from tickrig.host.motion.least_time import MotionLimits, least_time_s, way_time_s
 
 SQUARE = [Pose(4, 0), Pose(4, 4), Pose(0, 4), Pose(0, 0)]
 
@@ -32,4 +32,4 @@ def test_a_short_way_never_reaches_the_highest_speed() -> None:
 
 def test_an_abler_cart_is_faster() -> None:
     relays = plan(Pose(), SQUARE)
-    assert least_time_s(relays, Abilities(v=1.0, w=1.0)) < least_time_s(relays) / 2
+    assert least_time_s(relays, MotionLimits(v=1.0, w=1.0)) < least_time_s(relays) / 2

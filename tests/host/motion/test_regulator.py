@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.regulator import Law, Regulator
+from tickrig.host.motion.regulator import ControlLaw, Regulator
 
 H = 0.02
 SPEC = Regulator(800.0, 300.0, 400.0, 0.05, 0.01, H)
-EXPLICIT = Regulator(800.0, 300.0, 400.0, 0.05, 0.01, H, Law.EXPLICIT)
+EXPLICIT = Regulator(800.0, 300.0, 400.0, 0.05, 0.01, H, ControlLaw.EXPLICIT)
 LINE = Pose(1.0, 1.0, 0.0)
 BEFORE = Twist(0.3, 0.01)
 

@@ -184,7 +184,7 @@ class Deleter:
 def test_a_proxy_that_is_deleted_as_it_is_to_be_removed_is_not_looked_for() -> None:
     bench = Bench(Echo)
     deleter = Deleter(bench.manager)
-    bench.manager.run_item(deleter)
+    bench.manager.add_item(deleter)
     deleter.proxy = bench.attach(0, "Echo", Settings(rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(AWAY_US)

@@ -17,9 +17,9 @@ from click.testing import CliRunner, Result
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
-from tickrig.emulators.rh3.cart.outing import Outing, demand_arrival
+from tickrig.emulators.rh3.cart.options import MotionOptions, demand_arrival
 from tickrig.emulators.rh3.cart.squares import Size, play_squares
-from tickrig.host.motion.drive import Ride, drive, start
+from tickrig.host.motion.drive import BaseConnection, drive, start
 from tickrig.host.motion.geometry import Pose
 
 CORNERS = "0.5, 0  # first\n\n0.5 0.5 9\n0 0 0\n"
@@ -97,17 +97,17 @@ def test_squares_calibrate_the_odometry(tmp_path: Path) -> None:
     assert lines[2].startswith("conf.default.lengthOfAxle: 0.45")
 
 
-class OnPort(Outing):
-    """An outing whose cart is said to be on a serial port."""
+class OnPort(MotionOptions):
+    """Options whose cart is said to be on a serial port."""
 
-    def _ride(self) -> Ride:
+    def _connection(self) -> BaseConnection:
         return ClosedLoop()
 
 
-class Jammed(Outing):
-    """An outing whose cart has something in a wheel."""
+class Jammed(MotionOptions):
+    """Options whose cart has something in a wheel."""
 
-    def _ride(self) -> Ride:
+    def _connection(self) -> BaseConnection:
         loop = ClosedLoop()
         loop.cart.base.inputs.set("jam_left", 1)
         loop.chain.ref_hard.configuration.set("gain_VP", "100")  # full torque, a stall
@@ -118,27 +118,27 @@ def test_a_person_measures_where_a_real_cart_stands(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("10\n0\n" * 4))
-    outing = OnPort("tuned", "/dev/ttyUSB0", 115_200, None, None, False, BaseParameters())
-    play_squares(outing, Size(1, 0.3), None)
+    options = OnPort("tuned", "/dev/ttyUSB0", 115_200, None, None, False, BaseParameters())
+    play_squares(options, Size(1, 0.3), None)
     told = capsys.readouterr().out
     assert told.count("Measured x of the cart from its start, mm") == 4
     assert "return, most    10.0    10.0 mm" in told
 
 
 def test_a_square_that_does_not_end_is_told() -> None:
-    outing = Jammed("tuned", None, 115_200, None, None, False, BaseParameters())
+    options = Jammed("tuned", None, 115_200, None, None, False, BaseParameters())
     with pytest.raises(click.ClickException, match=r"fault of the base: stall \(left\)"):
-        play_squares(outing, Size(1, 0.3), None)
+        play_squares(options, Size(1, 0.3), None)
 
 
 def test_a_goal_that_is_not_reached_is_told() -> None:
-    ride = Jammed("tuned", None, 115_200, None, None, False, BaseParameters()).begin()
+    connection = Jammed("tuned", None, 115_200, None, None, False, BaseParameters()).begin()
     with pytest.raises(click.ClickException, match=r"fault of the base: stall \(left\)"):
-        demand_arrival(ride, drive(ride, [Pose(1.0)]))
-    ride = ClosedLoop()
-    start(ride)
+        demand_arrival(connection, drive(connection, [Pose(1.0)]))
+    connection = ClosedLoop()
+    start(connection)
     with pytest.raises(click.ClickException, match=r"not there after 1\.0 s"):
-        demand_arrival(ride, drive(ride, [Pose(1.0)], timeout_us=1_000_000))
+        demand_arrival(connection, drive(connection, [Pose(1.0)], timeout_us=1_000_000))
 
 
 def test_odometry_conf_is_used(tmp_path: Path) -> None:

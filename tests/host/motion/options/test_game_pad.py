@@ -11,7 +11,7 @@ from tickrig.host.links.errors import LinkClosed
 from tickrig.host.motion.options.evdev_pad import ABS_RX, ABS_X, ABS_Y, EV_ABS, Axes, EvdevPad
 from tickrig.host.motion.options.game_pad import GamePad, open_pad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad
-from tickrig.host.motion.options.pad import Hand
+from tickrig.host.motion.options.pad import StickPosition
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 
@@ -19,9 +19,9 @@ class Held:
     """A pad whose hand a test moves."""
 
     def __init__(self) -> None:
-        self.hand, self.gone, self.closed = Hand(), False, 0
+        self.hand, self.gone, self.closed = StickPosition(), False, 0
 
-    def poll(self, now_us: int, /) -> Hand:
+    def poll(self, now_us: int, /) -> StickPosition:
         if self.gone:
             raise LinkClosed("the pad is gone")
         return self.hand
@@ -43,27 +43,27 @@ def written(on: PortBench[GamePad], periods: int = 1) -> list[Velocity2D]:
 
 def test_a_hand_becomes_a_velocity_in_each_period() -> None:
     on, held = bench(max_v="0.5", max_w="1.0")
-    held.hand = Hand(0.5, -1.0, 0.25)
+    held.hand = StickPosition(0.5, -1.0, 0.25)
     assert written(on, 3) == [Velocity2D(0.25, -0.3, 0.25)] * 3
 
 
 def test_letting_go_is_told_once() -> None:
     on, held = bench()
-    held.hand = Hand(forward=1.0)
+    held.hand = StickPosition(forward=1.0)
     on.period()
-    held.hand = Hand()
+    held.hand = StickPosition()
     assert written(on, 3) == [Velocity2D()]
 
 
 def test_a_stick_near_its_middle_is_let_go() -> None:
     on, held = bench()
-    held.hand = Hand(0.1, -0.1, 0.05)
+    held.hand = StickPosition(0.1, -0.1, 0.05)
     assert written(on, 2) == []
 
 
 def test_a_pad_that_is_gone_lets_go_and_is_an_error(caplog: pytest.LogCaptureFixture) -> None:
     on, held = bench()
-    held.hand = Hand(forward=1.0)
+    held.hand = StickPosition(forward=1.0)
     on.period()
     held.gone = True
     assert written(on, 2) == [Velocity2D()]
@@ -78,7 +78,7 @@ def test_a_pad_that_is_gone_lets_go_and_is_an_error(caplog: pytest.LogCaptureFix
 
 def test_deactivation_lets_go() -> None:
     on, held = bench()
-    held.hand = Hand(turn=-1.0)
+    held.hand = StickPosition(turn=-1.0)
     on.period()
     on.taken("velocity")
     on.deactivate()
@@ -101,35 +101,35 @@ def test_a_file_that_is_no_pad_is_refused() -> None:
 
 def test_sticks_are_centred_and_turned_round() -> None:
     axes = Axes({ABS_X: (0, 255), ABS_Y: (-100, 100), ABS_RX: (-100, 100)})
-    assert axes.hand == Hand()
+    assert axes.hand == StickPosition()
     axes.take(EV_ABS, ABS_Y, -50)
     axes.take(EV_ABS, ABS_X, 0)
     axes.take(EV_ABS, ABS_RX, 200)
-    assert axes.hand == Hand(0.5, -1.0, 1.0)
+    assert axes.hand == StickPosition(0.5, -1.0, 1.0)
 
 
 def test_other_events_move_no_stick() -> None:
     axes = Axes({ABS_Y: (-100, 100)})
     axes.take(1, ABS_Y, 100)
     axes.take(EV_ABS, ABS_X, 100)
-    assert axes.hand == Hand()
+    assert axes.hand == StickPosition()
 
 
 def test_an_axis_without_a_range_does_not_matter() -> None:
     axes = Axes({ABS_Y: (0, 0)})
     axes.take(EV_ABS, ABS_Y, 0)
-    assert axes.hand == Hand()
+    assert axes.hand == StickPosition()
 
 
 def test_a_key_pushes_while_it_repeats() -> None:
     host, terminal = pty.openpty()
     pad = KeyboardPad(terminal)
     os.write(host, b"xw")
-    assert pad.poll(PERIOD_US) == Hand(forward=1.0)
-    assert pad.poll(PERIOD_US + 299_000) == Hand(forward=1.0)
-    assert pad.poll(PERIOD_US + 300_000) == Hand()
+    assert pad.poll(PERIOD_US) == StickPosition(forward=1.0)
+    assert pad.poll(PERIOD_US + 299_000) == StickPosition(forward=1.0)
+    assert pad.poll(PERIOD_US + 300_000) == StickPosition()
     os.write(host, b"a ")
-    assert pad.poll(2_000_000) == Hand()
+    assert pad.poll(2_000_000) == StickPosition()
     os.close(host)
     os.close(terminal)
 

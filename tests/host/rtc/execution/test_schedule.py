@@ -7,7 +7,7 @@ from tickrig.host.rtc import Manager
 from tickrig.wire.instant import NEVER
 
 
-class Item:
+class ScheduledItem:
     """Notes when it was ticked; due each 300 us."""
 
     def __init__(self, manager: Manager, calls: list[str]) -> None:
@@ -19,13 +19,13 @@ class Item:
         self._calls.append("item")
         self.due_us += 300
         if now_us >= 900:
-            self._manager.drop_item(self)
+            self._manager.remove_item(self)
 
 
 def test_an_item_is_ticked_when_it_is_due_until_it_is_dropped() -> None:
     manager = Manager()
-    item = Item(manager, [])
-    manager.run_item(item)
+    item = ScheduledItem(manager, [])
+    manager.add_item(item)
     assert manager.due_us == 300
     manager.run_for(5_000)
     assert item.ticks_us == [300, 600, 900]
@@ -36,7 +36,7 @@ def test_items_go_before_execution_contexts() -> None:
     manager, calls = Manager(), list[str]()
     spy = manager.add(Spy("Spy0", calls), rate_hz=1_000.0)
     manager.activate(spy.instance_name)
-    manager.run_item(Item(manager, calls))
+    manager.add_item(ScheduledItem(manager, calls))
     calls.clear()
     manager.tick(1_000)
     assert calls[0] == "item"

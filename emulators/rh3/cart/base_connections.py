@@ -7,14 +7,14 @@ from functools import partial
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.drive import Ride
+from tickrig.host.motion.drive import BaseConnection
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.execution.real_time import RealTime
 
 
-class SerialRide:
-    """A `Ride` in real time, over a serial port: a base, or `rh3-emu`.
+class SerialBaseConnection:
+    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
 
     Args:
         url: what DeviceFileName is set to; a path or a pyserial URL.
@@ -48,33 +48,33 @@ class SerialRide:
             self._runner.step()
 
 
-class PacedRide:
-    """A `Ride` in virtual time that passes so many times as fast as the machine's.
+class PacedBaseConnection:
+    """A `BaseConnection` in virtual time that passes so many times as fast as the machine's.
 
     Args:
-        ride: the one in virtual time.
+        connection: the one in virtual time.
         pace: 1 is real time.
     """
 
-    def __init__(self, ride: Ride, pace: float) -> None:
-        self._ride, self._pace, self._clock = ride, pace, RealClock()
+    def __init__(self, connection: BaseConnection, pace: float) -> None:
+        self._connection, self._pace, self._clock = connection, pace, RealClock()
 
     @property
     def chain(self) -> MotionChain:
         """Its components."""
-        return self._ride.chain
+        return self._connection.chain
 
     @property
     def now_us(self) -> int:
         """The virtual time."""
-        return self._ride.now_us
+        return self._connection.now_us
 
     @property
     def pose(self) -> Pose:
         """Where it truly is."""
-        return self._ride.pose
+        return self._connection.pose
 
     def run_to(self, t_us: int) -> None:
         """Go on to a virtual time when it has come."""
         self._clock.wait_until(round(t_us / self._pace))
-        self._ride.run_to(t_us)
+        self._connection.run_to(t_us)

@@ -21,7 +21,7 @@ class Sample(NamedTuple):
     """A cart in one period.
 
     Attributes:
-        time_s: since the start of the journey.
+        time_s: since the start of the run.
         pose: where it is.
         twist: the velocity that is commanded.
         line: the line it follows towards this pose, None while it turns or stands.
@@ -41,7 +41,7 @@ class CrossTrack(NamedTuple):
 
 
 @dataclass(slots=True)
-class Journey:
+class MotionRun:
     """A way from a pose to a goal.
 
     Attributes:

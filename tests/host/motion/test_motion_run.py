@@ -3,15 +3,15 @@ from __future__ import annotations
 import pytest
 
 from tickrig.host.motion.geometry import Pose, Twist
-from tickrig.host.motion.journey import Journey, Sample
 from tickrig.host.motion.limiter import Limits
+from tickrig.host.motion.motion_run import MotionRun, Sample
 
 LINE = Pose(2.0, 0.0, 0.0)
 LIMITS = Limits(0.3, 0.3, 0.006, 0.1)
 
 
-def journey(*samples: Sample) -> Journey:
-    return Journey(Pose(2.0, 0.0, 0.1), list(samples))
+def run(*samples: Sample) -> MotionRun:
+    return MotionRun(Pose(2.0, 0.0, 0.1), list(samples))
 
 
 def on_line(x: float, y: float, line: Pose | None = LINE) -> Sample:
@@ -19,23 +19,23 @@ def on_line(x: float, y: float, line: Pose | None = LINE) -> Sample:
 
 
 def test_errors_are_measured_at_the_end() -> None:
-    seen = journey(on_line(0.0, 0.0), Sample(9.5, Pose(2.03, 0.04, -0.1), Twist(), None))
+    seen = run(on_line(0.0, 0.0), Sample(9.5, Pose(2.03, 0.04, -0.1), Twist(), None))
     assert (seen.error_m, seen.heading_error_rad) == pytest.approx((0.05, 0.2))
     assert (seen.duration_s, seen.end) == (9.5, Pose(2.03, 0.04, -0.1))
 
 
 def test_cross_track_is_measured_from_the_line_of_the_leg() -> None:
-    seen = journey(on_line(0.0, 0.03), on_line(1.0, -0.04), on_line(2.0, 9.0, None))
+    seen = run(on_line(0.0, 0.03), on_line(1.0, -0.04), on_line(2.0, 9.0, None))
     assert seen.cross_track == pytest.approx((0.00125**0.5, 0.04))
 
 
 def test_a_short_leg_has_no_cross_track() -> None:
-    assert journey(on_line(1.5, 0.3), on_line(2.0, 0.3)).cross_track == (0.0, 0.0)
+    assert run(on_line(1.5, 0.3), on_line(2.0, 0.3)).cross_track == (0.0, 0.0)
 
 
 def test_turning_adds_up_without_sign() -> None:
     twists = [Twist(0.0, w) for w in (0.0, 0.1, -0.1, 0.0)]
-    seen = journey(*(Sample(0.0, Pose(), twist, None) for twist in twists))
+    seen = run(*(Sample(0.0, Pose(), twist, None) for twist in twists))
     assert seen.turning_rad_s == pytest.approx(0.4)
 
 
@@ -49,16 +49,16 @@ def test_turning_adds_up_without_sign() -> None:
     ],
 )
 def test_a_command_beyond_a_limit_is_counted(twist: Twist, count: int) -> None:
-    seen = journey(Sample(0.0, Pose(), Twist(), None), Sample(0.02, Pose(), twist, None))
+    seen = run(Sample(0.0, Pose(), Twist(), None), Sample(0.02, Pose(), twist, None))
     assert seen.violations(LIMITS) == count
 
 
 @pytest.mark.parametrize("twist", [Twist(0.301, 0.0), Twist(0.0, 0.301)])
 def test_a_speed_that_stays_beyond_a_limit_is_counted(twist: Twist) -> None:
     same = Sample(0.0, Pose(), twist, None)
-    assert journey(same, same).violations(LIMITS) == 1
+    assert run(same, same).violations(LIMITS) == 1
 
 
 def test_a_speed_at_the_limit_is_within_it() -> None:
     same = Sample(0.0, Pose(), Twist(0.3, -0.3), None)
-    assert journey(same, same).violations(LIMITS) == 0
+    assert run(same, same).violations(LIMITS) == 0

@@ -14,16 +14,16 @@ import click
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.picture import check_plot
+from tickrig.emulators.rh3.cart.base_connections import PacedBaseConnection, SerialBaseConnection
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.live_map import LiveMap
-from tickrig.emulators.rh3.cart.rides import PacedRide, SerialRide
 from tickrig.emulators.rh3.cart.track_map import WIDTH, TrackMap
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.motion.dead_reckoning import Wheels
-from tickrig.host.motion.drive import Ride, start, stop
+from tickrig.host.motion.drive import BaseConnection, start, stop
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.journey import Journey, Sample
+from tickrig.host.motion.motion_run import MotionRun, Sample
 from tickrig.host.rtc.errors import RtcRefused
 
 INTERRUPTED: Final = 130
@@ -35,7 +35,7 @@ class Ended(Exception):  # noqa: N818 - no error
 
 
 @dataclass(frozen=True, slots=True)
-class Outing:
+class MotionOptions:
     """The options that all verbs have.
 
     Attributes:
@@ -63,37 +63,37 @@ class Outing:
         if self.plot is not None:
             check_plot(self.plot)
 
-    def begin(self, wheels: Wheels | None = None) -> Ride:
+    def begin(self, wheels: Wheels | None = None) -> BaseConnection:
         """Return a cart at the origin with its components active."""
-        ride = self._ride()
+        connection = self._connection()
         try:
             if self.conf is not None:
-                ride.chain.odometry.load(self.conf)
+                connection.chain.odometry.load(self.conf)
             if wheels is not None:
-                ride.chain.odometry.calibrate(wheels)
+                connection.chain.odometry.calibrate(wheels)
         except RtcRefused as error:
             raise Refused(str(error)) from None
         except OSError as error:
             refuse_path("odometry-conf", error)
-        start(ride, self.set_id)
-        if ride.chain.in_error:
-            raise Refused(ride.chain.ref_hard.trouble)
-        return ride
+        start(connection, self.set_id)
+        if connection.chain.in_error:
+            raise Refused(connection.chain.ref_hard.trouble)
+        return connection
 
-    def _ride(self) -> Ride:
+    def _connection(self) -> BaseConnection:
         if self.device is not None:
-            return SerialRide(self.device, self.baud)
+            return SerialBaseConnection(self.device, self.baud)
         loop = ClosedLoop(self.base)
-        return loop if self.pace is None else PacedRide(loop, self.pace)
+        return loop if self.pace is None else PacedBaseConnection(loop, self.pace)
 
 
-class Watcher:
+class RunWatcher:
     """Draws samples if they are to be drawn, and raises `Ended` when a signal has come."""
 
-    def __init__(self, outing: Outing, points: Sequence[Pose]) -> None:
+    def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
         self._ended = self._asking = False
         width = min(WIDTH, get_terminal_size().columns - 1)
-        self._map = LiveMap(TrackMap(points, width), sys.stdout) if outing.show_map else None
+        self._map = LiveMap(TrackMap(points, width), sys.stdout) if options.show_map else None
 
     def end(self) -> None:
         """Let the next sample be the last; a question is left at once."""
@@ -123,9 +123,9 @@ class Watcher:
 
 
 @contextmanager
-def watched(outing: Outing, points: Sequence[Pose]) -> Iterator[Watcher]:
-    """Watch a run; Ctrl-C ends it with exit status 130."""
-    watcher = Watcher(outing, points)
+def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatcher]:
+    """OnSample a run; Ctrl-C ends it with exit status 130."""
+    watcher = RunWatcher(options, points)
     with stopped_by_signals(watcher.end):
         try:
             yield watcher
@@ -135,17 +135,17 @@ def watched(outing: Outing, points: Sequence[Pose]) -> Iterator[Watcher]:
 
 
 @contextmanager
-def stopped_at_the_end(ride: Ride) -> Iterator[Ride]:
+def stopping_at_the_end(connection: BaseConnection) -> Iterator[BaseConnection]:
     """Stop the base whatever happens."""
     try:
-        yield ride
+        yield connection
     finally:
-        stop(ride)
+        stop(connection)
 
 
-def demand_arrival(ride: Ride, journey: Journey) -> None:
+def demand_arrival(connection: BaseConnection, run: MotionRun) -> None:
     """End with a line and exit status 1 if the goal was not reached."""
-    if ride.chain.in_error:
-        raise click.ClickException(ride.chain.ref_hard.trouble)
-    if journey.reached_s is None:
-        raise click.ClickException(f"not there after {journey.duration_s:.1f} s")
+    if connection.chain.in_error:
+        raise click.ClickException(connection.chain.ref_hard.trouble)
+    if run.reached_s is None:
+        raise click.ClickException(f"not there after {run.duration_s:.1f} s")

@@ -8,24 +8,23 @@ from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.drive import PERIOD_US
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.journey import Journey
 from tickrig.host.motion.least_time import least_time_s
 from tickrig.host.motion.limiter import Limits, steps
+from tickrig.host.motion.motion_run import MotionRun
 
 
-def table(journey: Journey, start: Pose, points: Sequence[Pose], limits: Limits) -> list[str]:
+def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: Limits) -> list[str]:
     """Return a line for each measure."""
-    least_s, track = least_time_s(plan(start, points)), journey.cross_track
-    took_s = journey.duration_s if journey.reached_s is None else journey.reached_s
+    least_s, track = least_time_s(plan(start, points)), run.cross_track
+    took_s = run.duration_s if run.reached_s is None else run.reached_s
     share = f", {took_s / least_s:.2f} x the least time" if least_s else ""
-    lost = journey.violations(limits)
+    lost = run.violations(limits)
     return [
         f"time         {took_s:.2f} s{share}",
-        f"at the end   {journey.error_m * 1e3:.1f} mm and"
-        f" {journey.heading_error_rad:.4f} rad off the goal",
+        f"at the end   {run.error_m * 1e3:.1f} mm and {run.heading_error_rad:.4f} rad off the goal",
         f"cross-track  {track.rms * 1e3:.1f} mm rms, {track.most * 1e3:.1f} mm at most,"
         " on legs of 1 m and more",
-        f"turning      {journey.turning_rad_s:.2f} rad/s in all changes",
+        f"turning      {run.turning_rad_s:.2f} rad/s in all changes",
         f"limits       {f'{lost} commands beyond them' if lost else 'kept'}",
     ]
 
