@@ -1,107 +1,30 @@
-"""The command `tickrig demo`; what a demonstration needs is imported when it is played."""
+"""The command `tickrig demo`; each demonstration stands with its device."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Final
 
 import click
 
-from tickrig.emulators.commands.picture import check_plot
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.messages import warnings_shown
-from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import refuse_path
-from tickrig.host.cli.start import loading
-from tickrig.host.links.errors import DeviceRefused, LinkError
+from tickrig.host.cli.lazy_group import LazyGroup
 
-if TYPE_CHECKING:
-    from tickrig.emulators.fig120.samples import Sample
+DEMOS: Final = {
+    "rrc": (
+        "tickrig.emulators.rrc.demo_cli:rrc",
+        "Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.",
+    ),
+    "rtc-lite": (
+        "tickrig.emulators.rtc_lite.demo.cli:rtc_lite",
+        "Send numbers through two emulated PICs, cut the power of one, and see it come back.",
+    ),
+    "fig120": (
+        "tickrig.emulators.fig120.cli:fig120",
+        "Let a potentiometer at one CANopen node turn the motor of another, without a PC in"
+        " between.",
+    ),
+}
 
 
-@click.group()
+@click.group(cls=LazyGroup, commands=DEMOS)
 def demo() -> None:
     """Show an emulated device and a host at work; each ends by itself."""
-
-
-@demo.command()
-def rrc() -> None:
-    """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip."""
-    with loading():
-        from tickrig.emulators.rrc.demo import run_demo  # noqa: PLC0415
-
-    try:
-        run_demo(click.echo)
-    except (RuntimeError, OSError, LinkError, DeviceRefused) as error:
-        raise click.ClickException(str(error)) from error
-
-
-@demo.command("rtc-lite")
-@click.option("--virtual", is_flag=True, help="In virtual time: the same lines each time, at once.")
-def rtc_lite(virtual: bool) -> None:
-    """Send numbers through two emulated PICs, cut the power of one, and see it come back.
-
-    ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
-    RTComponent-Lite. The devices are processes on two ptys, in real time.
-    """
-    with loading():
-        from tickrig.emulators.rtc_lite.demo.play import run_demo  # noqa: PLC0415
-        from tickrig.emulators.rtc_lite.demo.stage import VirtualStage, pty_stage  # noqa: PLC0415
-        from tickrig.host.rtc.errors import RtcRefused  # noqa: PLC0415
-
-    try:
-        if virtual:
-            run_demo(VirtualStage(), click.echo)
-            return
-        with warnings_shown(), pty_stage() as stage:
-            run_demo(stage, click.echo)
-    except (RuntimeError, OSError, LinkError, RtcRefused) as error:
-        raise click.ClickException(str(error)) from error
-
-
-@demo.command(cls=BusCommand)
-@click.option("--plot", type=PATH, help="Draw the curves into FILE.png, .svg or .html.")
-@bus_options
-def fig120(plot: Path | None, **options: Any) -> None:
-    """Let a potentiometer at one CANopen node turn the motor of another, without a PC in between.
-
-    A master links the analogue input of an f-palette with the reference of a
-    motor core unit (PDO linking), starts both and leaves the bus. It runs in
-    virtual time; with -i and -c in real time on a bus of python-can.
-
-    \b
-    tickrig demo fig120
-    tickrig demo fig120 --plot curves.png
-    tickrig demo fig120 -i socketcan -c vcan0
-    """  # noqa: D301 - click wants the backspace
-    if plot is not None:
-        check_plot(plot)
-    samples = _play_fig120(BusOptions(**options))
-    if plot is not None:
-        _draw_fig120(samples, plot)
-        click.echo(f"\nThe curves are in {plot}.")
-
-
-def _play_fig120(bus: BusOptions) -> list[Sample]:
-    with loading():
-        from canopen import SdoCommunicationError  # noqa: PLC0415
-
-        from tickrig.emulators.fig120.demo import run_demo  # noqa: PLC0415
-        from tickrig.emulators.fig120.stage import VirtualStage, bus_stage  # noqa: PLC0415
-
-    try:
-        if not bus:
-            return run_demo(VirtualStage(), click.echo)
-        with warnings_shown(), bus_stage(bus) as stage:
-            return run_demo(stage, click.echo)
-    except (RuntimeError, OSError, SdoCommunicationError) as error:
-        raise click.ClickException(str(error)) from error
-
-
-def _draw_fig120(samples: list[Sample], plot: Path) -> None:
-    from tickrig.emulators.fig120.plot import write_plot  # noqa: PLC0415
-
-    try:
-        write_plot(samples, plot)
-    except OSError as error:
-        refuse_path("plot", error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -41,11 +42,22 @@ base_options: Final = add_options(
 """Add the parameters in `NAMES` as options."""
 
 
+def parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
+    """Return parameters; ValueError for a value of another type or out of range."""
+    with loading():
+        from tickrig.device.rh3.parameters import BaseParameters  # noqa: PLC0415 - slow
+
+    defaults = asdict(BaseParameters())
+    for name, value in settings.items():
+        wanted = (int,) if type(defaults[name]) is int else (int, float)
+        if not (type(value) in wanted or (name == "friction" and value is None)):
+            kind = "a whole number" if wanted == (int,) else "a number"
+            raise ValueError(f"{name} is {value!r}, expected is {kind}")
+    return BaseParameters(**settings)
+
+
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
     """Return a base of options, those left out as they are; Refused for one that cannot be."""
-    with loading():
-        from tickrig.emulators.rh3.device_type import parameters_of  # noqa: PLC0415 - slow
-
     try:
         return parameters_of({name: v for name, v in options.items() if v is not None})
     except ValueError as error:

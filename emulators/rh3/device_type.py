@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.trace import Config
-from tickrig.emulators.rh3.base_options import read_parameters
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rh3.base_options import parameters_of, read_parameters
 from tickrig.emulators.rh3.frame_log import frame_splitter
 from tickrig.emulators.rh3.verbs import verbs
 from tickrig.emulators.serial.emulator import LineSettings
@@ -38,17 +38,6 @@ def build_rh3(config: Config) -> Rh3Base:
         settings["seed"] = settings.pop("ground_seed")
     check_config(settings, asdict(BaseParameters()), "a base has no parameter", typed=False)
     return Rh3Base(parameters_of(settings))
-
-
-def parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
-    """Return parameters; ValueError for a value of another kind or out of range."""
-    defaults = asdict(BaseParameters())
-    for name, value in settings.items():
-        wanted = (int,) if type(defaults[name]) is int else (int, float)
-        if not (type(value) in wanted or (name == "friction" and value is None)):
-            kind = "a whole number" if wanted == (int,) else "a number"
-            raise ValueError(f"{name} is {value!r}, expected is {kind}")
-    return BaseParameters(**settings)
 
 
 def _configure(base: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.trace import Config, Mark
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.wire.rrc.check import check_digit
 

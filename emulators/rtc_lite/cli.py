@@ -11,7 +11,7 @@ from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
 def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:
-    from tickrig.emulators.rtc_lite.build import COMPONENTS  # noqa: PLC0415 - slow
+    from tickrig.emulators.rtc_lite.device_type import COMPONENTS  # noqa: PLC0415 - slow
 
     return [name for name in COMPONENTS if name.startswith(word)]
 

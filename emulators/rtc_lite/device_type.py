@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Final
 
+from tickrig.device.rtc_lite.component import Component, Echo, LiteA, LiteB
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.trace import Config
-from tickrig.emulators.rtc_lite.components import COMPONENTS, find_component
-from tickrig.emulators.rtc_lite.faults import LINE_FAULTS
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.rtc_lite.verbs import verbs
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS, verbs
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import refused_at
+from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import Command, ContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
@@ -65,6 +66,29 @@ def _context(name: str) -> ContextType:
         return ContextType[name.upper()]
     except KeyError:
         raise ValueError(f"context is {name!r}, proxy or timer is possible") from None
+
+
+COMPONENTS: Final[Mapping[str, type[Component]]] = MappingProxyType(
+    {"echo": Echo, "lite-a": LiteA, "lite-b": LiteB}
+)
+
+
+def find_component(spec: str) -> type[Component]:
+    """Return the component that a name or `FILE.py:Class` stands for.
+
+    Raises:
+        ValueError: there is none, its file cannot be run, or no PIC has room for it.
+    """
+    if spec in COMPONENTS:
+        return COMPONENTS[spec]
+    if f"{SUFFIX}:" not in spec:
+        raise ValueError(f"no node {spec!r}; known: {', '.join(COMPONENTS)}, or FILE.py:Class")
+    kind: type[Component] = find_class(spec, Component)
+    try:
+        kind()
+    except Exception as error:  # a user's constructor may raise anything
+        raise ValueError(f"{spec}: {explain_error(error, spec.rpartition(':')[0])}") from None
+    return kind
 
 
 def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:

@@ -10,7 +10,6 @@ from typing import Any, Final
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, Wall, World, room
-from tickrig.emulators.bench.wire_log import WireLine
 from tickrig.emulators.commands.device_type import (
     ConfiguredDevice,
     DeviceType,
@@ -18,6 +17,7 @@ from tickrig.emulators.commands.device_type import (
     check_config,
 )
 from tickrig.emulators.record.trace import Config, Mark
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.cli import USB_BAUD

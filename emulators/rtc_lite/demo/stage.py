@@ -11,7 +11,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.rtc_lite.build import COMPONENTS
+from tickrig.emulators.rtc_lite.device_type import COMPONENTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.clock import RealClock

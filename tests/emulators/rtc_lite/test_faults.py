@@ -4,7 +4,7 @@ import pytest
 
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.emulators.rtc_lite.emulate import LINE_FAULTS
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 
 PING = raw("0A 43 59 40 01 DD")
 STATE = raw("0A 43 58 40 43 1E")

@@ -11,7 +11,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.rtc_lite.emulate import LINE_FAULTS
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach

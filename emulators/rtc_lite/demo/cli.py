@@ -1,0 +1,31 @@
+"""The command `tickrig demo rtc-lite`."""
+
+from __future__ import annotations
+
+import click
+
+from tickrig.host.cli.start import loading
+from tickrig.host.links.errors import LinkError
+
+
+@click.command("rtc-lite")
+@click.option("--virtual", is_flag=True, help="In virtual time: the same lines each time, at once.")
+def rtc_lite(virtual: bool) -> None:
+    """Send numbers through two emulated PICs, cut the power of one, and see it come back.
+
+    ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
+    RTComponent-Lite. The devices are processes on two ptys, in real time.
+    """
+    with loading():
+        from tickrig.emulators.rtc_lite.demo.play import run_demo  # noqa: PLC0415
+        from tickrig.emulators.rtc_lite.demo.stage import VirtualStage, pty_stage  # noqa: PLC0415
+        from tickrig.host.rtc.errors import RtcRefused  # noqa: PLC0415
+
+    try:
+        if virtual:
+            run_demo(VirtualStage(), click.echo)
+            return
+        with warnings_shown(), pty_stage() as stage:
+            run_demo(stage, click.echo)
+    except (RuntimeError, OSError, LinkError, RtcRefused) as error:
+        raise click.ClickException(str(error)) from error
