@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.start import loading
 from tickrig.host.links.errors import LinkError
 
