@@ -22,12 +22,12 @@ GRAPH = imports()
 # Circles that are still to be opened: who opens one takes its line away.
 MODULE_CIRCLES = [
     [
-        "tickrig.host.monitor.logs.reading.can_log",
-        "tickrig.host.monitor.logs.reading.log_reader",
+        "tickrig.host.monitor.logs.can_log",
+        "tickrig.host.monitor.logs.log_reader",
     ],
     [
-        "tickrig.host.monitor.logs.writing.can_log_writer",
-        "tickrig.host.monitor.logs.writing.log_writer",
+        "tickrig.host.monitor.logs.can_log_writer",
+        "tickrig.host.monitor.logs.log_writer",
     ],
 ]
 ROOM_CIRCLES = {

@@ -136,7 +136,7 @@ def bus_stage(options: BusOptions) -> Iterator[Stage]:
         raise Refused(f"{options.interface} is inside one process, and the nodes run in another")
     nodes = [f"--node={node_id}={model}" for node_id, model in CAST.items()]
     with ExitStack() as stack:
-        child = stack.enter_context(running(EMULATOR, *nodes, *options.words(), linked=False))
+        child = stack.enter_context(running(EMULATOR, *nodes, *options.arguments(), linked=False))
         hand = stack.enter_context(ControlClient(child.control))
         bus, *_ = open_raw(options)
         stack.callback(bus.shutdown)

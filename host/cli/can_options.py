@@ -52,7 +52,7 @@ class BusOptions:
         """Say whether a bus outside is asked for."""
         return bool(self.interface or self.channel or self.timing or self.bus_kwargs)
 
-    def words(self) -> list[str]:
+    def arguments(self) -> list[str]:
         """Return the words that say the same on another command line."""
         words = [f"--{name}={value}" for name in _PLAIN if (value := getattr(self, name))]
         for option, values in zip(GREEDY, (self.timing, self.bus_kwargs), strict=True):

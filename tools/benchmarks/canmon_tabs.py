@@ -46,7 +46,7 @@ class Frames:
         """Return the next batch."""
         return self._batches.pop()
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say nothing."""
         return []
 

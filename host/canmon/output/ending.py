@@ -29,7 +29,7 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
         FramesLost: frames were lost or could not be taken, and the caller is strict.
     """
     source.close()
-    for word in (*source.words(), *more):
+    for word in (*source.messages(), *more):
         click.echo(word, err=True)
     if source.failed:
         raise SourceFailed(source.failed)

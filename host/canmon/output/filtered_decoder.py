@@ -49,6 +49,6 @@ class FilteredDecoder:
             if wanted is None or (decoded is not None and wanted.matches(record, decoded)):
                 yield record, decoded
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say which signals the filter asks for that never came, one line each."""
-        return [] if self._missing is None else self._missing.words()
+        return [] if self._missing is None else self._missing.messages()

@@ -12,9 +12,8 @@ from tickrig.host.canmon.output.filtered_decoder import Meant
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogFormatError
-from tickrig.host.monitor.logs.reading.log_reader import LogError
-from tickrig.host.monitor.logs.writing.log_writer import write_log
+from tickrig.host.monitor.logs.log_file import LogError, LogFormatError
+from tickrig.host.monitor.logs.log_writer import write_log
 
 
 class LogFile:
@@ -61,5 +60,5 @@ class LogFile:
             self._writer.close()
         except OSError as error:
             raise SourceFailed(f"{self._path}: {error.strerror}") from error
-        for word in self._writer.words():
+        for word in self._writer.messages():
             click.echo(word, err=True)

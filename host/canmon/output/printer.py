@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, assert_never
 from tickrig.host.canmon.output.filtered_decoder import Meant
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.log_writer import log_line
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line
-from tickrig.host.monitor.logs.writing.log_writer import log_line
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.can_log import channel_name
 from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.reading.can_log import channel_name
 from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024

@@ -13,8 +13,9 @@ from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.monitor.frames.candump_filter import flagged_id
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
+from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.log_reader import read_log
 
 BATCH: Final = 1_024
 """Frames of one poll."""
@@ -68,10 +69,10 @@ class FileSource:
         self._ended = len(batch) < BATCH
         return batch
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what was no frame or got lost."""
         named = zip(self._names, self._readers, strict=True)
-        return [word for name, reader in named for word in reader.tally.words(name)]
+        return [word for name, reader in named for word in reader.tally.messages(name)]
 
     def losses(self) -> list[str]:
         """Say what got lost or could not be taken."""
@@ -148,9 +149,9 @@ class StdinSource:
         self._ended = True
         return self._lines.finish()
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what was no frame or got lost."""
-        return self._lines.tally.words("standard input")
+        return self._lines.tally.messages("standard input")
 
     def losses(self) -> list[str]:
         """Say what got lost or could not be taken."""

@@ -113,7 +113,7 @@ class LiveSource(Generic[Item]):
         self._came.clear()
         return [self._queue.popleft() for _ in range(len(self._queue))]
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what was no frame or got lost."""
         remarks = (word for one in self._readers for word in one.tally.remarks(one.name))
         return [*self.losses(), *remarks]

@@ -69,7 +69,7 @@ class AnySource(Protocol[Taken_co]):
         """Wait for a first frame, then return all that are there; none if none came."""
         ...
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what was no frame or got lost, one line each."""
         ...
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.reading.log_reader import LogError
+from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.traffic.traffic import Snapshot
 
 if TYPE_CHECKING:
@@ -48,9 +48,9 @@ class WholeLog:
         """Return nothing: all is in the columns."""
         return []
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what was no frame or got lost, one line each."""
-        return self.columns.tally.words(self._name)
+        return self.columns.tally.messages(self._name)
 
     def losses(self) -> list[str]:
         """Say what got lost or could not be taken."""

@@ -55,7 +55,7 @@ def command(  # noqa: PLR0913 - options
     meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
     with closing(frames), closing(LogFile(log, source)) as out, until_interrupted():
         pass_on(frames, meaning, out.take)
-    report(frames, strict, meaning.words())
+    report(frames, strict, meaning.messages())
 
 
 explain_sources(command)

@@ -118,7 +118,7 @@ def command(  # noqa: PLR0913 - options
         log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         with until_interrupted(), until_unread():
             pass_on(frames, meaning, (log or shown).take, count, quiet_ms)
-    report(frames, strict, meaning.words())
+    report(frames, strict, meaning.messages())
 
 
 def _is_line(word: str) -> bool:

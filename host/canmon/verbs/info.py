@@ -18,12 +18,13 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.log_file import (
     COMPRESSED,
     TEXT,
+    LogError,
     LogFormat,
     LogFormatError,
     log_format,
 )
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
+from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
 
 HEAD_FRAMES: Final = 1_000
@@ -114,7 +115,7 @@ def command(log: Sequence[Path], jsonl: bool) -> None:
     """  # noqa: D301 - click wants the backspace
     for path in log:
         head = _head(path)
-        for word in head.tally.words(str(path)):
+        for word in head.tally.messages(str(path)):
             click.echo(word, err=True)
         click.echo(_json(path, head) if jsonl else "\n".join(_lines(path, head)))
 

@@ -15,7 +15,8 @@ from tickrig.host.canmon.output.ending import until_interrupted
 from tickrig.host.canmon.sources.source import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.logs.reading.log_reader import LogError, LogReader, read_log
+from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.log_reader import LogReader, read_log
 from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, Lateness, ReplayPlan
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
@@ -60,7 +61,7 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     receives = wait_rx is not None
     with transmitters(words, BusOptions(**options), receives=receives) as opened:
         _play(plan, dict(zip(words, opened, strict=True)), step, wait_rx)
-    for word in reader.tally.words(str(path)):
+    for word in reader.tally.messages(str(path)):
         click.echo(word, err=True)
 
 

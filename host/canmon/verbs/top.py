@@ -100,7 +100,7 @@ def command(  # noqa: PLR0913 - options
             click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
-    report(frames, strict, meaning.words())
+    report(frames, strict, meaning.messages())
 
 
 def _take_decoded(model: TopModel, meaning: FilteredDecoder) -> Take:

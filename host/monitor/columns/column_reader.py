@@ -15,10 +15,10 @@ from typing import BinaryIO, Final
 
 from tickrig.host.monitor.columns.candump_block import CandumpBlock
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows, joined
-from tickrig.host.monitor.logs.log_file import LogFormat, log_format
-from tickrig.host.monitor.logs.reading.log_lines import WholeLines, parse_log_line
-from tickrig.host.monitor.logs.reading.log_reader import LogError, LogReader, open_log, read_log
-from tickrig.host.monitor.logs.reading.screen_line import HEAD, ScreenClock
+from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.log_lines import WholeLines, parse_log_line
+from tickrig.host.monitor.logs.log_reader import LogReader, read_log
+from tickrig.host.monitor.logs.screen_line import HEAD, ScreenClock
 from tickrig.host.monitor.logs.tally import Tally
 
 BLOCK_BYTES: Final = 1 << 20

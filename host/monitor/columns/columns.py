@@ -15,8 +15,8 @@ import numpy.typing as npt
 from tickrig.host.monitor.frames.candump_filter import flagged_id
 from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.reading.log_reader import LogError
-from tickrig.host.monitor.logs.tally import BadLines, Tally
+from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import EXTENDED_MAX, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 
@@ -52,11 +52,6 @@ class Columns:
     channel: npt.NDArray[np.uint8]
     channels: tuple[str, ...] = ()
     tally: Tally = field(default_factory=Tally)
-
-    @property
-    def bad_lines(self) -> BadLines:
-        """Lines that were none of the log."""
-        return self.tally.bad_lines
 
     def __len__(self) -> int:
         """Return how many frames there are."""

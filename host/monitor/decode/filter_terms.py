@@ -218,6 +218,6 @@ class MissingSignals:
             if name not in names or node not in (None, decoded.node)
         }
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what never came, one line each."""
         return [f"the filter asks for {path!r}: no such signal came" for path in self._left]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final, Literal, cast
 
 
 class LogFormat(StrEnum):
@@ -45,6 +45,10 @@ class LogFormatError(ValueError):
     """A name that tells no format."""
 
 
+class LogError(ValueError):
+    """A file that is no log or ends in the middle, or a format that cannot be written here."""
+
+
 def log_format(path: Path) -> LogFormat:
     """Return the format of a file.
 
@@ -70,3 +74,12 @@ def to_us(seconds: float) -> int:
     if not 0 <= seconds < END_S:
         raise ValueError(f"{seconds!r} s is not 0 to below 1e12 s")
     return round(seconds * 1e6)
+
+
+def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
+    """Open a file for reading or writing, through gzip where its name says so."""
+    if path.suffix.lower() != COMPRESSED:
+        return path.open(mode)
+    import gzip  # noqa: PLC0415 - seldom wanted
+
+    return cast("BinaryIO", gzip.open(path, mode))  # it is read and written like one

@@ -40,7 +40,7 @@ class BadLines:
         if len(self.first) < KEPT:
             self.first.append((number, line))
 
-    def words(self, name: str) -> list[str]:
+    def messages(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if there are none."""
         said = [
             f"{name}: line {number} is no frame: {line!a:.{SHOWN}}" for number, line in self.first
@@ -73,13 +73,13 @@ class Tally:
         frames = sum(n for what, n in self.passed_over.items() if what not in NO_FRAMES)
         return self.bad_lines.count + frames
 
-    def words(self, name: str) -> list[str]:
+    def messages(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if all was returned."""
         return self.losses(name) + self.remarks(name)
 
     def losses(self, name: str) -> list[str]:
         """Say what was lost or could not be taken."""
-        said = self.bad_lines.words(name) + self._passed_over(name, no_frames=False)
+        said = self.bad_lines.messages(name) + self._passed_over(name, no_frames=False)
         return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])
 
     def remarks(self, name: str) -> list[str]:

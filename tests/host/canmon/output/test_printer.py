@@ -6,7 +6,7 @@ from tickrig.host.canmon.output.printer import Output, printer_of
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.frames.record import LineRecord
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
+from tickrig.host.monitor.logs.log_lines import LogLines
 
 
 def line(data: bytes) -> LineRecord:
@@ -44,4 +44,4 @@ def test_a_log_reader_counts_lines_of_a_serial_port() -> None:
     found, lines = line(b"device\n"), LogLines()
     text = printer_of(Output.JSONL, Stamp.NONE, False, False)(found, found.decoded)
     assert lines.push(text.encode() + b"\n") == []
-    assert lines.tally.words("pipe") == ["pipe: 1 lines of a serial port passed over"]
+    assert lines.tally.messages("pipe") == ["pipe: 1 lines of a serial port passed over"]

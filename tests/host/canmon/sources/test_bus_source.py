@@ -81,7 +81,7 @@ def test_options_name_a_bus_as_well_and_can_fd_is_counted(bench: can.BusABC) -> 
     bench.send(can.Message(arbitration_id=2, is_extended_id=False))
     wait(source, bool)
     source.close()
-    assert source.words() == ["canmon-bench: 1 CAN FD frames passed over"]
+    assert source.messages() == ["canmon-bench: 1 CAN FD frames passed over"]
 
 
 @pytest.mark.realtime
@@ -90,7 +90,7 @@ def test_frames_that_nobody_fetches_are_lost_and_counted() -> None:
     source = BusSource([reader], [None], queue_frames=5)
     wait(source, lambda _: source.lost == 3)
     source.close()
-    assert source.words() == ["3 frames found the queue full"]
+    assert source.messages() == ["3 frames found the queue full"]
 
 
 @pytest.mark.realtime
@@ -194,7 +194,7 @@ def test_a_bus_without_an_interface_is_of_socketcan(monkeypatch: pytest.MonkeyPa
 def test_the_interface_may_be_configured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_INTERFACE", "virtual")
     source = open_source(["bench"])
-    assert (source.live, source.ended, source.words()) == (True, False, [])
+    assert (source.live, source.ended, source.messages()) == (True, False, [])
     source.close()
 
 

@@ -90,7 +90,7 @@ def test_frames_of_can_fd_and_can_xl_are_counted(bus: Bus, sender: Sender) -> No
     sender.socket.send(struct.pack("=IBBHI", 0x123, 0x80, 0, 2_048, 0) + bytes(2_048))
     sender.frame(0x705)
     read(reader, 1)
-    assert reader.tally.words("can0") == [
+    assert reader.tally.messages("can0") == [
         "can0: 1 CAN FD frames passed over",
         "can0: 1 CAN XL frames passed over",
     ]

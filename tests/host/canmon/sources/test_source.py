@@ -37,7 +37,7 @@ def log(folder: Path, text: str, name: str = "run.log") -> str:
 def test_a_file_gives_its_frames_and_says_which_lines_are_none(tmp_path: Path) -> None:
     source = open_source([log(tmp_path, LOG)])
     assert [str(record.frame) for record in drained(source)] == ["705#7F", "080#"]
-    assert source.words() == [
+    assert source.messages() == [
         f"{tmp_path}/run.log: line 2 is no frame: '(0000000000.020000) can0 185#3702R'"
     ]
     assert not source.live
@@ -120,7 +120,7 @@ def test_standard_input_tells_of_bad_lines_and_losses() -> None:
     assert source.poll(0) == []
     source.close()
     assert (source.lost, source.ended, source.live) == (3, True, True)
-    assert source.words() == [
+    assert source.messages() == [
         "standard input: line 1 is no frame: 'noise'",
         "standard input: its recorder lost 3 frames",
     ]

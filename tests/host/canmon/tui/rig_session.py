@@ -33,7 +33,7 @@ class RigSource:
         frames: Sequence[CanFrame] = self._host.receive(max(1, timeout_us))
         return [Record(self._host.now_us, BUS, frame) for frame in frames]
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         return []
 
     def losses(self) -> list[str]:

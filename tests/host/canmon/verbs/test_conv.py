@@ -5,7 +5,7 @@ from pathlib import Path
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.reading.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import read_log
 
 LOG = """\
 (1436509052.249713) can0 705#7F

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.reading.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 

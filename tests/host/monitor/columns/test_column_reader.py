@@ -12,8 +12,9 @@ from tickrig.host.monitor.columns.candump_block import CandumpBlock
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
 from tickrig.host.monitor.frames.candump_filter import flagged_id
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
+from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
 
 HEX = "0123456789abcdefABCDEF"
@@ -103,7 +104,7 @@ def test_lines_longer_than_a_block_and_files_without_end_are_whole(tmp_path: Pat
     line = "(0000000000.010000) can0 705#7F\n"
     path = log(tmp_path, line * 40_000 + "x" * (1 << 20) + "\n" + line[:-1])
     columns = read_columns(path)
-    assert (len(columns), columns.bad_lines.first[0][0]) == (40_001, 40_001)
+    assert (len(columns), columns.tally.bad_lines.first[0][0]) == (40_001, 40_001)
 
 
 def test_a_compressed_log_that_was_cut_is_refused(tmp_path: Path) -> None:

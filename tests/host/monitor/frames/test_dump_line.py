@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from tests.host.monitor.logs.reading.test_log_lines import read
+from tests.host.monitor.logs.test_log_lines import read
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame

@@ -13,7 +13,7 @@ from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.signal_spec import parse_signal
-from tickrig.host.monitor.logs.reading.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import NO_ACK
 

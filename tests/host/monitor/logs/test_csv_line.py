@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.logs.reading.test_log_lines import FRAMES
+from tests.host.monitor.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.output.printer import csv_printer
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_record
+from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.host.monitor.logs.notation import DUMP_HEADER
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.reading.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
-from tickrig.host.monitor.logs.writing.log_writer import write_log
 from tickrig.wire.can import CanFrame
 
 HEARDS = st.lists(
@@ -51,7 +51,7 @@ def test_buses_that_become_one_are_said(tmp_path: Path) -> None:
     for name in ("can0", "can1"):
         writer.write(Record(0, name, CanFrame(1)))
     writer.close()
-    assert writer.words() == ["run.csv: csv does not tell buses apart: can0, can1"]
+    assert writer.messages() == ["run.csv: csv does not tell buses apart: can0, can1"]
 
 
 def test_lines_of_a_serial_port_are_counted() -> None:

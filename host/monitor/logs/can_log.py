@@ -20,12 +20,11 @@ import can
 from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.blf_damage import BlfReader, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.log_file import LogFormat
+from tickrig.host.monitor.logs.log_file import LogError, LogFormat, open_log
 from tickrig.host.monitor.logs.notation import UNNAMED
-from tickrig.host.monitor.logs.reading.blf_damage import BlfReader, missing_end
-from tickrig.host.monitor.logs.reading.log_reader import LogError, open_log
-from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, BadLines, Tally
+from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, Tally
 
 _SILENT: Final = {
     LogFormat.ASC: re.compile(
@@ -128,11 +127,6 @@ class CanLogReader:
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, Tally()
-
-    @property
-    def bad_lines(self) -> BadLines:
-        """Lines that are none of the log, so far."""
-        return self.tally.bad_lines
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.notation import json_line
-from tickrig.host.monitor.logs.reading.log_lines import (
+from tickrig.host.monitor.logs.log_lines import (
     LONGEST,
     LogLines,
     WholeLines,
     parse_log_line,
 )
+from tickrig.host.monitor.logs.log_writer import log_line
+from tickrig.host.monitor.logs.notation import json_line
 from tickrig.host.monitor.logs.tally import Tally
-from tickrig.host.monitor.logs.writing.log_writer import log_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -121,8 +121,8 @@ def test_other_lines_are_bad(line: str) -> None:
 def test_the_first_bad_lines_are_kept_and_all_are_counted() -> None:
     lines = LogLines()
     lines.push(b"x\n" * 7)
-    assert lines.tally.words("run.log")[0] == "run.log: line 1 is no frame: 'x'"
-    assert lines.tally.words("run.log")[-1] == (
+    assert lines.tally.messages("run.log")[0] == "run.log: line 1 is no frame: 'x'"
+    assert lines.tally.messages("run.log")[-1] == (
         "run.log: 7 lines are no frames; the first 5 are shown"
     )
 

@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.monitor.columns.test_column_reader import rows_by_line, rows_of
-from tests.host.monitor.logs.reading.test_log_lines import FRAMES
+from tests.host.monitor.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.verbs.info import read_head
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.reading.log_lines import LogLines, parse_log_line
-from tickrig.host.monitor.logs.reading.log_reader import read_log
+from tickrig.host.monitor.logs.log_lines import LogLines, parse_log_line
+from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -61,7 +61,7 @@ def test_without_stamps_frames_have_no_time_and_that_is_said() -> None:
     text = "".join(f"{line[22:]}\n" for line in CANDUMP.splitlines() if line.startswith(" "))
     frames, tally = read(text)
     assert frames == [record._replace(at_us=0) for record in records(READ)]
-    assert tally.words("run.txt")[-1] == "run.txt: 6 frames have no time"
+    assert tally.messages("run.txt")[-1] == "run.txt: 6 frames have no time"
 
 
 def test_colours_are_passed_over() -> None:

@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
-from typing import BinaryIO, Final, Protocol, cast
+from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, LogFormat, log_format
+from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log
 from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
 from tickrig.wire.candump import LogLine
 
 BLOCK_LINES: Final = 256
+
+
+CAN_LOG_WRITER: Final = "tickrig.host.monitor.logs.can_log_writer"
+"""python-can is slow to import: this module is when a log needs it."""
+
+WRITERS: Final = {
+    LogFormat.CANDUMP: (__name__, "TextLogWriter"),
+    LogFormat.JSONL: (__name__, "TextLogWriter"),
+    LogFormat.CSV: (__name__, "CsvLogWriter"),
+    LogFormat.ASC: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.BLF: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.MF4: (CAN_LOG_WRITER, "CanLogWriter"),
+}
+"""Module and class of the writer of each format."""
 
 
 class LogWriter(Protocol):
@@ -28,7 +44,7 @@ class LogWriter(Protocol):
         """End the log; closing twice is no error."""
         ...
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what the format could not hold, one line each."""
         ...
 
@@ -42,22 +58,8 @@ def write_log(path: Path) -> LogWriter:
         LogError: its format needs a library that is not there.
     """
     kind = log_format(path)
-    if kind in TEXT:
-        return CsvLogWriter(path) if kind is LogFormat.CSV else TextLogWriter(create(path), kind)
-    from tickrig.host.monitor.logs.writing.can_log_writer import (  # noqa: PLC0415 - python-can is slow
-        CanLogWriter,
-    )
-
-    return CanLogWriter(path, kind)
-
-
-def create(path: Path) -> BinaryIO:
-    """Open a file for writing, through gzip where its name says so."""
-    if path.suffix.lower() != COMPRESSED:
-        return path.open("wb")
-    import gzip  # noqa: PLC0415 - seldom wanted
-
-    return cast("BinaryIO", gzip.open(path, "wb"))  # it is written like one
+    module, name = WRITERS[kind]
+    return cast("LogWriter", getattr(import_module(module), name)(path, kind))
 
 
 def log_line(record: Record) -> str:
@@ -76,8 +78,8 @@ _LINES: Final = {
 class TextLogWriter:
     """A log in lines: candump's, JSON or CSV."""
 
-    def __init__(self, file: BinaryIO, kind: LogFormat) -> None:
-        self._file, self._lines = file, list[str]()
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._file, self._lines = open_log(path, "wb"), list[str]()
         self._text = _LINES[kind]
 
     def write(self, record: Record, /) -> None:
@@ -97,7 +99,7 @@ class TextLogWriter:
             self._give()
             self._file.close()
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Nothing: these formats hold all there is."""
         return []
 
@@ -109,8 +111,8 @@ class TextLogWriter:
 class CsvLogWriter(TextLogWriter):
     """Rows below a header; they do not name their bus."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(create(path), LogFormat.CSV)
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        super().__init__(path, kind)
         self._name, self._channels = path.name, dict[str, None]()
         self._lines.append(LOG_HEADER)
 
@@ -119,7 +121,7 @@ class CsvLogWriter(TextLogWriter):
         self._channels[record.channel] = None
         super().write(record)
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say which buses became one."""
         if len(self._channels) < 2:
             return []

@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
-from typing import BinaryIO, Final, Protocol, cast
+from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import COMPRESSED, TEXT, log_format
-from tickrig.host.monitor.logs.reading.log_lines import LogLines
-from tickrig.host.monitor.logs.tally import BadLines, Tally
+from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.tally import Tally
 
 BLOCK_BYTES: Final = 1 << 13
 """So few frames at once that the garbage collector seldom meets them."""
 
+CAN_LOG: Final = "tickrig.host.monitor.logs.can_log"
+"""python-can is slow to import: this module is when a log needs it."""
 
-class LogError(ValueError):
-    """A file that is no log, or ends in the middle."""
+READERS: Final = {
+    LogFormat.CANDUMP: (__name__, "TextLogReader"),
+    LogFormat.JSONL: (__name__, "TextLogReader"),
+    LogFormat.CSV: (__name__, "TextLogReader"),
+    LogFormat.ASC: (CAN_LOG, "CanLogReader"),
+    LogFormat.BLF: (CAN_LOG, "CanLogReader"),
+    LogFormat.TRC: (CAN_LOG, "CanLogReader"),
+    LogFormat.MF4: (CAN_LOG, "CanLogReader"),
+}
+"""Module and class of the reader of each format."""
 
 
 class LogReader(Protocol):
@@ -33,11 +44,6 @@ class LogReader(Protocol):
 
     tally: Tally
 
-    @property
-    def bad_lines(self) -> BadLines:
-        """Lines that are none of the log, so far."""
-        ...
-
     def __iter__(self) -> Iterator[Record]: ...
 
 
@@ -48,32 +54,15 @@ def read_log(path: Path) -> LogReader:
         LogFormatError: the file's name tells no format.
     """
     kind = log_format(path)
-    if kind in TEXT:
-        return TextLogReader(path)
-    from tickrig.host.monitor.logs.reading.can_log import CanLogReader  # noqa: PLC0415 - python-can is slow
-
-    return CanLogReader(path, kind)
-
-
-def open_log(path: Path) -> BinaryIO:
-    """Open a file for reading, through gzip where its name says so."""
-    if path.suffix.lower() != COMPRESSED:
-        return path.open("rb")
-    import gzip  # noqa: PLC0415 - seldom wanted
-
-    return cast("BinaryIO", gzip.open(path, "rb"))  # it reads like one
+    module, name = READERS[kind]
+    return cast("LogReader", getattr(import_module(module), name)(path, kind))
 
 
 class TextLogReader:
     """A reader of a log in text."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: LogFormat) -> None:
         self._path, self.tally = path, Tally()
-
-    @property
-    def bad_lines(self) -> BadLines:
-        """Lines that are none of the log, so far."""
-        return self.tally.bad_lines
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""

@@ -14,9 +14,7 @@ import can
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
-from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat
-from tickrig.host.monitor.logs.reading.log_reader import LogError
-from tickrig.host.monitor.logs.writing.log_writer import create
+from tickrig.host.monitor.logs.log_file import COMPRESSED, LogError, LogFormat, open_log
 from tickrig.wire.can_error import ErrorFrame
 
 _DATE: Final = "%a %b %d %H:%M:%S.{:03d} %Y"
@@ -140,7 +138,7 @@ class CanLogWriter:
         self._path, self._kind, self._closed = path, kind, False
         self._numbers: dict[str, int] = {}
         self._passed_over: Counter[str] = Counter()
-        self._file: Any = create(path)
+        self._file: Any = open_log(path, "wb")
         if kind in TEXT:
             self._file = _Text(self._file, str(path))
         try:
@@ -169,7 +167,7 @@ class CanLogWriter:
             self._writer.stop()
             self._file.close()
 
-    def words(self) -> list[str]:
+    def messages(self) -> list[str]:
         """Say what the format could not hold."""
         named = self._path.name
         said = [f"{named}: {count} {what} left out" for what, count in self._passed_over.items()]

@@ -19,7 +19,7 @@ from typing import Final
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
-from tickrig.host.monitor.logs.reading.screen_line import ScreenClock, parse_screen_line
+from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError

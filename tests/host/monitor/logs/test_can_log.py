@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.logs.reading.test_log_lines import FRAMES
+from tests.host.monitor.logs.test_log_lines import FRAMES
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogFormatError, log_format
-from tickrig.host.monitor.logs.reading.log_reader import LogError, read_log
-from tickrig.host.monitor.logs.writing.log_writer import write_log
+from tickrig.host.monitor.logs.log_file import LogError, LogFormatError, log_format
+from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -168,7 +168,7 @@ def test_frames_before_a_blf_log_begins_are_said(tmp_path: Path) -> None:
     for at_us in (START_US, START_US - 100_000, START_US - 2_000_000):
         writer.write(Record(at_us, "can0", CanFrame.parse("705#7F")))
     writer.close()
-    assert writer.words() == ["run.blf: 1 frames from before its start moved there"]
+    assert writer.messages() == ["run.blf: 1 frames from before its start moved there"]
     begin_us = START_US // 1_000_000 * 1_000_000
     read = [record.at_us for record in read_log(tmp_path / "run.blf")]
     assert read == [START_US, START_US - 100_000, begin_us]
@@ -179,7 +179,7 @@ def test_frames_of_no_date_are_left_out_and_said(name: str, tmp_path: Path) -> N
     writer = write_log(tmp_path / name)
     writer.write(Record(999_999_999_999_000_000, "can0", CanFrame.parse("705#7F")))
     writer.close()
-    assert writer.words() == [f"{name}: 1 frames of the year 2500 and later left out"]
+    assert writer.messages() == [f"{name}: 1 frames of the year 2500 and later left out"]
 
 
 @pytest.mark.parametrize("stamp", ["inf", "nan", "-1.0", "1e12"])
@@ -195,7 +195,7 @@ def test_what_is_no_time_is_no_frame(name: str, stamp: str, tmp_path: Path) -> N
 def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.asc", ASC))
     assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102", "123#R5"]
-    assert reader.bad_lines.first == [(8, "   0.000300 1  705             Rx   d 1 ZZ")]
+    assert reader.tally.bad_lines.first == [(8, "   0.000300 1  705             Rx   d 1 ZZ")]
     assert reader.tally.passed_over == {"lines with other events": 1, "CAN FD frames": 1}
 
 
@@ -218,14 +218,14 @@ def test_a_line_that_its_reader_passes_over_is_bad_unless_it_is_an_event(
     assert len(list(reader)) == len(list(read_log(log(tmp_path, name, head))))
     reader = read_log(log(tmp_path, name, head + text))
     list(reader)
-    assert reader.bad_lines.count == 1 + bad
+    assert reader.tally.bad_lines.count == 1 + bad
     assert reader.tally.passed_over["lines with other events"] == 2 - bad
 
 
 def test_bad_lines_of_trc_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.trc", TRC))
     assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102"]
-    assert [number for number, _ in reader.bad_lines.first] == [6]
+    assert [number for number, _ in reader.tally.bad_lines.first] == [6]
     assert reader.tally.passed_over == {"lines with other events": 1}
 
 
@@ -239,13 +239,13 @@ def test_a_trc_log_whose_head_does_not_tell_the_columns_is_none(tmp_path: Path) 
 def test_bad_lines_of_csv_are_counted_and_reading_goes_on(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.csv", CSV))
     assert [str(record.frame) for record in reader] == ["705#7F", "00000605#0102"]
-    assert reader.bad_lines.first == [(3, "oops")]
+    assert reader.tally.bad_lines.first == [(3, "oops")]
 
 
 def test_a_reader_reads_from_the_beginning_each_time(tmp_path: Path) -> None:
     reader = read_log(log(tmp_path, "run.csv", CSV))
     assert list(reader) == list(reader)
-    assert reader.bad_lines.count == 1
+    assert reader.tally.bad_lines.count == 1
 
 
 def test_objects_of_blf_that_are_no_frames_are_counted(tmp_path: Path) -> None:
@@ -255,7 +255,7 @@ def test_objects_of_blf_that_are_no_frames_are_counted(tmp_path: Path) -> None:
         writer.on_message_received(can.Message(timestamp=1_436_509_053, arbitration_id=1))
     reader = read_log(path)
     assert len(list(reader)) == 1
-    assert reader.tally.words("run.blf") == ["run.blf: 1 objects that are no frames passed over"]
+    assert reader.tally.messages("run.blf") == ["run.blf: 1 objects that are no frames passed over"]
 
 
 def blf(path: Path, frames: int) -> bytes:

@@ -1,1 +1,0 @@
-"""Log files read, one module a format."""
