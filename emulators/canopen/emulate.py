@@ -46,7 +46,7 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     if not (model or rtc):
         raise Refused("--write-eds belongs to --model or --rtc")
     description = describe_device(model or rtc or "")
-    text = format_eds(description.template, description.info)
+    text = format_eds(description.template.description, description.info)
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return

@@ -42,7 +42,7 @@ class Model:
         template = self.dictionary()
         return DeviceDescription(
             self.name,
-            DeviceInfo(VENDOR, template[PRODUCT, 0].default.decode("ascii"), bit_rates=BIT_RATES),
+            DeviceInfo(VENDOR, template[PRODUCT, 0].data.decode("ascii"), bit_rates=BIT_RATES),
             template,
             self.node_id,
             application=self.application,

@@ -12,7 +12,6 @@ from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tests.emulators.can.can_bench import Log
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.sim_network import SimNetwork
@@ -20,6 +19,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 NODE_ID = 5
 
@@ -27,15 +27,15 @@ NODE_ID = 5
 def dictionary(*needs: str) -> Dictionary:
     """Make that of the reference slave, with what the library wants to know of a drive."""
     made = make_dictionary(needs)
-    modes = Entry(
+    modes = EntryDescription(
         0x6502, 0, "Supported drive modes", DataType.UNSIGNED32, Access.READ, default=0x1FF
     )
-    return Dictionary([*made, modes], made.objects)
+    return Dictionary([*made.description, modes], made.objects)
 
 
 def eds(*needs: str) -> io.StringIO:
     """Return the EDS of the reference slave, as the library wants a file."""
-    file = io.StringIO(write_eds(dictionary(*needs)))
+    file = io.StringIO(write_eds(dictionary(*needs).description))
     file.name = "reference.eds"
     return file
 

@@ -36,7 +36,7 @@ def drive(vcan: Bus) -> Iterator[Slave]:
 def node(vcan: Bus, drive: Slave) -> Iterator[Any]:
     network = canopen.Network()
     network.connect(**vcan.keywords)
-    file = io.StringIO(write_eds(epos.dictionary()))
+    file = io.StringIO(write_eds(epos.dictionary().description))
     file.name = "epos.eds"
     kind: Any = BaseNode402
     node: Any = network.add_node(kind(LEFT_WHEEL, file))

@@ -9,7 +9,6 @@ from pathlib import Path
 from benchmarks.canopen_peers import NODE_ID, PEERS, REPLY, REQUEST, Peer, our_slave
 from benchmarks.table import RUNS, rates, row
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
@@ -17,6 +16,7 @@ from tickrig.emulators.canopen.eds.eds_cache import EdsCache
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 UPLOAD = bytes.fromhex("4002200000000000")
 CALLS = 20_000
@@ -70,11 +70,15 @@ def small_dictionary() -> Dictionary:
     """Return a dictionary with an SDO server and one number."""
     return Dictionary(
         [
-            Entry(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ),
-            Entry(0x1200, 0, "n", DataType.UNSIGNED8, Access.READ, default=2),
-            Entry(0x1200, 1, "c2s", DataType.UNSIGNED32, Access.READ, default=0x600, relative=True),
-            Entry(0x1200, 2, "s2c", DataType.UNSIGNED32, Access.READ, default=0x580, relative=True),
-            Entry(0x2002, 0, "u32", DataType.UNSIGNED32, RW),
+            EntryDescription(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ),
+            EntryDescription(0x1200, 0, "n", DataType.UNSIGNED8, Access.READ, default=2),
+            EntryDescription(
+                0x1200, 1, "c2s", DataType.UNSIGNED32, Access.READ, default=0x600, relative=True
+            ),
+            EntryDescription(
+                0x1200, 2, "s2c", DataType.UNSIGNED32, Access.READ, default=0x580, relative=True
+            ),
+            EntryDescription(0x2002, 0, "u32", DataType.UNSIGNED32, RW),
         ]
     )
 
@@ -180,15 +184,15 @@ def tpdo_dictionary(produces_sync: bool) -> Dictionary:
     tpdo = Access.READ | Access.WRITE | Access.TPDO
     return Dictionary(
         [
-            *small_dictionary(),
-            Entry(0x1005, 0, "SYNC", u32, RW, default=0x80 | produces_sync << 30),
-            Entry(0x1006, 0, "Cycle", u32, RW, default=20_000 if produces_sync else 0),
-            Entry(0x1017, 0, "Heartbeat", u16, RW, default=100),
-            Entry(0x1800, 0, "n", u8, Access.READ, default=2),
-            Entry(0x1800, 1, "COB-ID", u32, RW, default=0x4000_0180, relative=True),
-            Entry(0x1800, 2, "Type", u8, RW, default=1),
-            Entry(0x1A00, 0, "n", u8, RW, default=1),
-            Entry(0x1A00, 1, "map", u32, RW, default=0x2003_0040),
-            Entry(0x2003, 0, "u64", DataType.UNSIGNED64, tpdo, default=1),
+            *small_dictionary().description,
+            EntryDescription(0x1005, 0, "SYNC", u32, RW, default=0x80 | produces_sync << 30),
+            EntryDescription(0x1006, 0, "Cycle", u32, RW, default=20_000 if produces_sync else 0),
+            EntryDescription(0x1017, 0, "Heartbeat", u16, RW, default=100),
+            EntryDescription(0x1800, 0, "n", u8, Access.READ, default=2),
+            EntryDescription(0x1800, 1, "COB-ID", u32, RW, default=0x4000_0180, relative=True),
+            EntryDescription(0x1800, 2, "Type", u8, RW, default=1),
+            EntryDescription(0x1A00, 0, "n", u8, RW, default=1),
+            EntryDescription(0x1A00, 1, "map", u32, RW, default=0x2003_0040),
+            EntryDescription(0x2003, 0, "u64", DataType.UNSIGNED64, tpdo, default=1),
         ]
     )

@@ -10,11 +10,11 @@ from durand import DatatypeEnum, Node, Variable
 from durand.network import NetworkABC
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 NODE_ID = 5
 REQUEST, REPLY = 0x600 + NODE_ID, 0x580 + NODE_ID
@@ -27,12 +27,16 @@ Peer = Callable[[bytes], list[bytes]]
 def our_slave() -> Peer:
     """Our slave, ticked once for each request."""
     entries = [
-        Entry(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ, default=0x191),
-        Entry(0x1200, 0, "Highest", DataType.UNSIGNED8, Access.READ, default=2),
-        Entry(0x1200, 1, "Client", DataType.UNSIGNED32, Access.READ, default=0x600, relative=True),
-        Entry(0x1200, 2, "Server", DataType.UNSIGNED32, Access.READ, default=0x580, relative=True),
-        Entry(0x2002, 0, "u32", DataType.UNSIGNED32, RW, default=1),
-        Entry(0x2008, 0, "domain", DataType.DOMAIN, RW),
+        EntryDescription(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ, default=0x191),
+        EntryDescription(0x1200, 0, "Highest", DataType.UNSIGNED8, Access.READ, default=2),
+        EntryDescription(
+            0x1200, 1, "Client", DataType.UNSIGNED32, Access.READ, default=0x600, relative=True
+        ),
+        EntryDescription(
+            0x1200, 2, "Server", DataType.UNSIGNED32, Access.READ, default=0x580, relative=True
+        ),
+        EntryDescription(0x2002, 0, "u32", DataType.UNSIGNED32, RW, default=1),
+        EntryDescription(0x2008, 0, "domain", DataType.DOMAIN, RW),
     ]
     slave = make_slave(Dictionary(entries), NODE_ID)
     now_us = TICK_US

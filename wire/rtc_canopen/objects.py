@@ -1,7 +1,7 @@
 """The objects of a DeviceRTC, made of its profile (DECISION K2, K3, K17).
 
 >>> table = object_table(RtcProfile(type_name="Empty"))
->>> {f"{row.index:04X}h": row.data.decode() for row in table if row.index == 0x1008}
+>>> {f"{row.index:04X}h": row.default.decode() for row in table if row.index == 0x1008}
 {'1008h': 'Empty'}
 """
 

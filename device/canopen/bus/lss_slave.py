@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping
+from operator import eq, ge, le
 from typing import Final
 
-from tickrig.device.canopen.bus.lss_identification import IDENTIFY, SELECTIVE, FastScanner, Question
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import (
     BIT_RATES,
+    FASTSCAN_RESET,
     LSS_MASTER_COB_ID,
     LSS_SLAVE_COB_ID,
     MESSAGE_BYTES,
@@ -30,7 +30,66 @@ from tickrig.wire.instant import NEVER
 IDENTITY: Final = 0x1018
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)
 
-Command = Callable[[bytes], None]
+MAX_BIT: Final = 31
+MAX_SUB: Final = 3
+
+Test = tuple[int, Callable[[int, int], bool]]
+"""A part of the LSS address, and how the number of a message is compared with it."""
+
+SELECTIVE: Final[tuple[Test, ...]] = ((0, eq), (1, eq), (2, eq), (3, eq))
+"""Switch state selective: the whole LSS address."""
+
+IDENTIFY: Final[tuple[Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, le), (3, ge))
+"""Identify remote slave: revision and serial number in a range, bounds included."""
+
+
+class MessageSequence:
+    """One request in several messages; a wrong one or a missing one ends it.
+
+    Args:
+        tests: one for each message, in their order.
+    """
+
+    def __init__(self, tests: tuple[Test, ...]) -> None:
+        self._tests, self._step = tests, 0
+
+    def take(self, step: int, address: LssAddress, number: int) -> bool:
+        """Take a message. Returns: whether it was the last one and all of them fit."""
+        if step == 0:
+            self._step = 0
+        part, fits = self._tests[step]
+        if step != self._step or not fits(number, address[part]):
+            self._step = len(self._tests)
+            return False
+        self._step += 1
+        return self._step == len(self._tests)
+
+
+class FastScanner:
+    """Follows a fastscan: one part of the LSS address after the other."""
+
+    def __init__(self) -> None:
+        self._sub = 0
+
+    def take(self, request: FastScan, address: LssAddress) -> LssMode | None:
+        """Take a request. Returns: the state after it if it is answered, else None."""
+        if request.bit_check == FASTSCAN_RESET:
+            self._sub = 0
+            return LssMode.WAITING
+        if request.bit_check > MAX_BIT or request.sub != self._sub:
+            return None
+        if (address[self._sub] ^ request.id_number) >> request.bit_check:
+            return None
+        if request.bit_check:
+            return LssMode.WAITING
+        return self._advance(request)
+
+    def _advance(self, request: FastScan) -> LssMode | None:
+        """Go on to the next part; the part before it means that all were found."""
+        if request.next_sub > MAX_SUB:
+            return None
+        self._sub = request.next_sub
+        return LssMode.CONFIGURATION if request.next_sub < request.sub else LssMode.WAITING
 
 
 class LssSlave(Service):
@@ -54,15 +113,14 @@ class LssSlave(Service):
         self._mode = LssMode.WAITING
         self._bit_rate_index: int | None = None
         self._switch_us = NEVER
-        self._selective, self._identify = Question(SELECTIVE), Question(IDENTIFY)
+        self._selective, self._identify = MessageSequence(SELECTIVE), MessageSequence(IDENTIFY)
         self._fastscan = FastScanner()
-        self._commands = self._make_commands()
 
     def power_on(self) -> None:
         """Begin with the stored bit rate."""
         self._switch_us = NEVER
         self._bit_rate_index = self.node.nonvolatile.bit_rate_index
-        self._tell_bit_rate()
+        self._notify_bit_rate()
 
     def start(self) -> None:
         """Wait for the LSS master; a bit rate that is on its way still comes."""
@@ -81,7 +139,7 @@ class LssSlave(Service):
     def tick(self, now_us: int) -> None:
         """Switch the bit rate."""
         self._switch_us = NEVER
-        self._tell_bit_rate()
+        self._notify_bit_rate()
 
     @property
     def _address(self) -> LssAddress:
@@ -91,36 +149,12 @@ class LssSlave(Service):
     def _is_unconfigured(self) -> bool:
         return self.node.node_id == self.node.pending_id == UNCONFIGURED
 
-    def _make_commands(self) -> dict[LssMode, dict[int, Command]]:
-        always: dict[int, Command] = {
-            LssCommand.SWITCH_GLOBAL: self._switch_global,
-            LssCommand.IDENTIFY_NON_CONFIGURED: self._identify_non_configured,
-        }
-        for step in range(len(IDENTIFY)):
-            always[LssCommand.IDENTIFY_VENDOR + step] = partial(self._identify_remote, step)
-        waiting: dict[int, Command] = {LssCommand.FASTSCAN: self._scan}
-        for step in range(len(SELECTIVE)):
-            waiting[LssCommand.SWITCH_VENDOR + step] = partial(self._switch_selective, step)
-        configuration: dict[int, Command] = {
-            LssCommand.CONFIGURE_NODE_ID: self._configure_node_id,
-            LssCommand.CONFIGURE_BIT_TIMING: self._configure_bit_timing,
-            LssCommand.ACTIVATE_BIT_TIMING: self._activate_bit_timing,
-            LssCommand.STORE: self._store,
-            LssCommand.INQUIRE_NODE_ID: self._inquire_node_id,
-        }
-        for step in range(len(LssAddress._fields)):
-            configuration[LssCommand.INQUIRE_VENDOR + step] = partial(self._inquire, step)
-        return {
-            LssMode.WAITING: {**always, **waiting},
-            LssMode.CONFIGURATION: {**always, **configuration},
-        }
-
     def _receive(self, frame: CanFrame) -> None:
         data = frame.data
         if len(data) == MESSAGE_BYTES:
-            command = self._commands[self._mode].get(data[0])
+            command = _COMMANDS[self._mode].get(data[0])
             if command is not None:
-                command(data)
+                command(self, data)
 
     def _answer(self, command: LssCommand, number: int = 0) -> None:
         self.node.send(LSS_SLAVE_COB_ID, message(command, number))
@@ -137,13 +171,15 @@ class LssSlave(Service):
             if node.node_id == UNCONFIGURED and node.pending_id != UNCONFIGURED:
                 node.reset_communication()
 
-    def _switch_selective(self, step: int, data: bytes) -> None:
-        if self._selective.ask(step, self._address, number_of(data)):
+    def _switch_selective(self, data: bytes) -> None:
+        step = data[0] - LssCommand.SWITCH_VENDOR
+        if self._selective.take(step, self._address, number_of(data)):
             self._mode = LssMode.CONFIGURATION
             self._answer(LssCommand.SWITCHED)
 
-    def _identify_remote(self, step: int, data: bytes) -> None:
-        if self._identify.ask(step, self._address, number_of(data)):
+    def _identify_remote(self, data: bytes) -> None:
+        step = data[0] - LssCommand.IDENTIFY_VENDOR
+        if self._identify.take(step, self._address, number_of(data)):
             self._answer(LssCommand.IDENTIFIED)
 
     def _identify_non_configured(self, data: bytes) -> None:
@@ -153,7 +189,7 @@ class LssSlave(Service):
     def _scan(self, data: bytes) -> None:
         if not self._is_unconfigured:
             return
-        mode = self._fastscan.ask(FastScan.parse(data), self._address)
+        mode = self._fastscan.take(FastScan.parse(data), self._address)
         if mode is not None:
             self._mode = mode
             self._answer(LssCommand.IDENTIFIED)
@@ -183,15 +219,42 @@ class LssSlave(Service):
         nonvolatile.changed()
         self._acknowledge(LssCommand.STORE, allowed=True)
 
-    def _inquire(self, step: int, data: bytes) -> None:
-        self._answer(LssCommand(data[0]), self._address[step])
+    def _inquire(self, data: bytes) -> None:
+        command = LssCommand(data[0])
+        self._answer(command, self._address[command - LssCommand.INQUIRE_VENDOR])
 
     def _inquire_node_id(self, data: bytes) -> None:
         self._answer(LssCommand.INQUIRE_NODE_ID, self.node.node_id)
 
-    def _tell_bit_rate(self) -> None:
-        """Tell the bit rate, if one was ever configured."""
+    def _notify_bit_rate(self) -> None:
+        """Give the bit rate to the subscribers, if one was ever configured."""
         bit_rate = BIT_RATES.get(-1 if self._bit_rate_index is None else self._bit_rate_index)
         if bit_rate is not None:
-            for told in self.node.on_bit_rate:
-                told(bit_rate)
+            for notify in self.node.on_bit_rate:
+                notify(bit_rate)
+
+
+_Command = Callable[[LssSlave, bytes], None]
+
+_ALWAYS: Final[Mapping[int, _Command]] = {
+    LssCommand.SWITCH_GLOBAL: LssSlave._switch_global,
+    LssCommand.IDENTIFY_NON_CONFIGURED: LssSlave._identify_non_configured,
+    **{LssCommand.IDENTIFY_VENDOR + n: LssSlave._identify_remote for n in range(len(IDENTIFY))},
+}
+_COMMANDS: Final[Mapping[LssMode, Mapping[int, _Command]]] = {
+    LssMode.WAITING: {
+        **_ALWAYS,
+        LssCommand.FASTSCAN: LssSlave._scan,
+        **{LssCommand.SWITCH_VENDOR + n: LssSlave._switch_selective for n in range(len(SELECTIVE))},
+    },
+    LssMode.CONFIGURATION: {
+        **_ALWAYS,
+        LssCommand.CONFIGURE_NODE_ID: LssSlave._configure_node_id,
+        LssCommand.CONFIGURE_BIT_TIMING: LssSlave._configure_bit_timing,
+        LssCommand.ACTIVATE_BIT_TIMING: LssSlave._activate_bit_timing,
+        LssCommand.STORE: LssSlave._store,
+        LssCommand.INQUIRE_NODE_ID: LssSlave._inquire_node_id,
+        **{LssCommand.INQUIRE_VENDOR + n: LssSlave._inquire for n in range(len(SELECTIVE))},
+    },
+}
+"""What a message does, by its command specifier."""

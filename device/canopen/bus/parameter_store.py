@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import COMMUNICATION_AREA, CanopenSlave
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import RW, Access
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 STORE_PARAMETERS: Final = 0x1010
@@ -57,24 +56,23 @@ class ParameterStore(Service):
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.volatile = set(VOLATILE)
-        self._entries: list[Entry] = []
-        self._hang(STORE_PARAMETERS, SAVE, self._save)
-        self._hang(RESTORE_DEFAULTS, LOAD, self._load)
+        dictionary = node.dictionary
+        self._entries = [
+            *dictionary.elements(STORE_PARAMETERS, LAST_SUB),
+            *dictionary.elements(RESTORE_DEFAULTS, LAST_SUB),
+        ]
+        for entry in self._entries:
+            entry.guard, entry.written = _check_signature, self._act
 
     def start(self) -> None:
-        """Tell what it can."""
+        """Show what it can."""
         for entry in self._entries:
-            _tell(entry)
+            _show_on_command(entry)
 
-    def _hang(self, index: int, signature: int, act: Callable[[range], None]) -> None:
-        for entry in self.node.dictionary.elements(index, LAST_SUB):
-            entry.guard = partial(_check_signature, signature)
-            entry.written = partial(self._act, entry, act)
-            self._entries.append(entry)
-
-    def _act(self, entry: Entry, act: Callable[[range], None]) -> None:
-        _tell(entry)
-        act(_AREAS.get(entry.sub, _MANUFACTURER_AREA))
+    def _act(self, entry: Entry) -> None:
+        _show_on_command(entry)
+        area = _AREAS.get(entry.sub, _MANUFACTURER_AREA)
+        (self._save if entry.index == STORE_PARAMETERS else self._load)(area)
         self.node.nonvolatile.changed()
 
     def _save(self, area: range) -> None:
@@ -82,7 +80,7 @@ class ParameterStore(Service):
         for entry in self.node.dictionary:
             if entry.index not in area or not self._is_parameter(entry):
                 continue
-            if entry.data == entry.power_on_data(node_id):
+            if entry.data == entry.description.power_on_data(node_id):
                 stored.pop(entry.key, None)
             else:
                 stored[entry.key] = entry.data
@@ -93,20 +91,20 @@ class ParameterStore(Service):
             del stored[key]
 
     def _is_parameter(self, entry: Entry) -> bool:
+        access = entry.description.access
         return (
-            entry.readable
-            and entry.writable
+            RW in access
             and entry.index not in self.volatile
             and entry.data_type is not DataType.DOMAIN
-            and (Access.RPDO not in entry.access or Access.TPDO in entry.access)
+            and (Access.RPDO not in access or Access.TPDO in access)
         )
 
 
-def _tell(entry: Entry) -> None:
+def _show_on_command(entry: Entry) -> None:
     """Put back what is read there; the signature was only a command."""
     entry.assign(ON_COMMAND.ljust(entry.size, b"\0"))
 
 
-def _check_signature(signature: int, value: Value) -> None:
-    if value != signature:
+def _check_signature(entry: Entry, value: Value) -> None:
+    if value != (SAVE if entry.index == STORE_PARAMETERS else LOAD):
         raise SdoAbort(AbortCode.NOT_STORED)

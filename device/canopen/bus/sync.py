@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.pdo.pdo_mapping import whole_number
+from tickrig.device.canopen.pdo.pdo_parameters import whole_number
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, is_restricted
 from tickrig.wire.canopen.datatypes import Value
@@ -47,12 +48,12 @@ class Sync(Service):
         self._due_us, self._counter, self._length, self._length_error = NEVER, 0, 0, False
         if self._cob_id is not None:
             self._cob_id.guard = self._check_cob_id
-            self._cob_id.watchers.append(self._changed)
+            self._cob_id.watch(self._changed)
         if self._period is not None:
-            self._period.watchers.append(self._changed)
+            self._period.watch(self._changed)
         if self._overflow is not None:
             self._overflow.guard = self._check_overflow
-            self._overflow.watchers.append(self._changed)
+            self._overflow.watch(self._changed)
 
     @property
     def can_id(self) -> int:
@@ -116,7 +117,7 @@ class Sync(Service):
         for told in self.node.on_sync:
             told(counter)
 
-    def _changed(self) -> None:
+    def _changed(self, entry: Entry) -> None:
         """Follow another COB-ID, period or overflow value."""
         if self.node.state in ALIVE:
             self.node.rewire()
@@ -128,7 +129,7 @@ class Sync(Service):
         running = self._produces and self.period_us and self.node.state in ALIVE
         self.schedule(self.node.now_us if running else NEVER)
 
-    def _check_cob_id(self, value: Value) -> None:
+    def _check_cob_id(self, entry: Entry, value: Value) -> None:
         """Refuse what is no CAN-ID for it, and another one while it produces."""
         cob_id = whole_number(value)
         can_id, producer = cob_id & CAN_ID_MASK, bool(cob_id & FLAG_30)
@@ -137,7 +138,7 @@ class Sync(Service):
         if producer and (self._period is None or (self._produces and can_id != self.can_id)):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
-    def _check_overflow(self, value: Value) -> None:
+    def _check_overflow(self, entry: Entry, value: Value) -> None:
         """Refuse an impossible counter, and any while a period is set."""
         if value not in COUNTER_OVERFLOWS:
             raise SdoAbort(AbortCode.VALUE_RANGE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.device.canopen.core.cob_id_rules import cob_id_guard, takes_part
+from tickrig.device.canopen.core.cob_id_rules import check_time_cob_id
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.wire.can import CanFrame
@@ -34,8 +34,8 @@ class TimeStamp(Service):
         self._set_us, self._ordered = 0, TimeOfDay(0, 0)
         self._cob_id = node.dictionary.find(COB_ID_TIME)
         if self._cob_id is not None:
-            self._cob_id.guard = cob_id_guard(self._cob_id, CONSUMES | PRODUCES, takes_part)
-            self._cob_id.watchers.append(node.rewire)
+            self._cob_id.guard = check_time_cob_id
+            self._cob_id.watch(self.follow_cob_id)
 
     @property
     def now(self) -> TimeOfDay | None:

@@ -62,8 +62,12 @@ class Application(Service):
 
     def watch(self, entries: Iterable[Entry]) -> None:
         """Call `on_execute` whenever one of these objects has changed."""
+        changed = self._object_changed
         for entry in entries:
-            entry.watchers.append(self.request)
+            entry.watch(changed)
+
+    def _object_changed(self, entry: Entry) -> None:
+        self.request()
 
     def tick(self, now_us: int) -> None:
         """Execute."""

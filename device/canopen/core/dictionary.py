@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
+from operator import attrgetter
+from typing import Final, Self
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.canopen.eds.object_table import ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
-__all__ = ["Dictionary", "ObjectCode", "ObjectInfo"]
+NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
 
 
-class Dictionary:
-    """All entries of one slave.
+class DictionaryDescription:
+    """What never changes in the dictionaries of one type of device; all its slaves share it.
 
     Args:
         entries: in any order; they are kept sorted.
@@ -22,44 +24,91 @@ class Dictionary:
 
     Raises:
         ValueError: two entries have the same index and sub-index.
+
+    Attributes:
+        entries: sorted by index and sub-index.
+        objects: names and kinds by index, sorted.
+        places: place among the entries by index << 8 | sub-index.
     """
 
+    __slots__ = ("entries", "objects", "places")
+
     def __init__(
-        self, entries: Iterable[Entry], objects: dict[int, ObjectInfo] | None = None
+        self, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
     ) -> None:
-        ordered = sorted(entries, key=lambda entry: entry.key)
-        self._entries = {entry.key: entry for entry in ordered}
-        if len(self._entries) != len(ordered):
-            twice = next(a for a, b in pairwise(ordered) if a.key == b.key)
+        self.entries = tuple(sorted(entries, key=attrgetter("key")))
+        self.places = {entry.key: place for place, entry in enumerate(self.entries)}
+        if len(self.places) != len(self.entries):
+            twice = next(a for a, b in pairwise(self.entries) if a.key == b.key)
             raise ValueError(f"{twice!r} is in the dictionary twice")
-        self.by_multiplexer = {
-            entry.index.to_bytes(2, "little") + bytes([entry.sub]): entry for entry in ordered
-        }
-        known = objects or {}
-        self.objects = {
-            entry.index: known.get(entry.index, ObjectInfo(entry.name)) for entry in ordered
+        self.objects: Mapping[int, ObjectDescription] = {
+            entry.index: objects.get(entry.index, ObjectDescription(entry.name))
+            for entry in self.entries
         }
 
-    def copy(self) -> Dictionary:
+    def __iter__(self) -> Iterator[EntryDescription]:
+        """Give all entries, sorted."""
+        return iter(self.entries)
+
+
+class Dictionary:
+    """All entries of one slave: values of its own, and a description that it shares.
+
+    Args:
+        entries: in any order; they are kept sorted.
+        objects: names and kinds of arrays and records; a variable is called as its entry.
+
+    Raises:
+        ValueError: two entries have the same index and sub-index.
+
+    Attributes:
+        description: names, types, access, limits and defaults.
+        by_multiplexer: entries that an SDO has named, by the three bytes that name them.
+
+    >>> from tickrig.wire.canopen.datatypes import DataType
+    >>> from tickrig.wire.canopen.eds.object_table import RW
+    >>> dictionary = Dictionary([EntryDescription(0x2000, 0, "Gain", DataType.UNSIGNED8, RW)])
+    >>> dictionary[0x2000, 0].value = 5
+    >>> dictionary[0x2000, 0].value, dictionary.copy()[0x2000, 0].value
+    (5, 0)
+    """
+
+    __slots__ = ("_entries", "_places", "by_multiplexer", "description")
+
+    def __init__(
+        self,
+        entries: Iterable[EntryDescription],
+        objects: Mapping[int, ObjectDescription] = NO_OBJECTS,
+    ) -> None:
+        self._describe(DictionaryDescription(entries, objects))
+
+    def _describe(self, description: DictionaryDescription) -> None:
+        self.description, self._places = description, description.places
+        self._entries = [Entry(each) for each in description.entries]
+        self.by_multiplexer: dict[bytes, Entry] = {}
+
+    def copy(self) -> Self:
         """Return the same objects with their default values, for another slave."""
-        twin = Dictionary.__new__(Dictionary)
-        entries = [entry.copy() for entry in self._entries.values()]
-        twin._entries = dict(zip(self._entries, entries, strict=True))
-        twin.by_multiplexer = dict(zip(self.by_multiplexer, entries, strict=True))
-        twin.objects = self.objects
+        twin = type(self).__new__(type(self))
+        twin._describe(self.description)
         return twin
+
+    @property
+    def objects(self) -> Mapping[int, ObjectDescription]:
+        """Names and kinds by index, sorted."""
+        return self.description.objects
 
     def __iter__(self) -> Iterator[Entry]:
         """Give all entries, sorted."""
-        return iter(self._entries.values())
+        return iter(self._entries)
 
     def __len__(self) -> int:
         """Return the number of entries."""
         return len(self._entries)
 
     def __contains__(self, at: tuple[int, int]) -> bool:
-        """Say whether there is an entry at (index, sub-index)."""
-        return at[0] << 8 | at[1] in self._entries
+        """Return whether there is an entry at (index, sub-index)."""
+        return at[0] << 8 | at[1] in self._places
 
     def __getitem__(self, at: tuple[int, int]) -> Entry:
         """Return the entry at (index, sub-index); KeyError if there is none."""
@@ -70,14 +119,19 @@ class Dictionary:
 
     def find(self, index: int, sub: int = 0) -> Entry | None:
         """Return an entry, None if there is none."""
-        return self._entries.get(index << 8 | sub)
+        place = self._places.get(index << 8 | sub)
+        return None if place is None else self._entries[place]
 
     def look_up(self, multiplexer: bytes) -> Entry:
         """Return the entry that an SDO names by three bytes; SdoAbort if there is none."""
         entry = self.by_multiplexer.get(multiplexer)
         if entry is None:
-            known = int.from_bytes(multiplexer[:2], "little") in self.objects
-            raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
+            index = int.from_bytes(multiplexer[:2], "little")
+            entry = self.find(index, multiplexer[2])
+            if entry is None:
+                known = index in self.objects
+                raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
+            self.by_multiplexer[multiplexer] = entry
         return entry
 
     def elements(self, index: int, most: int = 254) -> list[Entry]:

@@ -1,4 +1,4 @@
-"""One entry of the object dictionary: an index with a sub-index."""
+"""One entry of the object dictionary of a slave: its value, and who acts on it."""
 
 from __future__ import annotations
 
@@ -7,99 +7,78 @@ from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 TRUTH: Final = (0, 1)
 
-__all__ = ["MAX_VARIABLE_BYTES", "Access", "Entry"]
+Guard = Callable[["Entry", Value], None]
+OnEntry = Callable[["Entry"], None]
 
 
 class Entry:
-    """A variable, or one element of an array or record.
+    """The value of a variable, or of one element of an array or record.
 
     Its bytes are kept as they go over the wire. The service that owns an object
-    hangs its rules onto the entry: `guard` judges a value that comes over the
-    bus, `written` acts on it, `source` makes the value on demand.
+    hangs its rules onto the entry; each of them is called with the entry.
 
     Args:
-        index: 0x0000..0xFFFF.
-        sub: 0..255.
-        name: as in the EDS.
-        data_type: decides size and notation.
-        access: what the bus may do.
-        default: power-on value; zero or empty if left out.
-        low: smallest value, None for that of the data type.
-        high: largest value.
-        relative: the default is to be added to the node-ID ($NODEID).
-        max_bytes: largest size of a string or domain.
+        description: name, type, access and limits; shared with other slaves.
 
     Attributes:
+        description: as given.
         data: the present value as bytes.
-        guard: raises SdoAbort for a value that the owner does not take.
+        guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
         written: called after a value came over the bus.
         source: gives the bytes to read instead of `data`; may raise SdoAbort.
         watchers: called whenever the value has changed, from the bus or from the inside.
     """
 
-    __slots__ = (
-        *("access", "data", "data_type", "default", "guard", "high", "index", "low"),
-        *("max_bytes", "name", "readable", "relative", "size", "source", "sub"),
-        *("watchers", "writable", "written"),
-    )
+    __slots__ = ("data", "description", "guard", "source", "watchers", "written")
 
-    def __init__(  # noqa: PLR0913 - a description, by keyword
-        self,
-        index: int,
-        sub: int,
-        name: str,
-        data_type: DataType,
-        access: Access,
-        *,
-        default: Value | None = None,
-        low: float | None = None,
-        high: float | None = None,
-        relative: bool = False,
-        max_bytes: int = MAX_VARIABLE_BYTES,
-    ) -> None:
-        self.index, self.sub, self.name = index, sub, name
-        self.data_type, self.access = data_type, access
-        self.low, self.high, self.relative, self.max_bytes = low, high, relative, max_bytes
-        self.size = data_type.size
-        self.readable, self.writable = Access.READ in access, Access.WRITE in access
-        self.default = bytes(self.size) if default is None else data_type.encode(default)
-        self.data = self.default
-        self.guard: Callable[[Value], None] | None = None
-        self.written: Callable[[], None] | None = None
-        self.source: Callable[[], bytes] | None = None
-        self.watchers: list[Callable[[], None]] = []
+    def __init__(self, description: EntryDescription) -> None:
+        self.description = description
+        self.data = description.default
+        self.guard: Guard | None = None
+        self.written: OnEntry | None = None
+        self.source: Callable[[Entry], bytes] | None = None
+        self.watchers: tuple[OnEntry, ...] = ()
 
     def __repr__(self) -> str:
         """Name it as a log line would."""
-        return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
-
-    def copy(self) -> Entry:
-        """Return the same description with its default value, and nobody's rules."""
-        twin = Entry.__new__(Entry)
-        twin.index, twin.sub, twin.name = self.index, self.sub, self.name
-        twin.data_type, twin.access, twin.size = self.data_type, self.access, self.size
-        twin.low, twin.high, twin.max_bytes = self.low, self.high, self.max_bytes
-        twin.readable, twin.writable, twin.relative = self.readable, self.writable, self.relative
-        twin.default = twin.data = self.default
-        twin.guard = twin.written = twin.source = None
-        twin.watchers = []
-        return twin
+        return repr(self.description)
 
     @property
-    def takes_all(self) -> bool:
-        """Whether every value of the right size is taken, and nobody acts on it."""
-        free = self.low is None and self.high is None and self.data_type is not DataType.BOOLEAN
-        return free and self.guard is None and self.written is None
+    def index(self) -> int:
+        """Index, 0x0000..0xFFFF."""
+        return self.description.index
+
+    @property
+    def sub(self) -> int:
+        """Sub-index, 0..255."""
+        return self.description.sub
 
     @property
     def key(self) -> int:
         """Index and sub-index in one number."""
-        return self.index << 8 | self.sub
+        return self.description.key
+
+    @property
+    def data_type(self) -> DataType:
+        """Size and notation."""
+        return self.description.data_type
+
+    @property
+    def size(self) -> int:
+        """Size in bytes, 0 where it varies."""
+        return self.description.size
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether every value of the right size is taken, and nobody acts on it."""
+        low, high, kind = self.description.low, self.description.high, self.data_type
+        free = low is None and high is None and kind is not DataType.BOOLEAN
+        return free and self.guard is None and self.written is None
 
     @property
     def value(self) -> Value:
@@ -113,40 +92,55 @@ class Entry:
     @property
     def number(self) -> int:
         """The present value of an integer."""
-        return int.from_bytes(self.data, "little", signed=self.data_type.signed)
+        return int.from_bytes(self.data, "little", signed=self.description.signed)
+
+    def watch(self, changed: OnEntry) -> None:
+        """Have `changed` called whenever the value has changed."""
+        self.watchers = (*self.watchers, changed)
+
+    def unwatch(self, changed: OnEntry) -> None:
+        """Do so no longer."""
+        self.watchers = tuple(watcher for watcher in self.watchers if watcher != changed)
 
     def assign(self, data: bytes) -> None:
         """Change the value from the inside; watchers hear of it."""
         if data != self.data:
             self.data = data
             for changed in self.watchers:
-                changed()
+                changed(self)
 
-    def power_on_data(self, node_id: int) -> bytes:
-        """Return the default, with the node-ID where it belongs to it."""
-        if not self.relative:
-            return self.default
-        value = int.from_bytes(self.default, "little") + node_id
-        return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
+    def force(self, data: bytes) -> None:
+        """Change the value from the inside; its owner acts as if the bus had written it."""
+        self.assign(data)
+        if self.written is not None:
+            self.written(self)
+
+    def present(self) -> bytes:
+        """Return what is to be read now; SdoAbort if its owner has nothing."""
+        return self.data if self.source is None else self.source(self)
 
     def upload(self) -> bytes:
         """Read over the bus; SdoAbort if that is not allowed."""
-        if not self.readable:
+        if not self.description.readable:
             raise SdoAbort(AbortCode.WRITE_ONLY)
-        return self.data if self.source is None else self.source()
+        return self.present()
 
     def check_writable(self) -> None:
         """Raise SdoAbort unless the bus may write."""
-        if not self.writable:
+        if not self.description.writable:
             raise SdoAbort(AbortCode.READ_ONLY)
 
     def check_size(self, size: int) -> None:
         """Raise SdoAbort if so many bytes cannot be a value."""
-        most = self.size or self.max_bytes
-        if size > most:
+        if size > (self.size or self.description.max_bytes):
             raise SdoAbort(AbortCode.TOO_LONG)
         if size < self.size:
             raise SdoAbort(AbortCode.TOO_SHORT)
+
+    def check_owner(self, data: bytes) -> None:
+        """Raise SdoAbort if the owner of the object refuses a value."""
+        if self.guard is not None:
+            self.guard(self, self.data_type.decode(data))
 
     def download(self, data: bytes) -> None:
         """Write over the bus; SdoAbort if access, size, range or the owner refuses."""
@@ -158,13 +152,19 @@ class Entry:
         if self.data_type is DataType.BOOLEAN and value not in TRUTH:
             raise SdoAbort(AbortCode.VALUE_RANGE)
         if self.guard is not None:
-            self.guard(value)
-        self.assign(data)
-        if self.written is not None:
-            self.written()
+            self.guard(self, value)
+        self.force(data)
+
+    def receive(self, data: bytes) -> None:
+        """Write from a PDO: what is refused is not taken, and nobody hears of it."""
+        try:
+            self.download(data)
+        except SdoAbort:
+            return
 
     def _check_limits(self, value: float) -> None:
-        if self.high is not None and value > self.high:
+        low, high = self.description.low, self.description.high
+        if high is not None and value > high:
             raise SdoAbort(AbortCode.VALUE_TOO_HIGH)
-        if self.low is not None and value < self.low:
+        if low is not None and value < low:
             raise SdoAbort(AbortCode.VALUE_TOO_LOW)

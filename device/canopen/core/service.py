@@ -11,6 +11,7 @@ from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
+    from tickrig.device.canopen.core.entry import Entry
     from tickrig.device.canopen.core.slave import CanopenSlave
 
 Handler = Callable[[CanFrame], None]
@@ -80,6 +81,10 @@ class Service(NonCopyable):
 
     def tick(self, now_us: int) -> None:
         """Do what is due; called in the tick for which it was scheduled."""
+
+    def follow_cob_id(self, entry: Entry) -> None:
+        """Listen to another CAN-ID: a watcher of a COB-ID."""
+        self.node.rewire()
 
     def schedule(self, due_us: int) -> None:
         """Ask for `tick` at this time, instead of the one asked for before; `NEVER` for none."""

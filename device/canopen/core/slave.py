@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from operator import itemgetter
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
@@ -185,7 +185,8 @@ class CanopenSlave(NonCopyable):
         for service in self.services:
             reconfigured_by += service.reconfigured_by(self.state)
             for can_id, handler in service.handlers(self.state):
-                self._handlers[can_id] = _both(self._handlers.get(can_id), handler)
+                first = self._handlers.get(can_id)
+                self._handlers[can_id] = _Both(first, handler).handle if first else handler
             for can_id, handler in service.remote_handlers(self.state):
                 self._remote_handlers[can_id] = handler
         self.reconfigured_by = frozenset(reconfigured_by)
@@ -244,7 +245,9 @@ class CanopenSlave(NonCopyable):
         for entry in self.dictionary:
             if entry.index in area:
                 data = stored.get(entry.key)
-                entry.assign(entry.power_on_data(self.node_id) if data is None else data)
+                if data is None:
+                    data = entry.description.power_on_data(self.node_id)
+                entry.assign(data)
 
     def _receive_special(self, frame: CanFrame) -> None:
         """Handle a remote frame; 29-bit frames are for nobody here."""
@@ -273,13 +276,12 @@ def _admits(command: NmtCommand) -> bool:
     return True
 
 
-def _both(first: Handler | None, second: Handler) -> Handler:
-    """Return a handler that calls both: two services may listen to one CAN-ID."""
-    if first is None:
-        return second
+class _Both(NamedTuple):
+    """Two handlers of one CAN-ID: two services may listen to it."""
 
-    def handle(frame: CanFrame) -> None:
-        first(frame)
-        second(frame)
+    first: Handler
+    second: Handler
 
-    return handle
+    def handle(self, frame: CanFrame) -> None:
+        self.first(frame)
+        self.second(frame)

@@ -8,7 +8,6 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.objects import dictionary_of
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
@@ -93,7 +92,8 @@ class DeviceRtc(Application):
 
 def make_dictionary(kind: type[Component]) -> Dictionary:
     """Make the objects of a component; ValueError if its profile cannot be."""
-    return dictionary_of(object_table(kind.profile()))
+    table = object_table(kind.profile())
+    return Dictionary(table, table.objects)
 
 
 def application_of(kind: type[Component]) -> ServiceMaker:

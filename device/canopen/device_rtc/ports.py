@@ -62,7 +62,7 @@ class InPort(Port[T]):
         self.is_new = False
         return self.value
 
-    def _mark(self) -> None:
+    def _mark(self, entry: Entry) -> None:
         self.is_new = True
 
 

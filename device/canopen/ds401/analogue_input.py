@@ -48,7 +48,7 @@ class AnalogueInput:
         self._rules = [rule for rule in (whole, fraction) if rule.settings] or [whole]
         self._judged: tuple[float, bool] | None = None
         for entry in self.objects():
-            entry.watchers.append(self._judge_anew)
+            entry.watch(self._judge_anew)
 
     @property
     def name(self) -> str:
@@ -102,7 +102,7 @@ class AnalogueInput:
             self.sent()
         return event
 
-    def _judge_anew(self) -> None:
+    def _judge_anew(self, entry: Entry) -> None:
         self._judged = None
 
     def _convert(self, physical: float) -> None:

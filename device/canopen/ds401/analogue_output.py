@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from math import isfinite, isnan
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -44,7 +43,7 @@ class AnalogueOutput:
         self._error = find_number(dictionary, INTEGER_ERROR_VALUE, number)
         self._real_error = find_number(dictionary, REAL_ERROR_VALUE, number)
         for entry in self._written:
-            entry.watchers.append(partial(self._write, entry))
+            entry.watch(self._write)
 
     @property
     def output(self) -> Output:

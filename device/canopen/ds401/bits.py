@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import NamedTuple
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -57,12 +56,12 @@ class Bits:
     def __init__(self, dictionary: Dictionary, family: DigitalObjects, default: int = 0) -> None:
         self.views = sorted(_views(dictionary, family), key=lambda view: view.entry.key)
         self.value = default
-        self.changed: Callable[[View], None] = _ignore
+        self.changed: Callable[[View], None] | None = None
         for view in self.views:
             self.value = view.into(self.value)
         self.assign(self.value)
         for view in self.views:
-            view.entry.watchers.append(partial(self._follow, view))
+            view.entry.watch(self._follow)
 
     @property
     def lines(self) -> int:
@@ -79,11 +78,13 @@ class Bits:
         """Return the elements that show one of these lines."""
         return [view.entry for view in self.views if view.lines & lines]
 
-    def _follow(self, view: View) -> None:
+    def _follow(self, entry: Entry) -> None:
+        view = next(view for view in self.views if view.entry is entry)
         value = view.into(self.value)
         if value != self.value:
             self.assign(value)
-            self.changed(view)
+            if self.changed is not None:
+                self.changed(view)
 
 
 def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[View]:
@@ -98,7 +99,3 @@ def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[View]:
 def _view(entry: Entry, width: int, shift: int) -> View:
     bits = min(width, 8 * entry.size)
     return View(entry, (1 << bits) - 1 << shift, shift)
-
-
-def _ignore(view: View) -> None:
-    """Do nothing about a change."""

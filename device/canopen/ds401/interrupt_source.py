@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -23,7 +22,7 @@ class InterruptSource:
         self._banks = dict(elements(dictionary, INTERRUPT_SOURCE))
         self.entries = list(self._banks.values())
         for entry in self.entries:
-            entry.source = partial(_read, entry)
+            entry.source = _read
 
     def note(self, number: int) -> None:
         """Set the bit of a channel, 1..254."""

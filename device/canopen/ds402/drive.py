@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.ds402.modes.mode import Mode
 from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
@@ -124,7 +125,7 @@ class Ds402(Application):
     def _listen(self) -> None:
         parameters = self.parameters
         parameters.watch((indices.CONTROLWORD,), self._controlled)
-        parameters.watch((indices.MODES_OF_OPERATION,), self._change_mode)
+        parameters.watch((indices.MODES_OF_OPERATION,), self._mode_written)
         parameters.watch((*TARGETS, *self.more_targets), self._refresh)
         parameters.watch(CONFIGURATION, self._outdate)
         guard_values(self.node.dictionary, self.offered)
@@ -208,7 +209,7 @@ class Ds402(Application):
         self.automaton.restart()
         self.controlword = self.parameters.number(indices.CONTROLWORD)
         self.parameters.write(indices.SUPPORTED_MODES, self._supported)
-        self._outdate()
+        self._stale = True
         self._change_mode()
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
@@ -280,7 +281,7 @@ class Ds402(Application):
             self._winding_dc = self.motor.winding_dc
             self.schedule(now_us + COOLING_US)
 
-    def _controlled(self) -> None:
+    def _controlled(self, entry: Entry) -> None:
         """Obey a new controlword, with what was configured before it."""
         self._configure()
         before, self.controlword = self.controlword, self.parameters.number(indices.CONTROLWORD)
@@ -297,6 +298,9 @@ class Ds402(Application):
                 self.mode.stop()
         self.request()
 
+    def _mode_written(self, entry: Entry) -> None:
+        self._change_mode()
+
     def _change_mode(self) -> None:
         number = self.parameters.number(indices.MODES_OF_OPERATION)
         if number in self.offered:
@@ -311,10 +315,10 @@ class Ds402(Application):
         if self.enabled:
             self.request()
 
-    def _refresh(self) -> None:
+    def _refresh(self, entry: Entry) -> None:
         self.fresh = True
         self.request()
 
-    def _outdate(self) -> None:
+    def _outdate(self, entry: Entry) -> None:
         self._stale = True
         self.request()

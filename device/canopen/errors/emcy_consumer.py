@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Final
+from contextlib import suppress
+from typing import Final, NamedTuple
 
-from tickrig.device.canopen.core.cob_id_rules import cob_id_guard, is_valid
+from tickrig.device.canopen.core.cob_id_rules import check_emcy_cob_id, is_valid
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, INVALID
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.emcy import Emcy
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.errors import FramingError
@@ -26,7 +27,7 @@ class EmcyConsumer(Service):
 
     Attributes:
         latest: the latest EMCY of each node since the reset.
-        on_emcy: told the node-ID and the message.
+        on_emcy: called with the node-ID and the message.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -39,8 +40,8 @@ class EmcyConsumer(Service):
             if (entry := node.dictionary.find(EMERGENCY_CONSUMER, node_id)) is not None
         ]
         for entry in self._entries:
-            entry.guard = cob_id_guard(entry, INVALID, is_valid)
-            entry.watchers.append(node.rewire)
+            entry.guard = check_emcy_cob_id
+            entry.watch(self.follow_cob_id)
 
     def start(self) -> None:
         """Know nothing of others."""
@@ -51,16 +52,21 @@ class EmcyConsumer(Service):
         if state in ALIVE:
             for entry in self._entries:
                 if is_valid(entry.number):
-                    yield entry.number & CAN_ID_MASK, self._handler(entry.sub)
+                    yield entry.number & CAN_ID_MASK, _Producer(self, entry.sub).receive
 
-    def _handler(self, node_id: int) -> Handler:
-        def receive(frame: CanFrame) -> None:
-            try:
-                emcy = Emcy.parse(frame.data)
-            except FramingError:
-                return
-            self.latest[node_id] = emcy
-            for told in self.on_emcy:
-                told(node_id, emcy)
+    def hear(self, node_id: int, emcy: Emcy) -> None:
+        """Take the EMCY of a node."""
+        self.latest[node_id] = emcy
+        for notify in self.on_emcy:
+            notify(node_id, emcy)
 
-        return receive
+
+class _Producer(NamedTuple):
+    """Another node, which may send EMCY."""
+
+    consumer: EmcyConsumer
+    node_id: int
+
+    def receive(self, frame: CanFrame) -> None:
+        with suppress(FramingError):
+            self.consumer.hear(self.node_id, Emcy.parse(frame.data))

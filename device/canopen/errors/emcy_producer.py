@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.core.cob_id_rules import cob_id_guard, is_valid
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.cob_id_rules import check_emcy_cob_id, is_valid
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.errors.error_history import ErrorHistory
 from tickrig.wire.can_error import ErrorState
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, INVALID
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.emcy import TEXT_BYTES, Emcy, EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 ERROR_REGISTER: Final = 0x1001
+PRE_DEFINED_ERROR_FIELD: Final = 0x1003
 COB_ID_EMCY: Final = 0x1014
 INHIBIT_TIME_EMCY: Final = 0x1015
 
@@ -43,7 +48,7 @@ class EmcyProducer(Service):
         self._queue: list[bytes] = []
         self._free_us, self._bus_off = 0, False
         if self._cob_id is not None:
-            self._cob_id.guard = cob_id_guard(self._cob_id, INVALID, is_valid)
+            self._cob_id.guard = check_emcy_cob_id
 
     @property
     def register(self) -> int:
@@ -115,6 +120,47 @@ class EmcyProducer(Service):
         if len(self._queue) < QUEUE_LENGTH:
             self._queue.append(Emcy(code, register, text).encode())
         self.schedule(self._free_us)
+
+
+class ErrorHistory:
+    """Keeps the latest errors, the newest at sub-index 1.
+
+    Sub-index 0 counts them; 0 written to it forgets them all, other values are
+    refused with 0609 0030h. A sub-index without an error is answered with
+    0800 0024h. A field is the error code with the first two manufacturer-specific
+    bytes above it. That an error is gone is not noted.
+
+    Args:
+        dictionary: with or without 1003h.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._count = dictionary.find(PRE_DEFINED_ERROR_FIELD)
+        self._fields = dictionary.elements(PRE_DEFINED_ERROR_FIELD)
+        if self._count is not None:
+            self._count.guard = _only_zero
+            for field in self._fields:
+                field.source = self._read
+
+    def note(self, code: int, text: bytes) -> None:
+        """Put an error at the top; the oldest one falls out when all fields are full."""
+        if self._count is None or not self._fields:
+            return
+        count = min(self._count.number + 1, len(self._fields))
+        for sub in reversed(range(1, count)):
+            self._fields[sub].assign(self._fields[sub - 1].data)
+        self._fields[0].assign(code.to_bytes(2, "little") + text[:2].ljust(2, b"\0"))
+        self._count.assign(bytes([count]))
+
+    def _read(self, field: Entry) -> bytes:
+        if self._count is None or field.sub > self._count.number:
+            raise SdoAbort(AbortCode.NO_DATA)
+        return field.data
+
+
+def _only_zero(entry: Entry, value: Value) -> None:
+    if value != 0:
+        raise SdoAbort(AbortCode.VALUE_RANGE)
 
 
 def _padded(text: bytes) -> bytes:

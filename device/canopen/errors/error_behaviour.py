@@ -82,6 +82,6 @@ class ErrorBehaviour(Service):
             node.enter(NmtState.STOPPED)
 
 
-def _known(value: Value) -> None:
+def _known(entry: Entry, value: Value) -> None:
     if value not in tuple(Behaviour):
         raise SdoAbort(AbortCode.VALUE_RANGE)

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.objects import CONST, RO, ROT, RW, RWW, Element, Objects
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.ds402.modes import maxon, modes
@@ -31,7 +30,16 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.object_table import ObjectCode
+from tickrig.wire.canopen.eds.object_table import (
+    CONST,
+    RO,
+    ROT,
+    RW,
+    RWW,
+    Element,
+    ObjectCode,
+    ObjectTable,
+)
 
 NODE_ID: Final = 1
 """beego: 1 is the left wheel, 2 the right one."""
@@ -94,7 +102,7 @@ class Epos(Ds402):
 
 def dictionary() -> Dictionary:
     """Make the object dictionary."""
-    objects = Objects()
+    objects = ObjectTable()
     add_communication(objects, PROFILE)
     _add_setting_values(objects)
     _add_control(objects)
@@ -105,7 +113,7 @@ def dictionary() -> Dictionary:
     _add_profile(objects)
     _add_homing(objects)
     _add_cyclic(objects)
-    return objects.dictionary()
+    return Dictionary(objects, objects.objects)
 
 
 def make(node: CanopenSlave, slot: int) -> Epos:
@@ -113,13 +121,13 @@ def make(node: CanopenSlave, slot: int) -> Epos:
     return Epos(node, slot, Servo(EPOS_WHEEL))
 
 
-def _add_setting_values(objects: Objects) -> None:
+def _add_setting_values(objects: ObjectTable) -> None:
     objects.variable(0x2030, "Current mode setting value", I16, RWW)
     objects.variable(0x2062, "Position mode setting value", I32, RWW)
     objects.variable(0x206B, "Velocity mode setting value", I32, RWW)
 
 
-def _add_control(objects: Objects) -> None:
+def _add_control(objects: ObjectTable) -> None:
     objects.variable(0x603F, "Error code", U16, ROT)
     objects.variable(0x6040, "Controlword", U16, RWW)
     objects.variable(0x6041, "Statusword", U16, ROT)
@@ -130,7 +138,7 @@ def _add_control(objects: Objects) -> None:
     objects.variable(0x6502, "Supported drive modes", U32, RO, modes.supported(modes.MODES))
 
 
-def _add_options(objects: Objects) -> None:
+def _add_options(objects: ObjectTable) -> None:
     for index, name, default in (
         (0x6007, "Abort connection option code", 1),
         (0x605A, "Quick stop option code", 2),
@@ -142,7 +150,7 @@ def _add_options(objects: Objects) -> None:
         objects.variable(index, name, I16, RW, default)
 
 
-def _add_position(objects: Objects) -> None:
+def _add_position(objects: ObjectTable) -> None:
     objects.variable(0x6062, "Position demand value", I32, ROT)
     objects.variable(0x6063, "Position actual internal value", I32, ROT)
     objects.variable(0x6064, "Position actual value", I32, ROT)
@@ -159,7 +167,7 @@ def _add_position(objects: Objects) -> None:
     objects.variable(0x60FC, "Position demand internal value", I32, ROT)
 
 
-def _add_velocity(objects: Objects) -> None:
+def _add_velocity(objects: ObjectTable) -> None:
     objects.variable(0x606B, "Velocity demand value", I32, ROT)
     objects.variable(0x606C, "Velocity actual value", I32, ROT)
     objects.variable(0x606D, "Velocity window", U16, RW)
@@ -171,7 +179,7 @@ def _add_velocity(objects: Objects) -> None:
     objects.variable(0x60FF, "Target velocity", I32, RWW)
 
 
-def _add_torque(objects: Objects) -> None:
+def _add_torque(objects: ObjectTable) -> None:
     objects.variable(0x6071, "Target torque", I16, RWW)
     objects.variable(0x6072, "Max torque", U16, RWW, 2_900)
     objects.variable(0x6073, "Max current", U16, RW, 2_900)
@@ -186,7 +194,7 @@ def _add_torque(objects: Objects) -> None:
     objects.variable(0x60E1, "Negative torque limit value", U16, RWW, 2_900)
 
 
-def _add_profile(objects: Objects) -> None:
+def _add_profile(objects: ObjectTable) -> None:
     objects.variable(0x607F, "Max profile velocity", U32, RW, 25_000)
     objects.variable(0x6080, "Max motor speed", U32, RW, 25_000)
     objects.variable(0x6081, "Profile velocity", U32, RWW, 1_000)
@@ -196,7 +204,7 @@ def _add_profile(objects: Objects) -> None:
     objects.variable(0x6086, "Motion profile type", I16, RW)
 
 
-def _add_homing(objects: Objects) -> None:
+def _add_homing(objects: ObjectTable) -> None:
     objects.variable(0x607C, "Home offset", I32, RW)
     objects.variable(0x6098, "Homing method", I8, RW, 7)
     speeds = (("Speed for switch search", 100), ("Speed for zero search", 10))
@@ -205,7 +213,7 @@ def _add_homing(objects: Objects) -> None:
     objects.variable(0x609A, "Homing acceleration", U32, RW, 1_000)
 
 
-def _add_cyclic(objects: Objects) -> None:
+def _add_cyclic(objects: ObjectTable) -> None:
     objects.variable(0x60B0, "Position offset", I32, RWW)
     objects.variable(0x60B1, "Velocity offset", I32, RWW)
     objects.variable(0x60B2, "Torque offset", I16, RWW)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.objects import CONST, RO, ROT, RW, RWW, Objects
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Converter, Ds401
 from tickrig.wire.canopen.datatypes import DataType
@@ -17,6 +16,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.eds.object_table import CONST, RO, ROT, RW, RWW, ObjectTable
 
 NODE_ID: Final = 16
 ANALOGUE_INPUTS: Final = 8
@@ -50,11 +50,11 @@ PROFILE: Final = CommunicationProfile(
 
 def dictionary() -> Dictionary:
     """Make the object dictionary."""
-    objects = Objects()
+    objects = ObjectTable()
     add_communication(objects, PROFILE)
     _add_digital(objects)
     _add_analogue(objects)
-    return objects.dictionary()
+    return Dictionary(objects, objects.objects)
 
 
 def make(node: CanopenSlave, slot: int) -> Ds401:
@@ -62,7 +62,7 @@ def make(node: CanopenSlave, slot: int) -> Ds401:
     return Ds401(node, slot, inputs=(ADC,) * ANALOGUE_INPUTS)
 
 
-def _add_digital(objects: Objects) -> None:
+def _add_digital(objects: ObjectTable) -> None:
     objects.array(0x6000, "Read input 8-bit", 1, U8, ROT)
     objects.array(0x6002, "Polarity input 8-bit", 1, U8, RW)
     objects.array(0x6003, "Filter constant input 8-bit", 1, U8, RW)
@@ -77,7 +77,7 @@ def _add_digital(objects: Objects) -> None:
     objects.array(0x6208, "Filter mask output 8-bit", 1, U8, RW, 0xFF)
 
 
-def _add_analogue(objects: Objects) -> None:
+def _add_analogue(objects: ObjectTable) -> None:
     count = ANALOGUE_INPUTS
     objects.variable(0x2000, "Full scale of analogue inputs, mV", U16, CONST, FULL_SCALE_MV)
     objects.array(0x6401, "Read analogue input 16-bit", count, I16, ROT)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.objects import ROT, RW, RWW, Element, Objects
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.communication_profile import (
@@ -17,6 +16,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.eds.object_table import ROT, RW, RWW, Element, ObjectTable
 
 NODE_ID: Final = 32
 """Unless told otherwise."""
@@ -51,7 +51,7 @@ make: Final = MotorCoreUnit
 
 def dictionary() -> Dictionary:
     """Make the objects with their defaults."""
-    objects = Objects()
+    objects = ObjectTable()
     add_communication(objects, PROFILE)
     objects.variable(0x2000, "Mode", U8, RW, high=3)
     objects.variable(0x2001, "Status", U16, ROT)
@@ -66,4 +66,4 @@ def dictionary() -> Dictionary:
     objects.array(0x6411, "Write analogue output 16-bit", CHANNELS, I16, RWW)
     objects.array(0x6443, "Analogue output error mode", 1, U8, RW, 1)
     objects.array(0x6444, "Analogue output error value", 1, I32, RW)
-    return objects.dictionary()
+    return Dictionary(objects, objects.objects)

@@ -100,7 +100,7 @@ class References:
         limit = abs(_part(self._current_limit.number, self._current.number))
         return _limited(limit, MAX_CURRENT_MA) or MAX_CURRENT_MA
 
-    def _came(self, rpdo: int = 0) -> None:
+    def _came(self, source: Entry | int) -> None:
         if self.failed:
             self.failed = False
             self._back()

@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.motor_core_unit.display import Display
 from tickrig.device.canopen.motor_core_unit.faults import Signs
@@ -171,6 +172,6 @@ class MotorCoreUnit(Application):
         warmer_c = max(abs(servo.winding_c - air_c), abs(servo.housing_c - air_c))
         return now_us + COOLING_US if warmer_c > COOLED_C else NEVER
 
-    def _mode_written(self) -> None:
+    def _mode_written(self, entry: Entry) -> None:
         self._mode_was_written = True
         self.request()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from enum import Enum, auto
 from typing import Final
 
@@ -97,8 +97,8 @@ class HeartbeatConsumer(Service):
         self.monitors: dict[int, Monitor] = {}
         self._entries = node.dictionary.elements(CONSUMER_HEARTBEAT_TIME, MAX_NODES)
         for entry in self._entries:
-            entry.guard = self._guard(entry)
-            entry.watchers.append(self._changed(entry))
+            entry.guard = self._check
+            entry.watch(self._changed)
 
     def start(self) -> None:
         """Watch the nodes of the power-on values."""
@@ -127,29 +127,23 @@ class HeartbeatConsumer(Service):
         if _is_used(entry.number):
             self.monitors[entry.sub] = Monitor(self, entry.number)
 
-    def _changed(self, entry: Entry) -> Callable[[], None]:
-        def change() -> None:
-            monitor = self.monitors.pop(entry.sub, None)
-            if monitor is not None:
-                monitor.clear()
-            self._watch(entry)
-            self.node.rewire()
-            self.reschedule()
+    def _changed(self, entry: Entry) -> None:
+        monitor = self.monitors.pop(entry.sub, None)
+        if monitor is not None:
+            monitor.clear()
+        self._watch(entry)
+        self.node.rewire()
+        self.reschedule()
 
-        return change
-
-    def _guard(self, entry: Entry) -> Callable[[Value], None]:
-        def guard(value: Value) -> None:
-            number = value if isinstance(value, int) else 0
-            if number & RESERVED:
-                raise SdoAbort(AbortCode.VALUE_RANGE)
-            others = (other.number for other in self._entries if other is not entry)
-            if _is_used(number) and any(
-                _is_used(other) and _node_id(other) == _node_id(number) for other in others
-            ):
-                raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
-
-        return guard
+    def _check(self, entry: Entry, value: Value) -> None:
+        number = value if isinstance(value, int) else 0
+        if number & RESERVED:
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        others = (other.number for other in self._entries if other is not entry)
+        if _is_used(number) and any(
+            _is_used(other) and _node_id(other) == _node_id(number) for other in others
+        ):
+            raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
 
 
 def _node_id(value: int) -> int:

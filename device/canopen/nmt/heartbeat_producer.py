@@ -9,6 +9,7 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.device.canopen.core.entry import Entry
     from tickrig.device.canopen.core.slave import CanopenSlave
 
 
@@ -26,8 +27,8 @@ class HeartbeatProducer(Service):
         self._due_us = NEVER
         self._begins = False
         if self._period is not None:
-            self._period.watchers.append(self._begin)
-            self._period.written = self._begin  # the same value, too, begins anew
+            self._period.watch(self._changed)
+            self._period.written = self._changed  # the same value, too, begins anew
 
     def booted(self) -> None:
         """Count from the boot-up message."""
@@ -44,6 +45,9 @@ class HeartbeatProducer(Service):
         self._begins = False
         self._due_us += period_us
         self.schedule(self._due_us if period_us else NEVER)
+
+    def _changed(self, entry: Entry) -> None:
+        self._begin()
 
     def _begin(self) -> None:
         """Count from the next tick on, or from this one; not before the boot-up message."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.wire.can import CanFrame
@@ -36,7 +37,7 @@ class NodeGuarding(Service):
         self._toggle = 0
         for entry in (self._guard_time, self._factor, self._heartbeat):
             if entry is not None:
-                entry.watchers.append(self._changed)
+                entry.watch(self._changed)
 
     @property
     def life_time_us(self) -> int:
@@ -73,7 +74,7 @@ class NodeGuarding(Service):
         life_time_us = self.life_time_us
         self.schedule(node.now_us + life_time_us if life_time_us else NEVER)
 
-    def _changed(self) -> None:
+    def _changed(self, entry: Entry) -> None:
         """Wait for the next request: the times are others now."""
         self.node.emergency_clear(EmcyCode.HEARTBEAT, b"")
         self.schedule(NEVER)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import MPDO_DATA_BYTES, Dispatched, Scanned
 
 SCANNER_LISTS: Final = range(0x1FA0, 0x1FD0)
@@ -18,7 +19,7 @@ Source = tuple[int, int, int]
 
 def fits_mpdo(entry: Entry, direction: Access) -> bool:
     """Say whether an object may be in an MPDO: mappable and of one to four bytes."""
-    return direction in entry.access and 0 < entry.size <= MPDO_DATA_BYTES
+    return direction in entry.description.access and 0 < entry.size <= MPDO_DATA_BYTES
 
 
 def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.pdo.mpdo import dispatched_entries, fits_mpdo
 from tickrig.device.canopen.pdo.pdo_packing import make_write
+from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.pdo import Mpdo
 

@@ -27,7 +27,7 @@ class PdoConsumer(Service):
 
     Attributes:
         rpdos: those that the dictionary has.
-        on_rpdo: told the number of an RPDO when its objects have got its values.
+        on_rpdo: called with the number of an RPDO when its objects have got its values.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -40,7 +40,10 @@ class PdoConsumer(Service):
         ]
         self._synchronous: tuple[Rpdo, ...] = ()
         self._window_us, self._window_end_us, self._due_us = 0, NEVER, NEVER
-        self._follow(node.dictionary.find(SYNCHRONOUS_WINDOW_LENGTH))
+        window = node.dictionary.find(SYNCHRONOUS_WINDOW_LENGTH)
+        if window is not None:
+            self._window_changed(window)
+            window.watch(self._window_changed)
         node.on_sync.append(self._sync)
 
     @property
@@ -108,13 +111,6 @@ class PdoConsumer(Service):
         if self._window_us:
             self._window_end_us = self.node.now_us + self._window_us
 
-    def _follow(self, window: Entry | None) -> None:
+    def _window_changed(self, window: Entry) -> None:
         """Know the synchronous window at each SYNC."""
-        if window is None:
-            return
-
-        def changed() -> None:
-            self._window_us = window.number
-
-        changed()
-        window.watchers.append(changed)
+        self._window_us = window.number

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.mpdo import DISPATCHING_LISTS, SCANNER_LISTS
 from tickrig.device.canopen.pdo.pdo_packing import Slot, total_bits
+from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, whole_number
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import (
     DAM_MPDO,
     MAX_MAPPED_OBJECTS,
@@ -48,19 +49,20 @@ class PdoMapping:
         dictionary: where the mapped objects are.
         index: of the mapping parameter.
         direction: Access.RPDO or Access.TPDO.
-        locked: says whether the PDO is valid.
+        parameters: know whether the PDO is valid.
     """
 
     def __init__(
-        self, dictionary: Dictionary, index: int, direction: Access, locked: Callable[[], bool]
+        self, dictionary: Dictionary, index: int, direction: Access, parameters: PdoParameters
     ) -> None:
-        self._dictionary, self._direction, self._locked = dictionary, direction, locked
+        self._dictionary, self._direction, self._parameters = dictionary, direction, parameters
         self._count = dictionary.find(index)
         self._objects = dictionary.elements(index, MAX_MAPPED_OBJECTS)
         if self._count is not None:
             self._count.guard = self._check_count
+        check = self._check_object
         for entry in self._objects:
-            entry.guard = self._check_object
+            entry.guard = check
 
     @property
     def count(self) -> int:
@@ -94,18 +96,18 @@ class PdoMapping:
 
     def _check_slot(self, slot: Slot) -> None:
         """Refuse what the dictionary does not let into a PDO of this direction."""
-        if slot.entry is not None and self._direction not in slot.entry.access:
+        if slot.entry is not None and self._direction not in slot.entry.description.access:
             raise SdoAbort(AbortCode.NOT_MAPPABLE)
 
-    def _check_object(self, value: Value) -> None:
-        if self._locked() or self.count:
+    def _check_object(self, entry: Entry, value: Value) -> None:
+        if self._parameters.valid or self.count:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
         mapped = MappedObject.parse(whole_number(value))
         if mapped != _NOTHING:
             self._check_slot(self._slot(mapped))
 
-    def _check_count(self, value: Value) -> None:
-        if self._locked():
+    def _check_count(self, entry: Entry, value: Value) -> None:
+        if self._parameters.valid:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
         count = whole_number(value)
         if count == DAM_MPDO or (count == SAM_MPDO and self._has_sam_list()):
@@ -122,15 +124,8 @@ class PdoMapping:
         return any((index, 0) in self._dictionary for index in SAM_LISTS[self._direction])
 
 
-def whole_number(value: Value) -> int:
-    """Return a value that must be an integer; SdoAbort if the dictionary says otherwise."""
-    if not isinstance(value, int):
-        raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
-    return value
-
-
 def _fits(entry: Entry, bits: int) -> bool:
     """Say whether an object has so many bits; a string has whole bytes."""
     if entry.size:
         return 0 < bits <= 8 * entry.size
-    return 0 < bits <= 8 * min(entry.max_bytes, 8) and bits % 8 == 0
+    return 0 < bits <= 8 * min(entry.description.max_bytes, 8) and bits % 8 == 0

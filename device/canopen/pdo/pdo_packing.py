@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from operator import attrgetter
 from typing import Final, NamedTuple
 
@@ -46,12 +47,9 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
     """
     entries = [slot.entry for slot in slots if slot.entry is not None]
     if not all(slot.whole for slot in slots):
-        return _make_bit_pack(slots)
-    if any(entry.source is not None for entry in entries):
-        return lambda: b"".join(map(present, entries))
-    if len(entries) == 1:
-        return lambda: _data(entries[0])
-    return lambda: b"".join(map(_data, entries))
+        return _Bits(slots).pack
+    kept = all(entry.source is None for entry in entries)
+    return partial(_join, entries) if kept else partial(_join_present, entries)
 
 
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
@@ -61,69 +59,60 @@ def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
     does it; bytes behind the last object are for nobody.
     """
     if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
-        return _make_bit_unpack(slots)
+        return _Bits(slots).unpack
     steps, position = [], 0
     for entry, bits in slots:
         end = position + bits // 8
         if entry is not None:
             steps.append((make_write(entry), slice(position, end)))
         position = end
-
-    def unpack(data: bytes) -> None:
-        for write, piece in steps:
-            write(data[piece])
-
-    return unpack
+    return partial(_split, steps)
 
 
 def make_write(entry: Entry) -> Unpack:
-    """Return what writes an entry from a PDO.
-
-    A value that its limits or its owner refuse is not taken, and nobody is told:
-    a PDO has no answer. It is the straight way if nobody judges the entry.
-    """
-    if entry.takes_all or not entry.writable:
-        return entry.assign
-
-    def write(data: bytes) -> None:
-        try:
-            entry.download(data)
-        except SdoAbort:
-            return
-
-    return write
+    """Return what writes an entry from a PDO: the straight way if nobody judges the entry."""
+    straight = entry.takes_all or not entry.description.writable
+    return entry.assign if straight else entry.receive
 
 
 def present(entry: Entry) -> bytes:
     """Return the bytes of an entry that may be made on demand; the last ones if none can be."""
-    if entry.source is None:
-        return entry.data
     try:
-        return entry.source()
+        return entry.present()
     except SdoAbort:
         return entry.data
 
 
-def _make_bit_pack(slots: tuple[Slot, ...]) -> Pack:
-    fields = [(slot.entry, slot.bits) for slot in slots if slot.entry is not None]
-
-    def pack() -> bytes:
-        return pack_bits((int.from_bytes(present(entry), "little"), bits) for entry, bits in fields)
-
-    return pack
+def _join(entries: list[Entry]) -> bytes:
+    return b"".join(map(_data, entries))
 
 
-def _make_bit_unpack(slots: tuple[Slot, ...]) -> Unpack:
-    widths = [slot.bits for slot in slots]
-    steps = [
-        (place, make_write(entry), entry.size or bits // 8)
-        for place, (entry, bits) in enumerate(slots)
-        if entry is not None
-    ]
+def _join_present(entries: list[Entry]) -> bytes:
+    return b"".join(map(present, entries))
 
-    def unpack(data: bytes) -> None:
-        values = unpack_bits(data, widths)
-        for place, write, size in steps:
-            write(values[place].to_bytes(size, "little"))
 
-    return unpack
+def _split(steps: list[tuple[Unpack, slice]], data: bytes) -> None:
+    for write, part in steps:
+        write(data[part])
+
+
+class _Bits:
+    """Objects that do not fill whole bytes, behind each other."""
+
+    __slots__ = ("_slots",)
+
+    def __init__(self, slots: tuple[Slot, ...]) -> None:
+        self._slots = slots
+
+    def pack(self) -> bytes:
+        return pack_bits(
+            (int.from_bytes(present(entry), "little"), bits)
+            for entry, bits in self._slots
+            if entry is not None
+        )
+
+    def unpack(self, data: bytes) -> None:
+        values = unpack_bits(data, [slot.bits for slot in self._slots])
+        for value, (entry, bits) in zip(values, self._slots, strict=True):
+            if entry is not None:
+                make_write(entry)(value.to_bytes(entry.size or bits // 8, "little"))

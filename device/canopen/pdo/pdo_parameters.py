@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.pdo.pdo_mapping import whole_number
+from tickrig.device.canopen.core.entry import Entry, OnEntry
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -43,7 +42,7 @@ class PdoParameters:
         dictionary: with or without these objects.
         index: of the communication parameter.
         types: transmission types that such a PDO may have.
-        changed: told the sub-index of what has another value now.
+        changed: called with each entry that has another value now.
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class PdoParameters:
         dictionary: Dictionary,
         index: int,
         types: frozenset[int],
-        changed: Callable[[int], None],
+        changed: OnEntry,
     ) -> None:
         self._types = types
         self._entries = {
@@ -59,16 +58,10 @@ class PdoParameters:
             for sub in range(COB_ID, SYNC_START + 1)
             if (entry := dictionary.find(index, sub)) is not None
         }
-        guards = {
-            COB_ID: self._check_cob_id,
-            TYPE: self._check_type,
-            INHIBIT_TIME: self._check_unlocked,
-            RESERVED: _refuse,
-            SYNC_START: self._check_sync_start,
-        }
-        for sub, entry in self._entries.items():
-            entry.guard = guards.get(sub)
-            entry.watchers.append(_telling(changed, sub))
+        check = self._check
+        for entry in self._entries.values():
+            entry.guard = check
+            entry.watch(changed)
         if RESERVED in self._entries:
             self._entries[RESERVED].source = _absent
 
@@ -112,8 +105,22 @@ class PdoParameters:
         entry = self._entries.get(sub)
         return otherwise if entry is None else entry.number
 
-    def _check_cob_id(self, value: Value) -> None:
-        cob_id = whole_number(value)
+    def _check(self, entry: Entry, value: Value) -> None:
+        match entry.sub:
+            case 1:  # COB-ID
+                self._check_cob_id(whole_number(value))
+            case 2 if value not in self._types:
+                raise SdoAbort(AbortCode.VALUE_RANGE)
+            case 4:  # reserved
+                raise SdoAbort(AbortCode.NO_SUBINDEX)
+            case 3 | 6 if self.valid:  # inhibit time, SYNC start value
+                raise SdoAbort(AbortCode.VALUE_RANGE)
+            case 6 if whole_number(value) > MAX_SYNC_START:
+                raise SdoAbort(AbortCode.VALUE_RANGE)
+            case _:
+                return
+
+    def _check_cob_id(self, cob_id: int) -> None:
         if cob_id & _NOT_IN_A_CAN_ID:
             raise SdoAbort(AbortCode.VALUE_RANGE)
         if cob_id & INVALID:
@@ -122,28 +129,14 @@ class PdoParameters:
         if is_restricted(can_id) or (self.valid and can_id != self.can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
-    def _check_type(self, value: Value) -> None:
-        if value not in self._types:
-            raise SdoAbort(AbortCode.VALUE_RANGE)
 
-    def _check_unlocked(self, value: Value) -> None:
-        if self.valid:
-            raise SdoAbort(AbortCode.VALUE_RANGE)
-
-    def _check_sync_start(self, value: Value) -> None:
-        self._check_unlocked(value)
-        if whole_number(value) > MAX_SYNC_START:
-            raise SdoAbort(AbortCode.VALUE_RANGE)
+def whole_number(value: Value) -> int:
+    """Return a value that must be an integer; SdoAbort if the dictionary says otherwise."""
+    if not isinstance(value, int):
+        raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
+    return value
 
 
-def _telling(changed: Callable[[int], None], sub: int) -> Callable[[], None]:
-    return lambda: changed(sub)
-
-
-def _refuse(value: Value) -> None:
-    raise SdoAbort(AbortCode.NO_SUBINDEX)
-
-
-def _absent() -> bytes:
+def _absent(entry: Entry) -> bytes:
     """Answer for sub-index 4, which must not be there even if an EDS has it."""
     raise SdoAbort(AbortCode.NO_SUBINDEX)

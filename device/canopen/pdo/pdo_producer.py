@@ -29,7 +29,7 @@ class PdoProducer(Service):
         tpdos: those that the dictionary has.
         quiet: keys of entries whose change is no event, because a profile judges
             it; to be set before the node is Operational.
-        on_sent: told the mapped objects of each TPDO that has been sent.
+        on_sent: called with the mapped objects of each TPDO that has been sent.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.core.entry import Access
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Handler
 from tickrig.device.canopen.core.slave import COMMUNICATION_AREA
 from tickrig.device.canopen.pdo.mpdo_consumer import DamConsumer, SamConsumer
@@ -17,6 +17,7 @@ from tickrig.device.canopen.pdo.pdo_parameters import (
     PdoParameters,
 )
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.pdo import DAM_MPDO, MAX_PDO_BYTES, SAM_MPDO
 from tickrig.wire.instant import NEVER
@@ -54,9 +55,7 @@ class Rpdo:
         self.parameters = PdoParameters(
             dictionary, RPDO_PARAMETERS[offset], RPDO_TYPES, self._changed
         )
-        self.mapping = PdoMapping(
-            dictionary, RPDO_MAPPINGS + offset, Access.RPDO, lambda: self.parameters.valid
-        )
+        self.mapping = PdoMapping(dictionary, RPDO_MAPPINGS + offset, Access.RPDO, self.parameters)
         self._text = number.to_bytes(2, "little")
         self.restart()
         self._unpack: Unpack
@@ -136,8 +135,8 @@ class Rpdo:
 
     def _deliver(self, data: bytes) -> None:
         self._unpack(data)
-        for told in self._consumer.on_rpdo:
-            told(self.number)
+        for notify in self._consumer.on_rpdo:
+            notify(self.number)
 
     def _passes(self, data: bytes) -> bool:
         """Judge length and time; say whether the frame can be used."""
@@ -167,7 +166,7 @@ class Rpdo:
                 self._consumer.node.emergency_clear(code, self._text)
         self._supervised = bool(self._errors) or self._event_us > 0
 
-    def _changed(self, sub: int) -> None:
-        if sub == EVENT_TIMER:
+    def _changed(self, entry: Entry) -> None:
+        if entry.sub == EVENT_TIMER:
             self.deadline_us = NEVER
         self._consumer.changed()

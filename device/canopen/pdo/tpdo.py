@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.pdo.mpdo import scanned_entries
 from tickrig.device.canopen.pdo.mpdo_producer import DamProducer, SamProducer
 from tickrig.device.canopen.pdo.pdo_mapping import PdoMapping
 from tickrig.device.canopen.pdo.pdo_packing import Pack, make_pack
@@ -27,6 +28,7 @@ from tickrig.device.canopen.pdo.tpdo_modes import (
     TpdoMode,
 )
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import DAM_MPDO, SAM_MPDO
 
 if TYPE_CHECKING:
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
 TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
 TPDO_MAPPINGS: Final = 0x1A00
 
-MPDO_MODES: Final[dict[int, type[TpdoMode]]] = {SAM_MPDO: SamProducer, DAM_MPDO: DamProducer}
 RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
     RTR_SYNCHRONOUS: RtrSynchronous,
     RTR_EVENT: TpdoMode,
@@ -44,6 +45,8 @@ RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
 
 class Tpdo:
     """Sends the mapped objects when its transmission type says so.
+
+    For its mode it is the sender: parameters, `pack`, `send`, `wake`.
 
     Args:
         producer: the service that it belongs to.
@@ -56,19 +59,18 @@ class Tpdo:
     """
 
     def __init__(self, producer: PdoProducer, number: int) -> None:
-        self.number, self.producer, self.node = number, producer, producer.node
+        self.number, self._producer, self._node = number, producer, producer.node
         offset, dictionary = number - 1, producer.node.dictionary
         self.parameters = PdoParameters(
             dictionary, TPDO_PARAMETERS[offset], TPDO_TYPES, self._changed
         )
-        self.mapping = PdoMapping(
-            dictionary, TPDO_MAPPINGS + offset, Access.TPDO, lambda: self.parameters.valid
-        )
+        self.mapping = PdoMapping(dictionary, TPDO_MAPPINGS + offset, Access.TPDO, self.parameters)
         self.mode: TpdoMode = Silent(self)
         self.pack: Pack = bytes
         self.entries: list[Entry] = []
+        self.wake = producer.wake
         self._can_id = 0
-        self._watched: list[tuple[Entry, Callable[[], None]]] = []
+        self._watched: list[Entry] = []
 
     def begin(self) -> None:
         """Start anew with the present parameters."""
@@ -77,51 +79,55 @@ class Tpdo:
         slots = self.mapping.slots()
         self.pack = make_pack(slots)
         self.entries = [slot.entry for slot in slots if slot.entry is not None]
-        self.mode = _mode(self)
+        self.mode = self._make_mode()
+        if isinstance(self.mode, SamProducer):
+            self._watch(scanned_entries(self._node.dictionary))
+        elif self.mode.on_change:
+            self._watch(self.entries)
 
     def end(self) -> None:
         """Send no more."""
-        for entry, changed in self._watched:
-            entry.watchers.remove(changed)
+        for entry in self._watched:
+            entry.unwatch(self.mode.request)
         self._watched.clear()
         self.mode = Silent(self)
 
-    def watch(self, entry: Entry, changed: Callable[[], None]) -> None:
-        """Hear of each change of an entry that counts as an event."""
-        if entry.key not in self.producer.quiet:
-            entry.watchers.append(changed)
-            self._watched.append((entry, changed))
-
-    def transmit(self) -> None:
-        """Send the mapped objects."""
-        self.node.send(self._can_id, self.pack())
-        for told in self.producer.on_sent:
-            told(self.entries)
-
-    def send(self, data: bytes) -> None:
-        """Send these bytes."""
-        self.node.send(self._can_id, data)
+    def send(self, data: bytes | None = None) -> None:
+        """Send bytes, or the mapped objects as they are now."""
+        if data is not None:
+            self._node.send(self._can_id, data)
+            return
+        self._node.send(self._can_id, self.pack())
+        for notify in self._producer.on_sent:
+            notify(self.entries)
 
     def answer(self, frame: CanFrame) -> None:
         """Answer a remote frame."""
         self.mode.answer()
 
-    def _changed(self, sub: int) -> None:
-        if sub == EVENT_TIMER:
-            self.mode.retime()
+    def _watch(self, entries: Iterable[Entry]) -> None:
+        """Hear of each change that counts as an event."""
+        self._watched = [entry for entry in entries if entry.key not in self._producer.quiet]
+        for entry in self._watched:
+            entry.watch(self.mode.request)
+
+    def _changed(self, entry: Entry) -> None:
+        if entry.sub == EVENT_TIMER:
+            self.mode.retime(self._node.now_us)
         else:
-            self.producer.changed(self)
+            self._producer.changed(self)
 
-
-def _mode(tpdo: Tpdo) -> TpdoMode:
-    """Return the transmission type of a TPDO at work."""
-    kind, count = tpdo.parameters.transmission_type, tpdo.mapping.count
-    if not tpdo.parameters.valid:
-        return Silent(tpdo)
-    if count in MPDO_MODES:
-        return MPDO_MODES[count](tpdo) if kind in EVENT_DRIVEN else Silent(tpdo)
-    if not tpdo.entries:
-        return Silent(tpdo)
-    if kind in SYNCHRONOUS:
-        return SynchronousCyclic(tpdo) if kind else SynchronousAcyclic(tpdo)
-    return RTR_MODES.get(kind, EventDriven)(tpdo)
+    def _make_mode(self) -> TpdoMode:
+        """Return the transmission type at work."""
+        kind, count = self.parameters.transmission_type, self.mapping.count
+        if not self.parameters.valid:
+            return Silent(self)
+        if count in (SAM_MPDO, DAM_MPDO):
+            if kind not in EVENT_DRIVEN:
+                return Silent(self)
+            return DamProducer(self) if count == DAM_MPDO else SamProducer(self, self._node.node_id)
+        if not self.entries:
+            return Silent(self)
+        if kind in SYNCHRONOUS:
+            return SynchronousCyclic(self) if kind else SynchronousAcyclic(self)
+        return RTR_MODES.get(kind, EventDriven)(self)

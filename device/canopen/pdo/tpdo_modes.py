@@ -3,12 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.device.canopen.pdo.tpdo import Tpdo
+    from tickrig.device.canopen.core.entry import Entry
+    from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters
+
+
+class PdoSender(Protocol):
+    """What a mode sees of its TPDO."""
+
+    @property
+    def parameters(self) -> PdoParameters:
+        """Transmission type, inhibit time and event timer."""
+        ...
+
+    def pack(self) -> bytes:
+        """Return the mapped objects as bytes."""
+        ...
+
+    def send(self, data: bytes | None = None) -> None:
+        """Send bytes, or the mapped objects as they are now."""
+
+    def wake(self, due_us: int) -> None:
+        """Have the mode run at this time, unless it is run earlier anyway."""
 
 
 class TpdoMode:
@@ -18,27 +38,28 @@ class TpdoMode:
         due_us: when it wants to be run.
         synchronous: whether it wants to hear of SYNC.
         timed: whether it ever wants to be run.
+        on_change: whether a change of a mapped object is an event.
         on_sync: called with the counter of each SYNC, 0 if it has none.
     """
 
-    synchronous = timed = False
+    synchronous = timed = on_change = False
 
-    def __init__(self, tpdo: Tpdo) -> None:
-        self.tpdo, self.due_us = tpdo, NEVER
+    def __init__(self, sender: PdoSender) -> None:
+        self.sender, self.due_us = sender, NEVER
         self.on_sync: Callable[[int], None] = _ignore
 
-    def request(self) -> None:
-        """Hear of an event."""
+    def request(self, entry: Entry | None = None) -> None:
+        """Take an event: the change of an object, or one that the application makes."""
 
     def run(self, now_us: int) -> None:
         """Do what is due."""
 
-    def retime(self) -> None:
+    def retime(self, now_us: int) -> None:
         """Follow another event timer."""
 
     def answer(self) -> None:
         """Send what a remote frame asks for."""
-        self.tpdo.transmit()
+        self.sender.send()
 
 
 class Silent(TpdoMode):
@@ -51,23 +72,21 @@ class Silent(TpdoMode):
 class SynchronousAcyclic(TpdoMode):
     """Type 0: sent with the SYNC after an event, and with the first one."""
 
-    synchronous = True
+    synchronous = on_change = True
 
-    def __init__(self, tpdo: Tpdo) -> None:
-        super().__init__(tpdo)
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
         self._marked = True
         self.on_sync = self._send_if_marked
-        for entry in tpdo.entries:
-            tpdo.watch(entry, self.request)
 
-    def request(self) -> None:
+    def request(self, entry: Entry | None = None) -> None:
         """Send with the next SYNC."""
         self._marked = True
 
     def _send_if_marked(self, counter: int) -> None:
         if self._marked:
             self._marked = False
-            self.tpdo.transmit()
+            self.sender.send()
 
 
 class SynchronousCyclic(TpdoMode):
@@ -79,10 +98,10 @@ class SynchronousCyclic(TpdoMode):
 
     synchronous = True
 
-    def __init__(self, tpdo: Tpdo) -> None:
-        super().__init__(tpdo)
-        self._period = self._left = tpdo.parameters.transmission_type
-        self._start = tpdo.parameters.sync_start
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._period = self._left = sender.parameters.transmission_type
+        self._start = sender.parameters.sync_start
         self.on_sync = self._await_start if self._start else self._counting
 
     @property
@@ -96,13 +115,13 @@ class SynchronousCyclic(TpdoMode):
             self.on_sync(counter)
 
     def _each(self, counter: int) -> None:
-        self.tpdo.transmit()
+        self.sender.send()
 
     def _nth(self, counter: int) -> None:
         self._left -= 1
         if not self._left:
             self._left = self._period
-            self.tpdo.transmit()
+            self.sender.send()
 
 
 class RtrSynchronous(TpdoMode):
@@ -110,17 +129,17 @@ class RtrSynchronous(TpdoMode):
 
     synchronous = True
 
-    def __init__(self, tpdo: Tpdo) -> None:
-        super().__init__(tpdo)
-        self._sample = tpdo.pack()
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._sample = sender.pack()
         self.on_sync = self._take
 
     def answer(self) -> None:
         """Send the sample."""
-        self.tpdo.send(self._sample)
+        self.sender.send(self._sample)
 
     def _take(self, counter: int) -> None:
-        self._sample = self.tpdo.pack()
+        self._sample = self.sender.pack()
 
 
 class EventDriven(TpdoMode):
@@ -129,20 +148,18 @@ class EventDriven(TpdoMode):
     Not earlier than the inhibit time after the last one, then with the newest data.
     """
 
-    timed = True
+    timed = on_change = True
 
-    def __init__(self, tpdo: Tpdo) -> None:
-        super().__init__(tpdo)
-        self._inhibit_us = tpdo.parameters.inhibit_us
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._inhibit_us = sender.parameters.inhibit_us
         self._marked, self._retimed, self._free_us, self.due_us = True, False, 0, 0
-        for entry in tpdo.entries:
-            tpdo.watch(entry, self.request)
 
-    def request(self) -> None:
+    def request(self, entry: Entry | None = None) -> None:
         """Send as soon as the inhibit time allows."""
         if not self._marked:
             self._marked, self.due_us = True, self._free_us
-            self.tpdo.producer.wake(self.due_us)
+            self.sender.wake(self.due_us)
 
     def run(self, now_us: int) -> None:
         """Send, or wait for the end of the inhibit time or of another event timer."""
@@ -153,17 +170,17 @@ class EventDriven(TpdoMode):
         else:
             self._marked, self._free_us = False, now_us + self._inhibit_us
             self._time_anew(now_us)
-            self.tpdo.transmit()
+            self.sender.send()
 
-    def retime(self) -> None:
+    def retime(self, now_us: int) -> None:
         """Start the event timer anew with the next run."""
         if not self._marked:
-            self._retimed, self.due_us = True, self.tpdo.node.now_us
-            self.tpdo.producer.wake(self.due_us)
+            self._retimed, self.due_us = True, now_us
+            self.sender.wake(self.due_us)
 
     def _time_anew(self, now_us: int) -> None:
         """Start the event timer; it runs from each transmission."""
-        event_us = self.tpdo.parameters.event_us
+        event_us = self.sender.parameters.event_us
         self._retimed, self.due_us = False, now_us + event_us if event_us else NEVER
 
 

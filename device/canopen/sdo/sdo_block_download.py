@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.sdo.download_size import DownloadSize
+from tickrig.device.canopen.sdo.sdo_segmented import DownloadSize
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo_command import (

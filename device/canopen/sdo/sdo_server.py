@@ -34,11 +34,13 @@ State = Callable[[bytes], None]
 """What the next request means; a transfer is in one of these at a time."""
 
 NO_MULTIPLEXER: Final = bytes(3)
-_GOES_ON: Final[dict[int, int]] = {
+_INITIATE: Final[dict[int, int]] = {
+    ClientCommand.DOWNLOAD: 0,
+    ClientCommand.UPLOAD: 0,
     ClientCommand.BLOCK_UPLOAD: BLOCK_SUBCOMMAND,
     ClientCommand.BLOCK_DOWNLOAD: BLOCK_END & BLOCK_SUBCOMMAND,
 }
-"""Bits of a block command that are 0 in an initiate request."""
+"""Commands that begin a transfer; bits of a block command that are 0 in an initiate request."""
 _UPLOAD: Final = int(ClientCommand.UPLOAD)
 _EXPEDITED: Final = tuple(
     bytes([ServerCommand.UPLOAD | EXPEDITED | SIZE_INDICATED | EXPEDITED_BYTES - size << 2])
@@ -76,12 +78,6 @@ class SdoServer:
         self.block_size = MAX_BLOCK_SIZE
         self._entries = node.dictionary.by_multiplexer
         self._multiplexer = NO_MULTIPLEXER
-        self._beginnings: Final[dict[int, Callable[[Entry, bytes], None]]] = {
-            ClientCommand.DOWNLOAD: self._begin_download,
-            ClientCommand.UPLOAD: self._begin_upload,
-            ClientCommand.BLOCK_UPLOAD: self._begin_block_upload,
-            ClientCommand.BLOCK_DOWNLOAD: self._begin_block_download,
-        }
         self._idle: Final[State] = self._without_transfer
         self._state: State = self._idle
         self.due_us = NEVER
@@ -129,12 +125,21 @@ class SdoServer:
         if command == ClientCommand.ABORT:
             self.end()
             return
-        begin = self._beginnings.get(command & SPECIFIER)
-        if begin is None or command & _GOES_ON.get(command & SPECIFIER, 0):
+        specifier = command & SPECIFIER
+        if specifier not in _INITIATE or command & _INITIATE[specifier]:
             raise SdoAbort(AbortCode.COMMAND_SPECIFIER)
         self.end()
         self._multiplexer = request[1:4]
-        begin(self.node.dictionary.look_up(self._multiplexer), request)
+        entry = self.node.dictionary.look_up(self._multiplexer)
+        match specifier:
+            case ClientCommand.DOWNLOAD:
+                self._begin_download(entry, request)
+            case ClientCommand.UPLOAD:
+                self.upload(entry.upload())
+            case ClientCommand.BLOCK_UPLOAD:
+                BlockUpload(self, entry.upload(), request)
+            case _:
+                BlockDownload(self, entry, request)
 
     def upload(self, data: bytes) -> None:
         """Give a value in one answer, or begin to give it in segments."""
@@ -149,7 +154,7 @@ class SdoServer:
         """Take a request while no transfer runs; reading a small value is the short way."""
         if request[0] == _UPLOAD:
             entry = self._entries.get(request[1:4])
-            if entry is not None and entry.readable and entry.source is None:
+            if entry is not None and entry.description.readable and entry.source is None:
                 data = entry.data
                 size = len(data)
                 if 0 < size <= EXPEDITED_BYTES:
@@ -158,9 +163,6 @@ class SdoServer:
                     )
                     return
         self.initiate(request)
-
-    def _begin_upload(self, entry: Entry, _request: bytes) -> None:
-        self.upload(entry.upload())
 
     def _begin_download(self, entry: Entry, request: bytes) -> None:
         """Write at once, or begin to take segments.
@@ -177,9 +179,3 @@ class SdoServer:
         entry.download(request[4 : 4 + size])
         self.respond(bytes([ServerCommand.DOWNLOAD]) + request[1:4] + bytes(4))
         self.end()
-
-    def _begin_block_upload(self, entry: Entry, request: bytes) -> None:
-        BlockUpload(self, entry.upload(), request)
-
-    def _begin_block_download(self, entry: Entry, request: bytes) -> None:
-        BlockDownload(self, entry, request)

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.cob_id_rules import cob_id_guard, is_valid
+from tickrig.device.canopen.core.cob_id_rules import check_sdo_cob_id, is_valid
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.sdo.sdo_server import SdoServer
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, FLAG_30, INVALID
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -72,7 +72,7 @@ class SdoServers(Service):
         ]
         for additional in self._additional:
             for entry in (additional.request, additional.response):
-                entry.guard = cob_id_guard(entry, INVALID | FLAG_30, is_valid)
+                entry.guard = check_sdo_cob_id
                 entry.written = self._configure
         self.servers = [self.default, *(additional.server for additional in self._additional)]
 
@@ -124,7 +124,7 @@ class SdoServers(Service):
             self._due_us = due_us
             self.schedule(due_us)
 
-    def _configure(self) -> None:
+    def _configure(self, entry: Entry) -> None:
         """Follow a COB-ID that the bus has changed."""
         for additional in self._additional:
             additional.configure()
@@ -137,5 +137,5 @@ class SdoServers(Service):
             server.end()
 
 
-def _refuse(_value: Value) -> None:
+def _refuse(_entry: Entry, _value: Value) -> None:
     raise SdoAbort(AbortCode.READ_ONLY)

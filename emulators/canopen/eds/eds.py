@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds.predefined import predefined
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import COUNTS, read_device
-from tickrig.wire.canopen.eds.eds_entry import EdsEntry
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 
 def read_eds(path: Path) -> DeviceDescription:
@@ -50,39 +50,30 @@ def describe(file: EdsFile) -> DeviceDescription:
     )
 
 
-def _entries(found: Iterable[EdsEntry]) -> Iterable[Entry]:
+def _entries(found: Iterable[EntryDescription]) -> Iterable[EntryDescription]:
     highest: dict[int, int] = {}
     for row in found:
         highest[row.index] = max(row.sub, highest.get(row.index, 0))
-    return (_entry(row, highest[row.index]) for row in found)
+    return (_completed(row, highest[row.index]) for row in found)
 
 
-def _entry(row: EdsEntry, highest: int) -> Entry:
-    """Make an entry; `highest` is the last sub-index of its object."""
-    default, relative = row.default, row.relative
-    if default is None and row.data_type.is_integer:
-        default, relative = _implied(row, highest)
-    entry = Entry(
-        *(row.index, row.sub, row.name, row.data_type, row.access),
-        low=row.low,
-        high=row.high,
-        relative=relative,
-        max_bytes=row.max_bytes,
-    )
-    if default is not None:
-        entry.default = entry.data = default
-    return entry
-
-
-def _implied(row: EdsEntry, highest: int) -> tuple[bytes | None, bool]:
-    """Return the power-on value of an object whose EDS gives none."""
+def _completed(row: EntryDescription, highest: int) -> EntryDescription:
+    """Return an entry with its power-on value; `highest` is the last sub-index of its object."""
+    if row.has_default or not row.data_type.is_integer:
+        return row
     if row.sub == 0 and highest and row.index not in COUNTS:
         number, relative = highest, False
     elif known := predefined(row.index, row.sub):
         number, relative = known
     else:
-        return None, False
-    try:
-        return row.data_type.encode(number), relative
-    except ValueError:  # not of the type that such an object has
-        return None, False
+        return row
+    with suppress(ValueError):  # not of the type that such an object has
+        return EntryDescription(
+            *(row.index, row.sub, row.name, row.data_type, row.access),
+            default=number,
+            low=row.low,
+            high=row.high,
+            relative=relative,
+            max_bytes=row.max_bytes,
+        )
+    return row

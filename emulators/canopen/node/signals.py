@@ -8,11 +8,12 @@ from functools import partial
 from typing import Final, Protocol
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.physical import Input, SignalType
 from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import Access, ObjectCode
 from tickrig.wire.errors import FieldError
 
 HEX: Final = "hex:"
@@ -90,15 +91,19 @@ class ObjectSignal:
         low, high = self._limits()
         shape = SignalType.LEVEL if _is_number(data_type) else SignalType.TEXT
         return Input(
-            self._name, f"{entry.name} ({_access(entry)})", shape, low, high, data_type.name
+            self._name,
+            f"{entry.description.name} ({_access(entry)})",
+            shape,
+            low,
+            high,
+            data_type.name,
         )
 
     def read(self) -> Setting:
         """Return the present value: a number, text, or bytes in hex."""
         entry = self._entry
         try:
-            data = entry.data if entry.source is None else entry.source()
-            value = entry.data_type.decode(data)
+            value = entry.data_type.decode(entry.present())
         except (SdoAbort, FieldError) as error:
             return f"({error})"
         return HEX + value.hex() if isinstance(value, bytes) else value
@@ -112,14 +117,13 @@ class ObjectSignal:
         """Set it; ValueError if its owner refuses."""
         entry, data = self._entry, self._encode(value)
         try:
-            if entry.guard is not None:
-                entry.guard(entry.data_type.decode(data))
+            entry.check_owner(data)
         except SdoAbort as abort:
             raise ValueError(f"{self._name} {value}: refused, {abort}") from None
-        self._later(partial(_change, entry, data))
+        self._later(partial(entry.force, data))
 
     def _encode(self, value: Setting) -> bytes:
-        entry, data_type = self._entry, self._entry.data_type
+        entry, data_type = self._entry.description, self._entry.data_type
         if Access.CONST in entry.access:
             raise ValueError(f"{self._name} is constant")
         low, high = self._limits()
@@ -136,14 +140,8 @@ class ObjectSignal:
     def _limits(self) -> tuple[float, float]:
         """Return the limits of a number, those of its type where the object has none."""
         low, high = _range(self._entry.data_type)
-        entry = self._entry
+        entry = self._entry.description
         return low if entry.low is None else entry.low, high if entry.high is None else entry.high
-
-
-def _change(entry: Entry, data: bytes) -> None:
-    entry.assign(data)
-    if entry.written is not None:
-        entry.written()
 
 
 def _is_number(data_type: DataType) -> bool:
@@ -151,10 +149,10 @@ def _is_number(data_type: DataType) -> bool:
 
 
 def _access(entry: Entry) -> str:
-    if Access.CONST in entry.access:
+    if Access.CONST in entry.description.access:
         return "const"
     return {(True, True): "rw", (True, False): "ro", (False, True): "wo"}.get(
-        (entry.readable, entry.writable), "hidden"
+        (entry.description.readable, entry.description.writable), "hidden"
     )
 
 

@@ -92,7 +92,7 @@ def _read(path: Path) -> dict[str, Nonvolatile]:
 def _fits(entry: Entry | None, data: bytes) -> bool:
     if entry is None:
         return False
-    return len(data) == entry.size if entry.size else len(data) <= entry.max_bytes
+    return len(data) == entry.size if entry.size else len(data) <= entry.description.max_bytes
 
 
 def _multiplexer(key: int) -> str:

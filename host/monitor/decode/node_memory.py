@@ -16,9 +16,9 @@ from tickrig.host.monitor.decode.object_text import (
     slug,
 )
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.eds_entry import EdsEntry
 from tickrig.wire.canopen.eds.eds_finding import Finding
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 
 
@@ -50,32 +50,21 @@ def read_eds(path: Path, node_id: int) -> EdsObjects:
     return EdsObjects(
         {(row.index, row.sub): _text(device, row) for row in device.entries},
         {
-            (row.index, row.sub): data
+            (row.index, row.sub): row.power_on_data(node_id)
             for row in device.entries
-            if (data := _power_on(row, node_id)) is not None
+            if row.has_default and row.data_type.is_integer
         },
         device.info.product_name or path.stem,
         findings,
     )
 
 
-def _text(device: EdsDevice, row: EdsEntry) -> ObjectText:
+def _text(device: EdsDevice, row: EntryDescription) -> ObjectText:
     name = slug(row.name)
     info = device.objects[row.index]
     if info.code not in VARIABLES:
         name = f"{slug(info.name)}.{name or row.sub}"
     return ObjectText(name, row.data_type, row.unit, row.factor, EDS)
-
-
-def _power_on(row: EdsEntry, node_id: int) -> bytes | None:
-    """Return the bytes of a number; None where there is none."""
-    if row.default is None or not row.data_type.is_integer:
-        return None
-    if not row.relative:
-        return row.default
-    number = int.from_bytes(row.default, "little") + node_id
-    size = row.data_type.size
-    return (number % (1 << 8 * size)).to_bytes(size, "little")
 
 
 STORE: Final = 0x1010

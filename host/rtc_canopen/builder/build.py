@@ -13,7 +13,7 @@ from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefi
 from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.canopen.eds.object_table import Access, ObjectRow
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.rtc_canopen.objects import device_info, object_table
 from tickrig.wire.rtc_canopen.profile import FIRST_PORT, Direction, PlacedPort, RtcProfile
 
@@ -74,7 +74,7 @@ def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
         yield _pdo(port)
 
 
-def _objects(rows: Iterable[ObjectRow]) -> Iterator[str]:
+def _objects(rows: Iterable[EntryDescription]) -> Iterator[str]:
     yield OBJECT.format("object", "name", "type", "access", "default")
     for row in rows:
         access = "".join(letter for flag, letter in LETTERS.items() if flag in row.access)

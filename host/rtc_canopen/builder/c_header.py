@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.rtc_canopen.builder.names import c_name, snake_name
 from tickrig.host.rtc_canopen.builder.skeleton import CALLBACKS
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.object_table import ObjectRow
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.rtc_canopen.objects import object_table
 from tickrig.wire.rtc_canopen.profile import PlacedPort, RtcProfile
 
@@ -131,7 +131,7 @@ def _prototypes(lower: str) -> Iterator[str]:
         yield f"{kind} {lower}_{name}(void); /* {text} */"
 
 
-def _table(profile: RtcProfile, rows: list[ObjectRow], lower: str) -> Iterator[str]:
+def _table(profile: RtcProfile, rows: list[EntryDescription], lower: str) -> Iterator[str]:
     ports = {port.index: port for port in profile.placed()}
     upper = lower.upper()
     yield ""
@@ -145,7 +145,7 @@ def _table(profile: RtcProfile, rows: list[ObjectRow], lower: str) -> Iterator[s
     yield f"#endif /* {upper}_OD_DEFINE */"
 
 
-def _entry(row: ObjectRow, port: PlacedPort | None, lower: str) -> str:
+def _entry(row: EntryDescription, port: PlacedPort | None, lower: str) -> str:
     access = row.access.value | (NODE_ID if row.relative else 0)
     number, text = "0u", "NULL"
     if row.data_type.size:
@@ -158,7 +158,7 @@ def _entry(row: ObjectRow, port: PlacedPort | None, lower: str) -> str:
     )
 
 
-def _offset(row: ObjectRow, port: PlacedPort | None, lower: str) -> str:
+def _offset(row: EntryDescription, port: PlacedPort | None, lower: str) -> str:
     if port is None or row.sub not in port.subs:
         return f"{lower.upper()}_NO_PORT"
     member = c_name(port.profile.name)

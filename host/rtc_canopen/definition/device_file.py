@@ -48,7 +48,7 @@ def read_device_file(path: Path) -> DeviceFile:
     defaults = {
         (row.index, row.sub): row.default
         for row in device.entries
-        if row.default is not None and row.data_type.is_integer
+        if row.has_default and row.data_type.is_integer
     }
     return DeviceFile(
         {key: int.from_bytes(defaults[key], "little") for key in IDENTITY if key in defaults},

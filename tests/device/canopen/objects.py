@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RW = Access.READ | Access.WRITE
@@ -18,27 +18,31 @@ RO = Access.READ
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 
 
-def u8(index: int, default: int = 0, access: Access = RW) -> list[Entry]:
-    return [Entry(index, 0, f"{index:04X}h", U8, access, default=default)]
+def u8(index: int, default: int = 0, access: Access = RW) -> list[EntryDescription]:
+    return [EntryDescription(index, 0, f"{index:04X}h", U8, access, default=default)]
 
 
-def u16(index: int, default: int = 0) -> list[Entry]:
-    return [Entry(index, 0, f"{index:04X}h", U16, RW, default=default)]
+def u16(index: int, default: int = 0) -> list[EntryDescription]:
+    return [EntryDescription(index, 0, f"{index:04X}h", U16, RW, default=default)]
 
 
-def u32(index: int, default: int = 0, *, relative: bool = False) -> list[Entry]:
-    return [Entry(index, 0, f"{index:04X}h", U32, RW, default=default, relative=relative)]
+def u32(index: int, default: int = 0, *, relative: bool = False) -> list[EntryDescription]:
+    return [
+        EntryDescription(index, 0, f"{index:04X}h", U32, RW, default=default, relative=relative)
+    ]
 
 
-def array(index: int, *defaults: int, kind: DataType = U32, access: Access = RW) -> list[Entry]:
+def array(
+    index: int, *defaults: int, kind: DataType = U32, access: Access = RW
+) -> list[EntryDescription]:
     elements = [
-        Entry(index, sub, f"{index:04X}h:{sub}", kind, access, default=default)
+        EntryDescription(index, sub, f"{index:04X}h:{sub}", kind, access, default=default)
         for sub, default in enumerate(defaults, 1)
     ]
-    return [Entry(index, 0, f"{index:04X}h:0", U8, RO, default=len(defaults)), *elements]
+    return [EntryDescription(index, 0, f"{index:04X}h:0", U8, RO, default=len(defaults)), *elements]
 
 
-def errors() -> list[Entry]:
+def errors() -> list[EntryDescription]:
     """Give the objects of an EMCY producer with three fields of history."""
     history = array(0x1003, 0, 0, 0, access=RO)[1:]
     return [
@@ -50,12 +54,14 @@ def errors() -> list[Entry]:
     ]
 
 
-def make_bus(*objects: Iterable[Entry], node_id: int = 5, kept: Nonvolatile | None = None) -> Bus:
+def make_bus(
+    *objects: Iterable[EntryDescription], node_id: int = 5, kept: Nonvolatile | None = None
+) -> Bus:
     """Make a slave of these objects on a bus of its own; it has not booted."""
     return Bus(make_slave(Dictionary(entry for rows in objects for entry in rows), node_id, kept))
 
 
-def booted(*objects: Iterable[Entry], kept: Nonvolatile | None = None) -> Bus:
+def booted(*objects: Iterable[EntryDescription], kept: Nonvolatile | None = None) -> Bus:
     """Make one that has sent its boot-up message."""
     bus = make_bus(*objects, kept=kept)
     assert bus.step() == ["705#00"]

@@ -9,12 +9,12 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.bus.sync import Sync
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RW = Access.READ | Access.WRITE
@@ -38,9 +38,9 @@ class Emergencies(Service):
 class PdoBench(Bus):
     """A slave that has booted; objects are written as by SDO, but without frames."""
 
-    def __init__(self, *more: Entry, without: Iterable[int] = ()) -> None:
+    def __init__(self, *more: EntryDescription, without: Iterable[int] = ()) -> None:
         left_out = set(without)
-        kept = [entry for entry in make_dictionary() if entry.index not in left_out]
+        kept = [entry for entry in make_dictionary().description if entry.index not in left_out]
         services = (NmtSlave, Sync, PdoConsumer, PdoProducer, Emergencies)
         super().__init__(CanopenSlave(Dictionary([*kept, *more]), NODE_ID, services))
         assert self.step() == ["705#00"]
@@ -101,16 +101,16 @@ class PdoBench(Bus):
         return notes
 
 
-def u8(index: int, sub: int, value: int = 0, access: Access = RW) -> Entry:
+def u8(index: int, sub: int, value: int = 0, access: Access = RW) -> EntryDescription:
     """Make an entry of one byte."""
-    return Entry(index, sub, "u8", U8, access, default=value)
+    return EntryDescription(index, sub, "u8", U8, access, default=value)
 
 
-def u32(index: int, sub: int, value: int = 0) -> Entry:
+def u32(index: int, sub: int, value: int = 0) -> EntryDescription:
     """Make an entry of four bytes."""
-    return Entry(index, sub, "u32", U32, RW, default=value)
+    return EntryDescription(index, sub, "u32", U32, RW, default=value)
 
 
-def u64(index: int, sub: int, value: int = 0) -> Entry:
+def u64(index: int, sub: int, value: int = 0) -> EntryDescription:
     """Make an entry of eight bytes."""
-    return Entry(index, sub, "u64", U64, RW, default=value)
+    return EntryDescription(index, sub, "u64", U64, RW, default=value)

@@ -8,7 +8,7 @@ from typing import Final
 from tests.device.canopen import reference as r1
 from tests.device.canopen.reference import BOOL, I8, I16, I32, RO, RPDO, RW, TPDO, U8, U16, U32
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 GENERIC_IO: Final = "401"
 DRIVE: Final = "402"
@@ -58,14 +58,14 @@ VARIABLES: Final[dict[str, tuple[r1.Variable, ...]]] = {
 def make_dictionary(needs: Collection[str]) -> Dictionary:
     """Make R1 with all that a check needs."""
     plain = r1.make_dictionary(needs)
-    return Dictionary([*plain, *_added(needs)], plain.objects)
+    return Dictionary([*plain.description, *_added(needs)], plain.objects)
 
 
-def _added(needs: Collection[str]) -> Iterator[Entry]:
+def _added(needs: Collection[str]) -> Iterator[EntryDescription]:
     for need in (GENERIC_IO, DRIVE):
         if need in needs:
             for index, name, kind, access, default in VARIABLES[need]:
-                yield Entry(index, 0, name, kind, access, default=default)
+                yield EntryDescription(index, 0, name, kind, access, default=default)
     if GENERIC_IO in needs:
         for row in ARRAYS:
             yield from r1.array(row)

@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import (
+    Access,
+    EntryDescription,
+    ObjectCode,
+    ObjectDescription,
+)
 
 RO: Final = Access.READ
 WO: Final = Access.WRITE
@@ -99,84 +104,86 @@ def make_dictionary(needs: Collection[str] = ()) -> Dictionary:
     return Dictionary(rows, {row.index: codes[row.index] for row in rows if row.index in codes})
 
 
-def array(row: Array) -> Iterator[Entry]:
+def array(row: Array) -> Iterator[EntryDescription]:
     """Make an array with its sub-index 0."""
     index, name, count, kind, access, default = row
-    yield Entry(index, 0, f"{name}.n", U8, RO, default=count)
+    yield EntryDescription(index, 0, f"{name}.n", U8, RO, default=count)
     for sub in range(1, count + 1):
-        yield Entry(index, sub, f"{name}.{sub}", kind, access, default=default)
+        yield EntryDescription(index, sub, f"{name}.{sub}", kind, access, default=default)
 
 
-def _object_infos() -> Iterator[tuple[int, ObjectInfo]]:
+def _object_infos() -> Iterator[tuple[int, ObjectDescription]]:
     for index, name, *_ in ARRAYS:
-        yield index, ObjectInfo(name, ObjectCode.ARRAY)
-    yield 0x1003, ObjectInfo("Pre-defined error field", ObjectCode.ARRAY)
-    yield 0x1029, ObjectInfo("Error behaviour", ObjectCode.ARRAY)
-    yield 0x1018, ObjectInfo("Identity", ObjectCode.RECORD)
-    yield 0x1200, ObjectInfo("SDO server 1", ObjectCode.RECORD)
-    yield 0x1201, ObjectInfo("SDO server 2", ObjectCode.RECORD)
+        yield index, ObjectDescription(name, ObjectCode.ARRAY)
+    yield 0x1003, ObjectDescription("Pre-defined error field", ObjectCode.ARRAY)
+    yield 0x1029, ObjectDescription("Error behaviour", ObjectCode.ARRAY)
+    yield 0x1018, ObjectDescription("Identity", ObjectCode.RECORD)
+    yield 0x1200, ObjectDescription("SDO server 1", ObjectCode.RECORD)
+    yield 0x1201, ObjectDescription("SDO server 2", ObjectCode.RECORD)
     for index, name, _ in MAPPINGS:
-        yield index, ObjectInfo(name, ObjectCode.RECORD)
-        yield index - 0x200, ObjectInfo(name.replace("map", "comm"), ObjectCode.RECORD)
+        yield index, ObjectDescription(name, ObjectCode.RECORD)
+        yield index - 0x200, ObjectDescription(name.replace("map", "comm"), ObjectCode.RECORD)
 
 
-def _variables() -> Iterator[Entry]:
+def _variables() -> Iterator[EntryDescription]:
     for index, name, kind, access, default in VARIABLES:
-        yield Entry(index, 0, name, kind, access, default=default)
-    yield Entry(0x1014, 0, "COB-ID EMCY", U32, RW, default=0x80, relative=True)
-    yield Entry(0x2006, 0, "u8 limits 10h..20h", U8, RW, default=0x10, low=0x10, high=0x20)
-    yield Entry(0x2007, 0, "string, max 64", STR, RW, default="short", max_bytes=64)
-    yield Entry(0x2008, 0, "domain, max 20000", DOM, RW, default=b"", max_bytes=20_000)
+        yield EntryDescription(index, 0, name, kind, access, default=default)
+    yield EntryDescription(0x1014, 0, "COB-ID EMCY", U32, RW, default=0x80, relative=True)
+    yield EntryDescription(
+        0x2006, 0, "u8 limits 10h..20h", U8, RW, default=0x10, low=0x10, high=0x20
+    )
+    yield EntryDescription(0x2007, 0, "string, max 64", STR, RW, default="short", max_bytes=64)
+    yield EntryDescription(0x2008, 0, "domain, max 20000", DOM, RW, default=b"", max_bytes=20_000)
 
 
-def _arrays() -> Iterator[Entry]:
+def _arrays() -> Iterator[EntryDescription]:
     for row in ARRAYS:
         yield from array(row)
-    yield Entry(0x1003, 0, "Pre-defined error field.n", U8, RW)
+    yield EntryDescription(0x1003, 0, "Pre-defined error field.n", U8, RW)
     for sub in range(1, 9):
-        yield Entry(0x1003, sub, f"Pre-defined error field.{sub}", U32, RO)
+        yield EntryDescription(0x1003, sub, f"Pre-defined error field.{sub}", U32, RO)
 
 
-def _records() -> Iterator[Entry]:
-    yield Entry(0x1018, 0, "Identity.n", U8, RO, default=len(IDENTITY))
+def _records() -> Iterator[EntryDescription]:
+    yield EntryDescription(0x1018, 0, "Identity.n", U8, RO, default=len(IDENTITY))
     for sub, (name, value) in enumerate(IDENTITY, 1):
-        yield Entry(0x1018, sub, f"Identity.{name}", U32, RO, default=value)
-    yield Entry(0x1200, 0, "SDO server 1.n", U8, RO, default=2)
-    yield Entry(0x1200, 1, "SDO server 1.c2s", U32, RO, default=0x600, relative=True)
-    yield Entry(0x1200, 2, "SDO server 1.s2c", U32, RO, default=0x580, relative=True)
-    yield Entry(0x1201, 0, "SDO server 2.n", U8, RO, default=3)
-    yield Entry(0x1201, 1, "SDO server 2.c2s", U32, RW, default=0x8000_0000)
-    yield Entry(0x1201, 2, "SDO server 2.s2c", U32, RW, default=0x8000_0000)
-    yield Entry(0x1201, 3, "SDO server 2.client", U8, RW)
+        yield EntryDescription(0x1018, sub, f"Identity.{name}", U32, RO, default=value)
+    yield EntryDescription(0x1200, 0, "SDO server 1.n", U8, RO, default=2)
+    yield EntryDescription(0x1200, 1, "SDO server 1.c2s", U32, RO, default=0x600, relative=True)
+    yield EntryDescription(0x1200, 2, "SDO server 1.s2c", U32, RO, default=0x580, relative=True)
+    yield EntryDescription(0x1201, 0, "SDO server 2.n", U8, RO, default=3)
+    yield EntryDescription(0x1201, 1, "SDO server 2.c2s", U32, RW, default=0x8000_0000)
+    yield EntryDescription(0x1201, 2, "SDO server 2.s2c", U32, RW, default=0x8000_0000)
+    yield EntryDescription(0x1201, 3, "SDO server 2.client", U8, RW)
 
 
-def _pdos() -> Iterator[Entry]:
+def _pdos() -> Iterator[EntryDescription]:
     for number, cob_id in enumerate(RPDO_COB_IDS, 1):
         yield from _communication(0x13FF + number, f"RPDO{number} comm", 5, cob_id)
     for number, cob_id in enumerate(TPDO_COB_IDS, 1):
         index, name = 0x17FF + number, f"TPDO{number} comm"
         yield from _communication(index, name, 6, cob_id)
-        yield Entry(index, 3, f"{name}.inhibit", U16, RW)
-        yield Entry(index, 6, f"{name}.sync start", U8, RW)
+        yield EntryDescription(index, 3, f"{name}.inhibit", U16, RW)
+        yield EntryDescription(index, 6, f"{name}.sync start", U8, RW)
 
 
-def _communication(index: int, name: str, highest: int, cob_id: int) -> Iterator[Entry]:
-    yield Entry(index, 0, f"{name}.n", U8, RO, default=highest)
-    yield Entry(index, 1, f"{name}.cobid", U32, RW, default=cob_id, relative=True)
-    yield Entry(index, 2, f"{name}.type", U8, RW, default=0xFF)
-    yield Entry(index, 5, f"{name}.event timer", U16, RW)
+def _communication(index: int, name: str, highest: int, cob_id: int) -> Iterator[EntryDescription]:
+    yield EntryDescription(index, 0, f"{name}.n", U8, RO, default=highest)
+    yield EntryDescription(index, 1, f"{name}.cobid", U32, RW, default=cob_id, relative=True)
+    yield EntryDescription(index, 2, f"{name}.type", U8, RW, default=0xFF)
+    yield EntryDescription(index, 5, f"{name}.event timer", U16, RW)
 
 
-def _mappings() -> Iterator[Entry]:
+def _mappings() -> Iterator[EntryDescription]:
     for index, name, mapped in MAPPINGS:
-        yield Entry(index, 0, f"{name}.n", U8, RW, default=len(mapped))
+        yield EntryDescription(index, 0, f"{name}.n", U8, RW, default=len(mapped))
         for sub in range(1, 9):
             default = mapped[sub - 1] if sub <= len(mapped) else 0
-            yield Entry(index, sub, f"{name}.map{sub}", U32, RW, default=default)
+            yield EntryDescription(index, sub, f"{name}.map{sub}", U32, RW, default=default)
 
 
-def _optional(needs: Collection[str]) -> Iterator[Entry]:
+def _optional(needs: Collection[str]) -> Iterator[EntryDescription]:
     if ERROR_BEHAVIOUR in needs:
         yield from array((0x1029, "Error behaviour", 1, U8, RW, 0))
     if NMT_STARTUP in needs:
-        yield Entry(0x1F80, 0, "NMT startup", U32, RW, default=4)
+        yield EntryDescription(0x1F80, 0, "NMT startup", U32, RW, default=4)

@@ -4,10 +4,10 @@ import pytest
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.nmt import NmtState
 
 RW = Access.READ | Access.WRITE
@@ -15,10 +15,10 @@ RW = Access.READ | Access.WRITE
 
 def make_bus(heartbeat_ms: int = 0, startup: int = 4) -> Bus:
     entries = [
-        Entry(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ),
-        Entry(0x1017, 0, "Heartbeat", DataType.UNSIGNED16, RW, default=heartbeat_ms),
-        Entry(0x1F80, 0, "NMT startup", DataType.UNSIGNED32, RW, default=startup),
-        Entry(0x2000, 0, "Mine", DataType.UNSIGNED8, RW, default=7),
+        EntryDescription(0x1000, 0, "Device type", DataType.UNSIGNED32, Access.READ),
+        EntryDescription(0x1017, 0, "Heartbeat", DataType.UNSIGNED16, RW, default=heartbeat_ms),
+        EntryDescription(0x1F80, 0, "NMT startup", DataType.UNSIGNED32, RW, default=startup),
+        EntryDescription(0x2000, 0, "Mine", DataType.UNSIGNED8, RW, default=7),
     ]
     return Bus(make_slave(Dictionary(entries), node_id=5))
 

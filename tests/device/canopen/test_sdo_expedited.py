@@ -4,8 +4,8 @@ import pytest
 
 from tests.device.canopen.objects import make_bus
 from tests.device.canopen.sdo_client import Client, booted
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.sdo import DownloadInitiateRequest
 
 UPLOADS = [
@@ -72,13 +72,13 @@ def test_a_download_writes_or_changes_nothing(request_: str, answer: str, after:
 
 def test_what_is_made_on_demand_is_read_over_the_bus() -> None:
     bus = booted()
-    bus.slave.dictionary[0x2000, 0].source = lambda: b"\x2a"
+    bus.slave.dictionary[0x2000, 0].source = lambda entry: b"\x2a"
     assert bus.step("605#4000200000000000") == ["585#4F0020002A000000"]
 
 
 @pytest.mark.parametrize("kind", [kind for kind in DataType if kind.size])
 def test_every_data_type_goes_there_and_back(kind: DataType) -> None:
-    bus = make_bus([Entry(0x2000, 0, "mine", kind, Access.READ | Access.WRITE)])
+    bus = make_bus([EntryDescription(0x2000, 0, "mine", kind, Access.READ | Access.WRITE)])
     bus.step()
     client, data = Client(bus), bytes(range(1, kind.size + 1))
     if kind.size <= 4:
@@ -90,7 +90,9 @@ def test_every_data_type_goes_there_and_back(kind: DataType) -> None:
 
 
 def test_a_boolean_is_0_or_1() -> None:
-    bus = make_bus([Entry(0x2100, 0, "on", DataType.BOOLEAN, Access.READ | Access.WRITE)])
+    bus = make_bus(
+        [EntryDescription(0x2100, 0, "on", DataType.BOOLEAN, Access.READ | Access.WRITE)]
+    )
     bus.step()
     for value, answer in (("01", "60"), ("02", "80"), ("FF", "80"), ("00", "60")):
         (sent,) = bus.step(f"605#2F002100{value}000000")

@@ -49,7 +49,7 @@ class Bench:
 
 
 def _eds() -> io.StringIO:
-    file = io.StringIO(write_eds(epos.dictionary()))
+    file = io.StringIO(write_eds(epos.dictionary().description))
     file.name = "epos.eds"
     return file
 

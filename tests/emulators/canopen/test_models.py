@@ -8,8 +8,7 @@ import canopen
 import pytest
 from canopen.objectdictionary import ODVariable, import_od
 
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
@@ -18,6 +17,7 @@ from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node.node import NODE_OUTPUTS
 from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription, ObjectCode
 
 SHIPPED = Path(__file__).parents[3] / "examples" / "eds"
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -33,7 +33,7 @@ def in_library(path: Path) -> dict[tuple[int, int], ODVariable]:
     return {at: variable for at, variable in found.items() if at[0] >= 0x1000}
 
 
-def default_of(entry: Entry) -> object:
+def default_of(entry: EntryDescription) -> object:
     value = entry.data_type.decode(entry.default)
     return entry.data_type.encode(value) if isinstance(value, bytes) else value
 
@@ -43,7 +43,9 @@ def test_the_shipped_eds_is_what_the_model_writes(model: Model) -> None:
     description = model.describe()
     text = (SHIPPED / f"{model.name}.eds").read_text("utf-8")
     again = f"canopen-slave-emu --model {model.name} --write-eds examples/eds/{model.name}.eds"
-    assert text == write_eds(description.template, description.info), f"write it again: {again}"
+    assert text == write_eds(description.template.description, description.info), (
+        f"write it again: {again}"
+    )
 
 
 def test_each_shipped_eds_has_its_model() -> None:
@@ -53,7 +55,7 @@ def test_each_shipped_eds_has_its_model() -> None:
 @each_model
 def test_the_canopen_library_reads_the_shipped_eds(model: Model) -> None:
     library = in_library(SHIPPED / f"{model.name}.eds")
-    entries = {(entry.index, entry.sub): entry for entry in model.dictionary()}
+    entries = {(entry.index, entry.sub): entry for entry in model.dictionary().description}
     assert library.keys() == entries.keys()
     for at, entry in entries.items():
         theirs = library[at]
@@ -70,7 +72,7 @@ def test_the_shipped_eds_gives_the_same_dictionary(model: Model) -> None:
     def rows(dictionary: Dictionary) -> list[tuple[object, ...]]:
         return [
             (entry.key, entry.name, entry.data_type, entry.access, entry.default, entry.relative)
-            for entry in dictionary
+            for entry in dictionary.description
         ]
 
     again = read_eds(SHIPPED / f"{model.name}.eds")

@@ -8,7 +8,6 @@ import pytest
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
@@ -18,6 +17,7 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_node
 from tickrig.emulators.canopen.profiles import application_of
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 EDS = Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds"
 
@@ -29,7 +29,11 @@ def node_of(spec: NodeSpec, profile: str = "auto") -> Node:
 
 def of_type(device_type: int) -> Dictionary:
     return Dictionary(
-        [Entry(0x1000, 0, "device type", DataType.UNSIGNED32, Access.READ, default=device_type)]
+        [
+            EntryDescription(
+                0x1000, 0, "device type", DataType.UNSIGNED32, Access.READ, default=device_type
+            )
+        ]
     )
 
 

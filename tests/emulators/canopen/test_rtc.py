@@ -67,7 +67,7 @@ def frames(result: Result) -> list[str]:
 def rows(dictionary: Dictionary) -> list[tuple[object, ...]]:
     return [
         (entry.key, entry.name, entry.data_type, entry.access, entry.default, entry.relative)
-        for entry in dictionary
+        for entry in dictionary.description
     ]
 
 

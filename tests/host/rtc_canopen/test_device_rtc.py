@@ -22,7 +22,9 @@ ECHO = "nodes: [{id: 48, name: Echo0, eds: echo.eds, ports: {rpdo1: in, tpdo1: o
 @pytest.fixture
 def bench(tmp_path: Path) -> Bench:
     description = MODELS["rtc-echo"].describe()
-    (tmp_path / "echo.eds").write_text(write_eds(description.template, description.info), "utf-8")
+    (tmp_path / "echo.eds").write_text(
+        write_eds(description.template.description, description.info), "utf-8"
+    )
     bench = Bench(ECHO, {48: "rtc-echo"}, tmp_path)
     bench.boot()
     bench.run_ms(120)
@@ -76,7 +78,9 @@ def test_in_error_a_start_of_another_master_changes_nothing(bench: Bench) -> Non
 
 def test_a_drive_that_cannot_reset_its_fault_is_reset_all_the_same(tmp_path: Path) -> None:
     description = MODELS["rtc-echo"].describe()
-    (tmp_path / "echo.eds").write_text(write_eds(description.template, description.info), "utf-8")
+    (tmp_path / "echo.eds").write_text(
+        write_eds(description.template.description, description.info), "utf-8"
+    )
     bench = Bench(ECHO.replace("ports", "role: drive, ports"), {48: "rtc-echo"}, tmp_path)
     bench.boot()
     bench.run_ms(120)

@@ -8,10 +8,17 @@ from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
-from tickrig.wire.canopen.eds.eds_entry import EdsEntry, read_entry, required
+from tickrig.wire.canopen.eds.eds_entry import read_entry, required
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
-from tickrig.wire.canopen.eds.object_table import RO, RW, Access, ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.object_table import (
+    RO,
+    RW,
+    Access,
+    EntryDescription,
+    ObjectCode,
+    ObjectDescription,
+)
 
 COMMISSIONING: Final = "DeviceComissioning"
 UNSET_NODE_IDS: Final = (0, 0xFF)
@@ -39,8 +46,8 @@ class EdsDevice:
     """
 
     info: DeviceInfo
-    entries: tuple[EdsEntry, ...]
-    objects: Mapping[int, ObjectInfo]
+    entries: tuple[EntryDescription, ...]
+    objects: Mapping[int, ObjectDescription]
     node_id: int | None = None
     bit_rate: int | None = None
 
@@ -61,7 +68,7 @@ def read_device(file: EdsFile) -> EdsDevice:
         _device_info(file),
         entries,
         {
-            index: ObjectInfo(file.value(f"{index:04X}", "ParameterName"), kind)
+            index: ObjectDescription(file.value(f"{index:04X}", "ParameterName"), kind)
             for index, kind in kinds.items()
         },
         _node_id(file),
@@ -106,7 +113,7 @@ def _kinds(file: EdsFile) -> Kinds:
     return kinds
 
 
-def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EdsEntry]:
+def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
     subs: dict[int, list[tuple[str, int]]] = {}
     for section, index, sub in file.objects():
         if sub is not None:
@@ -121,7 +128,7 @@ def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EdsEntry]:
 
 def _object(
     file: EdsFile, index: int, kind: ObjectCode, subs: list[tuple[str, int]]
-) -> Iterator[EdsEntry | None]:
+) -> Iterator[EntryDescription | None]:
     """Read the entries of one object; None for one that cannot be made."""
     head = f"{index:04X}"
     if kind in VARIABLES:
@@ -139,7 +146,7 @@ def _object(
     yield from _compact(file, index, count)
 
 
-def _compact(file: EdsFile, index: int, count: int) -> Iterator[EdsEntry]:
+def _compact(file: EdsFile, index: int, count: int) -> Iterator[EntryDescription]:
     """Read an object that is described by one of its elements."""
     head = f"{index:04X}"
     title = file.value(head, "ParameterName")
@@ -152,13 +159,13 @@ def _compact(file: EdsFile, index: int, count: int) -> Iterator[EdsEntry]:
     yield from elements
 
 
-def _count(index: int, elements: list[EdsEntry]) -> EdsEntry:
+def _count(index: int, elements: list[EntryDescription]) -> EntryDescription:
     """Make the sub-index 0 of a compact object."""
     u8 = DataType.UNSIGNED8
     if index == ERROR_FIELD:
-        return EdsEntry(index, 0, "Number of errors", u8, RW, b"\0")
+        return EntryDescription(index, 0, "Number of errors", u8, RW, default=0)
     used, access = len(elements), RO
     if index in COUNTS:
-        used = sum(any(element.default or b"") for element in elements)
+        used = sum(any(element.default) for element in elements)
         access = RW if any(Access.WRITE in element.access for element in elements) else RO
-    return EdsEntry(index, 0, "Number of entries", u8, access, bytes([used]))
+    return EntryDescription(index, 0, "Number of entries", u8, access, default=used)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_finding import shorten
 from tickrig.wire.canopen.eds.eds_value import parse_limit, parse_value
-from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode
+from tickrig.wire.canopen.eds.object_table import (
+    MAX_VARIABLE_BYTES,
+    Access,
+    EntryDescription,
+    ObjectCode,
+)
 
 SIMPLE_TYPES: Final = range(0x1C)
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
@@ -18,42 +22,9 @@ TRUTH: Final = (0, 1)
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
 
 
-@dataclass(frozen=True, slots=True)
-class EdsEntry:
-    """What a file says of one entry.
-
-    Attributes:
-        index: 0x0000..0xFFFF.
-        sub: 0..255.
-        name: as in the file.
-        data_type: DOMAIN where the file names one that we do not know.
-        access: what the bus may do.
-        default: bytes of the power-on value, None if the file gives none.
-        relative: the node-ID is added to the default.
-        low: smallest value, None for that of the data type.
-        high: largest value.
-        max_bytes: what a string or domain holds.
-        unit: empty if the file gives none.
-        factor: by which its number is multiplied to be in that unit.
-    """
-
-    index: int
-    sub: int
-    name: str
-    data_type: DataType
-    access: Access
-    default: bytes | None = None
-    relative: bool = False
-    low: float | None = None
-    high: float | None = None
-    max_bytes: int = MAX_VARIABLE_BYTES
-    unit: str = ""
-    factor: float = 1
-
-
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
-) -> EdsEntry | None:
+) -> EntryDescription | None:
     """Read an entry; None if it has no name, type or access, which the file notes.
 
     Args:
@@ -70,8 +41,12 @@ def read_entry(
         return None
     default, relative = _default(file, section, index, sub, kind)
     low, high = _limits(file, section, kind)
-    return EdsEntry(
-        *(index, sub, name, kind, access, default, relative, low, high),
+    return EntryDescription(
+        *(index, sub, name, kind, access),
+        default=default,
+        low=low,
+        high=high,
+        relative=relative,
         max_bytes=file.number(section, "MaxBytes", MAX_VARIABLE_BYTES),
         unit=file.value(section, "Unit"),
         factor=_factor(file, section),

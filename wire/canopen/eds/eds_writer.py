@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import groupby
 from operator import attrgetter
-from typing import Final
+from typing import Final, Protocol
 
-from tickrig.wire.canopen.eds.described import Described, Table
 from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
 from tickrig.wire.canopen.eds.eds_value import format_limit, format_value, parse_value
-from tickrig.wire.canopen.eds.object_table import MAX_VARIABLE_BYTES, Access, ObjectCode, ObjectInfo
+from tickrig.wire.canopen.eds.object_table import (
+    MAX_VARIABLE_BYTES,
+    Access,
+    EntryDescription,
+    ObjectCode,
+    ObjectDescription,
+)
 
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER: Final = range(0x2000, 0x6000)
@@ -33,6 +38,19 @@ NO_INFO: Final = DeviceInfo()
 _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
 
+class Table(Protocol):
+    """EntryDescription objects: an `ObjectTable`, or what the dictionaries of slaves share."""
+
+    @property
+    def objects(self) -> Mapping[int, ObjectDescription]:
+        """Names and kinds by index, sorted."""
+        ...
+
+    def __iter__(self) -> Iterator[EntryDescription]:
+        """Give all entries, sorted by index and sub-index."""
+        ...
+
+
 def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     """Write the objects with their default values.
 
@@ -49,18 +67,32 @@ def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
     >>> text.splitlines()[:2]
     ['[FileInfo]', 'FileName=device.eds']
     """
-    return "\n".join([*_head(table, info, ".eds"), *_objects(table, present=False)])
+    return "\n".join([*_head(table, info, ".eds"), *_objects(table)])
 
 
-def write_dcf(table: Table, node_id: int, bit_rate: int, info: DeviceInfo = NO_INFO) -> str:
-    """Write the objects with default and present values, for one node-ID; bit rate in bit/s."""
+def write_dcf(
+    table: Table,
+    node_id: int,
+    bit_rate: int,
+    values: Mapping[int, bytes],
+    info: DeviceInfo = NO_INFO,
+) -> str:
+    """Write the objects with default and present values, for one node.
+
+    Args:
+        table: the objects.
+        node_id: 1..127.
+        bit_rate: in bit/s.
+        values: bytes of the present values by index << 8 | sub-index; others have their default.
+        info: the head of the file.
+    """
     commissioning = [
         "[DeviceComissioning]",
         *(f"NodeID={node_id}", "NodeName=", f"Baudrate={bit_rate // 1_000}"),
         *("NetNumber=0", "NetworkName=", "CANopenManager=0"),
         *(f"LSS_SerialNumber=0x{_identity(table).get(SERIAL_NUMBER, 0):08X}", ""),
     ]
-    objects = _objects(table, present=True)
+    objects = _objects(table, values)
     return "\n".join([*_head(table, info, ".dcf"), *commissioning, *objects])
 
 
@@ -90,7 +122,7 @@ def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
 
 def _identity(table: Table) -> dict[int, int]:
     """Return the numbers of 1018h by sub-index."""
-    return {row.sub: int.from_bytes(row.data, "little") for row in table if row.index == 0x1018}
+    return {row.sub: int.from_bytes(row.default, "little") for row in table if row.index == 0x1018}
 
 
 def _file_info(info: DeviceInfo, ending: str) -> Iterator[str]:
@@ -114,7 +146,7 @@ def _comments(table: Table) -> Iterator[str]:
                 yield f"DefaultBytes of {title} is {entry.default.hex().upper()}"
 
 
-def _objects(table: Table, *, present: bool) -> Iterator[str]:
+def _objects(table: Table, values: Mapping[int, bytes] | None = None) -> Iterator[str]:
     mandatory = [index for index in table.objects if index in MANDATORY]
     manufacturer = [index for index in table.objects if index in MANUFACTURER]
     optional = [index for index in table.objects if index not in {*mandatory, *manufacturer}]
@@ -127,15 +159,15 @@ def _objects(table: Table, *, present: bool) -> Iterator[str]:
         yield from (f"{number}=0x{index:04X}" for number, index in enumerate(indices, 1))
         yield ""
     for info, entries in _grouped(table):
-        yield from _object(info, entries, present=present)
+        yield from _object(info, entries, values)
 
 
-def _grouped(table: Table) -> Iterator[tuple[ObjectInfo, list[Described]]]:
+def _grouped(table: Table) -> Iterator[tuple[ObjectDescription, list[EntryDescription]]]:
     for index, entries in groupby(table, attrgetter("index")):
         yield table.objects[index], list(entries)
 
 
-def _titles(info: ObjectInfo, entries: list[Described]) -> list[str]:
+def _titles(info: ObjectDescription, entries: list[EntryDescription]) -> list[str]:
     """Return the names of the sections of an object's entries."""
     head = f"{entries[0].index:04X}"
     if len(entries) == 1 and entries[0].sub == 0 and info.code in VARIABLES:
@@ -143,26 +175,32 @@ def _titles(info: ObjectInfo, entries: list[Described]) -> list[str]:
     return [f"{head}sub{entry.sub:X}" for entry in entries]
 
 
-def _object(info: ObjectInfo, entries: list[Described], *, present: bool) -> Iterator[str]:
+def _object(
+    info: ObjectDescription,
+    entries: list[EntryDescription],
+    values: Mapping[int, bytes] | None,
+) -> Iterator[str]:
     head, titles = f"{entries[0].index:04X}", _titles(info, entries)
     if titles == [head]:
-        yield from _variable(head, info.code, entries[0], present=present)
+        yield from _variable(head, info.code, entries[0], values)
         return
     code = ObjectCode.RECORD if info.code in VARIABLES else info.code
     yield from (f"[{head}]", f"ParameterName={_name(info.name)}")
     yield from (f"ObjectType=0x{code:X}", f"SubNumber={len(entries)}", "")
     for entry, title in zip(entries, titles, strict=True):
-        yield from _variable(title, ObjectCode.VAR, entry, present=present)
+        yield from _variable(title, ObjectCode.VAR, entry, values)
 
 
-def _variable(title: str, code: ObjectCode, entry: Described, *, present: bool) -> Iterator[str]:
+def _variable(
+    title: str, code: ObjectCode, entry: EntryDescription, values: Mapping[int, bytes] | None
+) -> Iterator[str]:
     kind = entry.data_type
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
     yield from (f"DataType=0x{kind:04X}", f"AccessType={_access_type(entry)}")
     yield f"PDOMapping={int(bool(entry.access & MAPPABLE))}"
     yield f"DefaultValue={_default(entry) or ''}"
-    if present:
-        value = format_value(kind, entry.data)
+    if values is not None:
+        value = format_value(kind, values.get(entry.key, entry.default))
         yield f"ParameterValue={value if _fits_a_line(value) else ''}"
     if entry.low is not None:
         yield f"LowLimit={format_limit(kind, entry.low)}"
@@ -171,7 +209,7 @@ def _variable(title: str, code: ObjectCode, entry: Described, *, present: bool) 
     yield ""
 
 
-def _access_type(entry: Described) -> str:
+def _access_type(entry: EntryDescription) -> str:
     mappable = entry.access & MAPPABLE
     name = ACCESS_TYPES.get(entry.access & ~MAPPABLE, "")
     if name == "rw" and mappable in (Access.TPDO, Access.RPDO):
@@ -182,13 +220,13 @@ def _access_type(entry: Described) -> str:
     return name
 
 
-def _default(entry: Described) -> str | None:
+def _default(entry: EntryDescription) -> str | None:
     """Return the text of a default, None if no text comes back exactly."""
     text = format_value(entry.data_type, entry.default, relative=entry.relative)
     return text if _reads_as(entry, text) else None
 
 
-def _reads_as(entry: Described, text: str) -> bool:
+def _reads_as(entry: EntryDescription, text: str) -> bool:
     """Say whether a default comes back exactly."""
     if not text:
         return not any(entry.default) and len(entry.default) == entry.data_type.size

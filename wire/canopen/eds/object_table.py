@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from enum import Flag, IntEnum
+from operator import attrgetter
 from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -66,11 +66,86 @@ class ObjectCode(IntEnum):
     RECORD = 0x9
 
 
-class ObjectInfo(NamedTuple):
-    """What an object is called, beside its entries."""
+class ObjectDescription(NamedTuple):
+    """What an object is called and what kind it is, beside its entries."""
 
     name: str
     code: ObjectCode = ObjectCode.VAR
+
+
+class EntryDescription:
+    """What never changes of a variable, or of one element of an array or record (CiA 306).
+
+    Args:
+        index: 0x0000..0xFFFF.
+        sub: 0..255.
+        name: as in the EDS.
+        data_type: decides size and notation; DOMAIN where a file names an unknown one.
+        access: what the bus may do.
+        default: power-on value or its bytes; zero, or empty, if left out.
+        low: smallest value, None for that of the data type.
+        high: largest value.
+        relative: the node-ID is added to the default ($NODEID).
+        max_bytes: largest size of a string or domain.
+        unit: of the value, empty if none is given.
+        factor: by which its number is multiplied to be in that unit.
+
+    Raises:
+        FieldError: the default is no value of the data type.
+
+    Attributes:
+        default: bytes of the power-on value.
+        has_default: whether one was given.
+        size: size in bytes, 0 where it varies.
+        signed: whether it is a signed integer.
+        readable: the bus may read it.
+        writable: the bus may write it.
+        key: index and sub-index in one number.
+    """
+
+    __slots__ = (
+        *("access", "data_type", "default", "factor", "has_default", "high", "index", "key"),
+        *("low", "max_bytes", "name", "readable", "relative", "signed", "size", "sub"),
+        *("unit", "writable"),
+    )
+
+    def __init__(  # noqa: PLR0913 - a description, by keyword
+        self,
+        index: int,
+        sub: int,
+        name: str,
+        data_type: DataType,
+        access: Access,
+        *,
+        default: Value | None = None,
+        low: float | None = None,
+        high: float | None = None,
+        relative: bool = False,
+        max_bytes: int = MAX_VARIABLE_BYTES,
+        unit: str = "",
+        factor: float = 1,
+    ) -> None:
+        self.index, self.sub, self.key, self.name = index, sub, index << 8 | sub, name
+        self.data_type, self.access = data_type, access
+        self.size, self.signed = data_type.size, data_type.signed
+        self.readable, self.writable = Access.READ in access, Access.WRITE in access
+        self.has_default = default is not None
+        if default is None:
+            default = bytes(self.size)
+        self.default = default if isinstance(default, bytes) else data_type.encode(default)
+        self.low, self.high, self.relative, self.max_bytes = low, high, relative, max_bytes
+        self.unit, self.factor = unit, factor
+
+    def __repr__(self) -> str:
+        """Name it as a log line would."""
+        return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
+
+    def power_on_data(self, node_id: int) -> bytes:
+        """Return the default, with the node-ID where it belongs to it."""
+        if not self.relative:
+            return self.default
+        value = int.from_bytes(self.default, "little") + node_id
+        return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
 
 
 class Element(NamedTuple):
@@ -93,40 +168,6 @@ class Element(NamedTuple):
     relative: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectRow:
-    """A variable, or one element of an array or record, as an EDS has it.
-
-    Attributes:
-        index: 0x1000..0xFFFF.
-        sub: 0..254.
-        name: as in the EDS.
-        data_type: of its value.
-        access: what the bus may do.
-        default: bytes of the power-on value.
-        low: smallest value, None for that of the data type.
-        high: largest value.
-        relative: the node-ID is added to the default.
-        max_bytes: what a string or domain holds.
-    """
-
-    index: int
-    sub: int
-    name: str
-    data_type: DataType
-    access: Access
-    default: bytes
-    low: float | None = None
-    high: float | None = None
-    relative: bool = False
-    max_bytes: int = MAX_VARIABLE_BYTES
-
-    @property
-    def data(self) -> bytes:
-        """The present value is the default."""
-        return self.default
-
-
 class ObjectTable:
     """Collects objects, sorted by index and sub-index when they are given out.
 
@@ -141,15 +182,15 @@ class ObjectTable:
     """
 
     def __init__(self) -> None:
-        self._rows: list[ObjectRow] = []
-        self._infos: dict[int, ObjectInfo] = {}
+        self._rows: list[EntryDescription] = []
+        self._infos: dict[int, ObjectDescription] = {}
 
-    def __iter__(self) -> Iterator[ObjectRow]:
+    def __iter__(self) -> Iterator[EntryDescription]:
         """Give all rows."""
-        return iter(sorted(self._rows, key=lambda row: (row.index, row.sub)))
+        return iter(sorted(self._rows, key=attrgetter("key")))
 
     @property
-    def objects(self) -> dict[int, ObjectInfo]:
+    def objects(self) -> dict[int, ObjectDescription]:
         """Names and kinds by index, sorted."""
         return dict(sorted(self._infos.items()))
 
@@ -166,9 +207,15 @@ class ObjectTable:
         relative: bool = False,
     ) -> None:
         """Add a variable."""
-        self._infos[index] = ObjectInfo(name)
-        data = _encoded(kind, default)
-        self._rows.append(ObjectRow(index, 0, name, kind, access, data, low, high, relative))
+        self._infos[index] = ObjectDescription(name)
+        row = EntryDescription(
+            *(index, 0, name, kind, access),
+            default=default,
+            low=low,
+            high=high,
+            relative=relative,
+        )
+        self._rows.append(row)
 
     def array(  # noqa: PLR0913, PLR0917 - a row of an object table
         self,
@@ -181,9 +228,8 @@ class ObjectTable:
     ) -> None:
         """Add an array of elements that are alike; sub-index 0 counts them."""
         self._head(index, name, ObjectCode.ARRAY, RO, count)
-        data = _encoded(kind, default)
         self._rows += (
-            ObjectRow(index, sub, f"{name} {sub}", kind, access, data)
+            EntryDescription(index, sub, f"{name} {sub}", kind, access, default=default)
             for sub in range(1, count + 1)
         )
 
@@ -205,16 +251,12 @@ class ObjectTable:
         highest = max(row.sub for row in rows) if count is None else count
         self._head(index, name, code, count_access, highest)
         self._rows += (
-            ObjectRow(*(index, sub, what, kind, access, _encoded(kind, default)), relative=relative)
+            EntryDescription(index, sub, what, kind, access, default=default, relative=relative)
             for sub, what, kind, access, default, relative in rows
         )
 
     def _head(self, index: int, name: str, code: ObjectCode, access: Access, count: int) -> None:
-        self._infos[index] = ObjectInfo(name, code)
+        self._infos[index] = ObjectDescription(name, code)
         u8 = DataType.UNSIGNED8
-        row = ObjectRow(index, 0, "Number of entries", u8, access, u8.encode(count))
+        row = EntryDescription(index, 0, "Number of entries", u8, access, default=count)
         self._rows.append(row)
-
-
-def _encoded(kind: DataType, value: Value | None) -> bytes:
-    return bytes(kind.size) if value is None else kind.encode(value)

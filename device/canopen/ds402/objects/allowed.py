@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Container, Iterable
+from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds402.modes.homing_methods import METHODS
 from tickrig.device.canopen.ds402.motion.trapezoid import RampShape
 from tickrig.device.canopen.ds402.objects import indices
@@ -32,14 +34,9 @@ def guard_values(dictionary: Dictionary, modes: Iterable[int]) -> None:
     for index, allowed in {**ALLOWED, indices.MODES_OF_OPERATION: tuple(modes)}.items():
         entry = dictionary.find(index)
         if entry is not None:
-            entry.guard = _only(allowed)
+            entry.guard = partial(_check, allowed)
 
 
-def _only(allowed: Container[Value]) -> Callable[[Value], None]:
-    """Return a guard that takes only some values."""
-
-    def guard(value: Value) -> None:
-        if value not in allowed:
-            raise SdoAbort(AbortCode.VALUE_RANGE)
-
-    return guard
+def _check(allowed: Container[Value], entry: Entry, value: Value) -> None:
+    if value not in allowed:
+        raise SdoAbort(AbortCode.VALUE_RANGE)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import OnEntry
 from tickrig.device.canopen.ds402.objects.indices import DEFAULTS
 
 
@@ -27,14 +28,14 @@ class Parameters:
         """Set a value, if the device has such an object; too large a one is cut to its range."""
         entry = self._dictionary.find(index, sub)
         if entry is not None:
-            entry.value = clamped(value, 8 * entry.size, signed=entry.data_type.signed)
+            entry.value = clamped(value, 8 * entry.size, signed=entry.description.signed)
 
-    def watch(self, indices: Iterable[int], changed: Callable[[], None]) -> None:
+    def watch(self, indices: Iterable[int], changed: OnEntry) -> None:
         """Call `changed` whenever one of these objects changes."""
         wanted = frozenset(indices)
         for entry in self._dictionary:
             if entry.index in wanted:
-                entry.watchers.append(changed)
+                entry.watch(changed)
 
 
 def clamped(value: int, bits: int, *, signed: bool) -> int:

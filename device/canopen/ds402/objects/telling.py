@@ -55,7 +55,7 @@ class Telling:
     def __init__(self, drive: Ds402, measures: Mapping[Multiplexer, Measure]) -> None:
         self._drive = drive
         self._rows = [
-            (entry, measure, entry.size, entry.data_type.signed)
+            (entry, measure, entry.size, entry.description.signed)
             for at, measure in measures.items()
             if (entry := drive.node.dictionary.find(*at)) is not None
         ]

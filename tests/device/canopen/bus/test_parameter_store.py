@@ -5,9 +5,9 @@ import pytest
 from tests.device.canopen.objects import RW, U8, U16, U32, array, make_bus, read, u16, write
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.bus.parameter_store import LOAD, SAVE, ParameterStore
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 STORE, RESTORE = 0x1010, 0x1011
@@ -19,13 +19,16 @@ def make() -> Bus:
         array(STORE, 1, 1, 1, 1),
         array(RESTORE, 1, 1, 1, 1),
         u16(COMMUNICATION),
-        [Entry(0x1014, 0, "EMCY", U32, RW, default=0x80, relative=True)],
-        [Entry(0x1003, 0, "errors", U8, RW)],
-        [Entry(MINE, 0, "both ways", U16, RW | Access.TPDO | Access.RPDO, default=7)],
-        [Entry(0x2002, 0, "read", U8, Access.READ), Entry(0x2003, 0, "write", U8, Access.WRITE)],
-        [Entry(0x2004, 0, "domain", DataType.DOMAIN, RW)],
-        [Entry(0x6200, 0, "output", U8, RW | Access.RPDO)],
-        [Entry(PROFILE, 0, "profile", U8, RW)],
+        [EntryDescription(0x1014, 0, "EMCY", U32, RW, default=0x80, relative=True)],
+        [EntryDescription(0x1003, 0, "errors", U8, RW)],
+        [EntryDescription(MINE, 0, "both ways", U16, RW | Access.TPDO | Access.RPDO, default=7)],
+        [
+            EntryDescription(0x2002, 0, "read", U8, Access.READ),
+            EntryDescription(0x2003, 0, "write", U8, Access.WRITE),
+        ],
+        [EntryDescription(0x2004, 0, "domain", DataType.DOMAIN, RW)],
+        [EntryDescription(0x6200, 0, "output", U8, RW | Access.RPDO)],
+        [EntryDescription(PROFILE, 0, "profile", U8, RW)],
     )
     bus.step()
     return bus
@@ -140,6 +143,6 @@ def test_a_device_profile_may_name_more_that_is_not_kept() -> None:
 
 def test_a_slave_is_born_with_what_it_kept() -> None:
     kept = Nonvolatile(parameters={0x2001_00: b"\x09\x00"})
-    bus = make_bus([Entry(MINE, 0, "mine", U16, RW)], kept=kept)
+    bus = make_bus([EntryDescription(MINE, 0, "mine", U16, RW)], kept=kept)
     bus.step()
     assert read(bus, MINE) == 9

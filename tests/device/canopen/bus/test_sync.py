@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.pdo_bench import OFF, PdoBench, u8
 from tests.device.canopen.reference import R32, RW
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.instant import NEVER
 
@@ -165,8 +165,8 @@ def test_an_impossible_counter_is_refused(bench: PdoBench, overflow: int) -> Non
 
 def test_a_default_producer_sends_after_the_boot_up() -> None:
     bench = PdoBench()
-    bench.slave.dictionary[0x1005, 0].default = PRODUCER.to_bytes(4, "little")
-    bench.slave.dictionary[0x1006, 0].default = (5_000).to_bytes(4, "little")
+    bench.slave.dictionary[0x1005, 0].description.default = PRODUCER.to_bytes(4, "little")
+    bench.slave.dictionary[0x1006, 0].description.default = (5_000).to_bytes(4, "little")
     assert bench.step("000#8105") == ["705#00"]
     assert bench.run(10) == ["080#"] * 2
 
@@ -188,7 +188,7 @@ def test_a_dictionary_without_1005h_has_no_sync() -> None:
 
 
 def test_a_cob_id_of_a_strange_type_is_refused() -> None:
-    bench = PdoBench(Entry(0x1005, 0, "COB-ID SYNC", R32, RW), without=[0x1005])
+    bench = PdoBench(EntryDescription(0x1005, 0, "COB-ID SYNC", R32, RW), without=[0x1005])
     assert bench.write(0x1005, 0, 1) is AbortCode.PARAMETER_INCOMPATIBLE
 
 

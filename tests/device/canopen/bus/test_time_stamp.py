@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.objects import booted, u32, write
 from tickrig.device.canopen.bus.time_stamp import TimeStamp
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.time_of_day import TimeOfDay
 from tickrig.wire.errors import FieldError
@@ -68,7 +68,7 @@ def test_the_application_produces_time_if_bit_30_says_so() -> None:
 
 
 @pytest.mark.parametrize("objects", [[], u32(0x1012, 0x100)])
-def test_who_is_no_producer_sends_no_time(objects: list[Entry]) -> None:
+def test_who_is_no_producer_sends_no_time(objects: list[EntryDescription]) -> None:
     bus = booted(objects)
     TimeStamp.of(bus.slave).produce(AT)
     assert bus.step() == []

@@ -3,12 +3,12 @@ from __future__ import annotations
 import pytest
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 
-def make(index: int, sub: int = 0) -> Entry:
-    return Entry(index, sub, "x", DataType.UNSIGNED8, Access.READ)
+def make(index: int, sub: int = 0) -> EntryDescription:
+    return EntryDescription(index, sub, "x", DataType.UNSIGNED8, Access.READ)
 
 
 def test_two_entries_at_one_place_are_refused() -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode
-from tickrig.device.canopen.core.objects import ROT, RWW, Objects
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.communication_profile import (
@@ -15,6 +14,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.eds.object_table import ROT, RWW, ObjectCode, ObjectTable
 
 PROFILE = CommunicationProfile(
     device_type=0x0003_0191,
@@ -28,11 +28,11 @@ PROFILE = CommunicationProfile(
 
 
 def lamp() -> Dictionary:
-    objects = Objects()
+    objects = ObjectTable()
     add_communication(objects, PROFILE)
     objects.array(0x6000, "Read input 8-bit", 1, DataType.UNSIGNED8, ROT)
     objects.array(0x6200, "Write output 8-bit", 1, DataType.UNSIGNED8, RWW)
-    return objects.dictionary()
+    return Dictionary(objects, objects.objects)
 
 
 def test_the_device_says_who_it_is() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.objects import RWRW, Objects
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
@@ -14,6 +13,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.eds.object_table import RWRW, ObjectTable
 
 Row = tuple[int, int, DataType, Value]
 """Index, number of elements, data type, default."""
@@ -28,7 +28,7 @@ NODE_ID = 5
 
 def make_dictionary(rows: list[Row], sent: tuple[int, ...] = ()) -> Dictionary:
     """Make a dictionary; TPDO 1 carries what is `sent`."""
-    objects = Objects()
+    objects = ObjectTable()
     profile = CommunicationProfile(
         device_type=0x000F_0191,
         name="board",
@@ -41,7 +41,7 @@ def make_dictionary(rows: list[Row], sent: tuple[int, ...] = ()) -> Dictionary:
     add_communication(objects, profile)
     for index, count, kind, default in rows:
         objects.array(index, f"{index:04X}h", count, kind, RWRW, default)
-    return objects.dictionary()
+    return Dictionary(objects, objects.objects)
 
 
 class Board(Bus):

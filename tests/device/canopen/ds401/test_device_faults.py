@@ -5,11 +5,10 @@ import pytest
 from tests.device.canopen.ds401.board import I16, NODE_ID, U8, Board, Row, make_dictionary
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.objects import RW
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
+from tickrig.wire.canopen.eds.object_table import RW, EntryDescription
 from tickrig.wire.canopen.nmt import NmtState
 
 ROWS: list[Row] = [(0x6200, 1, U8, 0x01), (0x6207, 1, U8, 0xF0), (0x6401, 1, I16, 0)]
@@ -73,8 +72,8 @@ def test_1029h_decides_about_the_nmt_state(
     fault: str, sub: int, behaviour: int, state: NmtState
 ) -> None:
     plain = make_dictionary(ROWS)
-    entry = Entry(0x1029, sub, "behaviour", U8, RW, default=behaviour)
-    slave = make_slave(Dictionary([*plain, entry]), NODE_ID, application=Ds401)
+    entry = EntryDescription(0x1029, sub, "behaviour", U8, RW, default=behaviour)
+    slave = make_slave(Dictionary([*plain.description, entry]), NODE_ID, application=Ds401)
     bus = Bus(slave)
     bus.step()
     bus.step("000#0105")

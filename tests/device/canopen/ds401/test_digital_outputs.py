@@ -124,7 +124,7 @@ def test_at_power_on_lines_that_the_mask_holds_are_low() -> None:
     made.write(0x6200, 1, 0)
     made.step()
     assert made.put("do") == 0x0F
-    made.slave.dictionary[0x6208, 1].default = b"\xf0"
+    made.slave.dictionary[0x6208, 1].description.default = b"\xf0"
     made.slave.reset()
     made.step()
     assert made.put("do") == 0xF0

@@ -5,6 +5,7 @@ import pytest
 from tests.device.canopen.profile_objects import GENERIC_IO, make_dictionary
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
 from tickrig.device.canopen.stack import make_slave
@@ -180,8 +181,10 @@ def test_pre_operational_keeps_the_outputs(running: Bench) -> None:
 
 def test_a_module_of_inputs_alone_has_no_outputs() -> None:
     plain = make_dictionary([])
-    entries = [entry for entry in plain if entry.index < 0x6000 and entry.index != 0x2000]
-    bus = Bus(make_slave(type(plain)(entries), 5, application=Ds401))
+    entries = [
+        entry for entry in plain.description if entry.index < 0x6000 and entry.index != 0x2000
+    ]
+    bus = Bus(make_slave(Dictionary(entries), 5, application=Ds401))
     assert bus.step() == ["705#00"]
     assert bus.slave.due_us == NEVER
 

@@ -7,10 +7,10 @@ from tests.device.canopen.reference import I16, RW, U32
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.instant import NEVER
 
 REACHED = 0x0400
@@ -19,9 +19,9 @@ HOMING_ERROR = 0x2000
 
 
 class Bench(Bus):
-    def __init__(self, *added: Entry) -> None:
+    def __init__(self, *added: EntryDescription) -> None:
         plain = make_dictionary([DRIVE])
-        dictionary = Dictionary([*plain, *added], plain.objects)
+        dictionary = Dictionary([*plain.description, *added], plain.objects)
         super().__init__(make_slave(dictionary, 5, application=Ds402))
         self.drive = Ds402.of(self.slave)
         self.step()
@@ -149,7 +149,7 @@ def test_a_fault_stops_at_once_and_needs_a_rising_edge(bench: Bench) -> None:
 
 
 def test_the_error_code_object_shows_the_fault() -> None:
-    bench = Bench(Entry(0x603F, 0, "Error code", U32, RW))
+    bench = Bench(EntryDescription(0x603F, 0, "Error code", U32, RW))
     bench.drive.fault(0x2310)
     assert bench.read(0x603F) == 0x2310
     bench.step()
@@ -297,7 +297,7 @@ def test_without_objects_the_drive_stays_off() -> None:
 
 
 def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
-    bench = Bench(Entry(0x6077, 0, "Torque actual value", I16, RW))
+    bench = Bench(EntryDescription(0x6077, 0, "Torque actual value", I16, RW))
     bench.write(0x60FF, 2**31 - 1)
     bench.enable(9)
     bench.write(0x6060, 10)
@@ -308,12 +308,12 @@ def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
 
 
 def test_the_supported_modes_are_shown() -> None:
-    bench = Bench(Entry(0x6502, 0, "Supported drive modes", U32, RW))
+    bench = Bench(EntryDescription(0x6502, 0, "Supported drive modes", U32, RW))
     assert bench.read(0x6502) == 0x3ED
 
 
 def test_the_modes_that_an_eds_lists_are_those_that_it_has() -> None:
-    listed = Entry(0x6502, 0, "Supported drive modes", U32, Access.READ, default=0b111)
+    listed = EntryDescription(0x6502, 0, "Supported drive modes", U32, Access.READ, default=0b111)
     bench = Bench(listed)
     assert bench.read(0x6502) == 0b111  # mode 2 is listed, but no drive here has it
     bench.write(0x6060, 3)

@@ -14,7 +14,7 @@ from tickrig.device.canopen.models import epos
 PROFILE = [
     (entry.index, entry.sub, entry.size)
     for entry in epos.dictionary()
-    if entry.index >= 0x2000 and entry.writable and entry.index not in (0x6040, 0x6060)
+    if entry.index >= 0x2000 and entry.description.writable and entry.index not in (0x6040, 0x6060)
 ]
 MODES = [1, 3, 4, 6, 7, 8, 9, 10, -1, -2, -3]
 CONTROLWORDS = [0x06, 0x0F, 0x1F, 0x3F, 0x5F, 0x21F, 0x02, 0x80, 0x10F, 0x00]

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.ds402.state.state import DriveState
 from tickrig.device.canopen.models import epos
@@ -14,6 +13,7 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 TURN = 2_000
 """Counts of the motor's encoder."""
@@ -41,8 +41,8 @@ def make_lenient(node: CanopenSlave, slot: int) -> Lenient:
 class Wheel(Bus):
     def __init__(self, application: ServiceMaker = epos.make) -> None:
         plain, access = epos.dictionary(), Access.READ | Access.WRITE
-        end_velocity = Entry(0x6082, 0, "End velocity", DataType.UNSIGNED32, access)
-        dictionary = Dictionary([*plain, end_velocity], plain.objects)
+        end_velocity = EntryDescription(0x6082, 0, "End velocity", DataType.UNSIGNED32, access)
+        dictionary = Dictionary([*plain.description, end_velocity], plain.objects)
         super().__init__(make_slave(dictionary, 1, application=application))
         self.drive = epos.Epos.of(self.slave)
         self.step()

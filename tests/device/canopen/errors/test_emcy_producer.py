@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.objects import array, booted, errors, make_bus, read, u8, u32, write
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
@@ -171,7 +171,9 @@ def test_a_restricted_can_id_is_refused(can_id: int) -> None:
 
 
 def test_a_cob_id_that_is_no_number_is_refused() -> None:
-    bus = booted([Entry(0x1014, 0, "odd", DataType.VISIBLE_STRING, Access.READ | Access.WRITE)])
+    bus = booted(
+        [EntryDescription(0x1014, 0, "odd", DataType.VISIBLE_STRING, Access.READ | Access.WRITE)]
+    )
     assert write(bus, 0x1014, "abc") is AbortCode.VALUE_RANGE
 
 

@@ -4,10 +4,10 @@ import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.objects import RO, ROT, RW, RWW
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.eds.object_table import RO, ROT, RW, RWW
 
 ROWS = [
     (0x1000, 0, RO, 0x0002_0192),
@@ -36,7 +36,7 @@ HOMED, OFFSET_MEASURED = 0x8000, 0x0100
 @pytest.mark.parametrize(("index", "sub", "access", "value"), ROWS)
 def test_an_object_is_as_the_table_says(index: int, sub: int, access: object, value: int) -> None:
     entry = epos.dictionary()[index, sub]
-    assert (entry.access, entry.number) == (access, value)
+    assert (entry.description.access, entry.number) == (access, value)
 
 
 @pytest.mark.parametrize("node_id", [1, 2])

@@ -9,9 +9,9 @@ import pytest
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.entry import Access
 from tickrig.device.canopen.models import f_palette
 from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.eds.object_table import Access
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "fig120_pot.json"
 POTENTIOMETER = json.loads(GOLDEN.read_text())["fig120_pot"]
@@ -106,7 +106,7 @@ def linked(palette: Palette) -> Palette:
 def test_the_objects_are_those_of_its_table(palette: Palette, at: tuple[int, int]) -> None:
     entry, (access, default) = palette.slave.dictionary[at], TABLE[at]
     assert entry.value == default
-    assert (Access.WRITE in entry.access) == (access == "rw")
+    assert (Access.WRITE in entry.description.access) == (access == "rw")
 
 
 def test_it_says_its_name(palette: Palette) -> None:

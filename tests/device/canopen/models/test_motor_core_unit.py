@@ -3,10 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access
-from tickrig.device.canopen.core.objects import RO, ROT, RW, RWW
 from tickrig.device.canopen.models import motor_core_unit
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import RO, ROT, RW, RWW, Access
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 I16, I32 = DataType.INTEGER16, DataType.INTEGER32
@@ -37,7 +36,7 @@ def test_an_object_is_as_the_table_says(
     dictionary: Dictionary, row: tuple[int, int, DataType, Access, int]
 ) -> None:
     entry = dictionary[row[:2]]
-    assert (entry.data_type, entry.access, entry.number) == row[2:]
+    assert (entry.data_type, entry.description.access, entry.number) == row[2:]
 
 
 def test_the_communication_objects_of_the_table_are_there(dictionary: Dictionary) -> None:
@@ -58,7 +57,7 @@ def test_there_are_four_pdos_each_way(dictionary: Dictionary, area: int) -> None
 def test_the_second_pdo_carries_the_four_channels_and_the_others_are_off(
     dictionary: Dictionary, area: int, cob_id: int, index: int
 ) -> None:
-    second = dictionary[area + 1, 1].power_on_data(motor_core_unit.NODE_ID)
+    second = dictionary[area + 1, 1].description.power_on_data(motor_core_unit.NODE_ID)
     assert int.from_bytes(second, "little") == cob_id
     assert dictionary[area + 1, 2].number == 255
     mapped = [dictionary[area + 0x201, sub].number for sub in range(1, 5)]

@@ -26,7 +26,7 @@ class Desk:
         wire, slave = CanWire(), make_motor()
         self.motor = Application.of(slave)
         self.network = SimNetwork(Rig(Station(slave, wire.end())), wire.end())
-        eds = io.StringIO(write_eds(motor_core_unit.dictionary()))
+        eds = io.StringIO(write_eds(motor_core_unit.dictionary().description))
         eds.name = "motor-core-unit.eds"
         self.node: Any = self.network.add_node(canopen.RemoteNode(NODE_ID, eds))
         self.network.run_for(10_000)

@@ -158,4 +158,4 @@ def test_what_an_mpdo_cannot_carry_is_not_scanned() -> None:
     bench.set(0x2003, 0, 1)
     bench.set(0x2009, 0, 1)
     assert bench.step() == []
-    assert RW in bench.slave.dictionary[0x2003, 0].access
+    assert RW in bench.slave.dictionary[0x2003, 0].description.access

@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.pdo_bench import OFF, RW, PdoBench, u8
 from tests.device.canopen.reference import R32, STR, TPDO, U8, U32
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
@@ -108,14 +108,14 @@ def test_an_mpdo_by_source_needs_a_list(unmapped: PdoBench, direction: int) -> N
 
 
 def test_a_string_is_mapped_by_whole_bytes() -> None:
-    bench = PdoBench(Entry(0x2100, 0, "name", STR, RW | TPDO, max_bytes=3))
+    bench = PdoBench(EntryDescription(0x2100, 0, "name", STR, RW | TPDO, max_bytes=3))
     bench.must_write((0x1800, 1, OFF | 0x185), (0x1A00, 0, 0), (0x1A00, 1, 0x2100_0018))
     assert bench.write(0x1A00, 1, 0x2100_0014) is AbortCode.NOT_MAPPABLE
     assert bench.write(0x1A00, 1, 0x2100_0020) is AbortCode.NOT_MAPPABLE
 
 
 def test_a_dictionary_without_sub_index_0_maps_all_there_is() -> None:
-    kept = Entry(0x1A00, 1, "map1", U32, RW, default=0x2000_0008)
+    kept = EntryDescription(0x1A00, 1, "map1", U32, RW, default=0x2000_0008)
     bench = PdoBench(kept, without=[0x1A00])
     bench.silence_tpdo2()
     assert bench.operational() == ["185#00"]
@@ -123,8 +123,8 @@ def test_a_dictionary_without_sub_index_0_maps_all_there_is() -> None:
 
 def test_a_mapping_of_a_strange_type_is_refused() -> None:
     bench = PdoBench(
-        Entry(0x1A00, 0, "map.n", U8, RW),
-        Entry(0x1A00, 1, "map1", R32, RW),
+        EntryDescription(0x1A00, 0, "map.n", U8, RW),
+        EntryDescription(0x1A00, 1, "map1", R32, RW),
         without=[0x1A00],
     )
     bench.must_write((0x1800, 1, OFF | 0x185))

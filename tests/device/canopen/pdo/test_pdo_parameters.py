@@ -5,7 +5,7 @@ import pytest
 from tests.device.canopen.pdo_bench import OFF, RW, PdoBench, u8, u32
 from tests.device.canopen.reference import R32
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RANGE = AbortCode.VALUE_RANGE
@@ -105,7 +105,7 @@ def test_a_pdo_without_a_type_is_event_driven() -> None:
 
 
 def test_a_cob_id_of_a_strange_type_is_refused() -> None:
-    bench = PdoBench(Entry(0x1800, 1, "cobid", R32, RW), without=[0x1800])
+    bench = PdoBench(EntryDescription(0x1800, 1, "cobid", R32, RW), without=[0x1800])
     assert bench.write(0x1800, 1, 1) is AbortCode.PARAMETER_INCOMPATIBLE
 
 

@@ -8,6 +8,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
@@ -239,7 +240,7 @@ def test_another_can_id_counts_at_once(running: PdoBench) -> None:
 
 
 def test_an_rpdo_that_may_write_communication_objects_can_change_what_is_heard() -> None:
-    heartbeat = Entry(0x1017, 0, "u16", U16, RW | RPDO)
+    heartbeat = EntryDescription(0x1017, 0, "u16", U16, RW | RPDO)
     bench = PdoBench(heartbeat, without=[0x1017])
     bench.operational()
     assert bench.slave.reconfigured_by == {0x000}
@@ -299,7 +300,7 @@ def test_an_object_mapped_shorter_gets_zeros_above(bench: PdoBench) -> None:
 
 
 def test_a_string_gets_its_bytes() -> None:
-    bench = PdoBench(Entry(0x2100, 0, "name", STR, RW | RPDO, default="long before"))
+    bench = PdoBench(EntryDescription(0x2100, 0, "name", STR, RW | RPDO, default="long before"))
     bench.must_write((0x1400, 1, OFF | 0x205))
     bench.map(0x1600, 0x2100_0018)
     bench.set_rpdo1(255)
@@ -323,18 +324,18 @@ def test_a_value_that_its_limits_refuse_is_not_taken_and_the_others_are() -> Non
 
 
 def test_the_owner_of_an_object_judges_and_acts() -> None:
-    owned = u8(0x2100, 0, 0, RW | RPDO)
-    bench = PdoBench(owned)
+    bench = PdoBench(u8(0x2100, 0, 0, RW | RPDO))
+    owned = bench.slave.dictionary[0x2100, 0]
     bench.must_write((0x1400, 1, OFF | 0x205))
     bench.map(0x1600, 0x2100_0008)
     bench.set_rpdo1(255)
     acted: list[int] = []
 
-    def guard(value: Value) -> None:
+    def guard(entry: Entry, value: Value) -> None:
         if value == 9:
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
-    owned.guard, owned.written = guard, lambda: acted.append(owned.number)
+    owned.guard, owned.written = guard, lambda entry: acted.append(entry.number)
     bench.operational()
     bench.step("205#08", "205#09", "205#08")
     assert acted == [8, 8]
@@ -349,7 +350,7 @@ def test_an_object_that_sdo_may_not_write_may_be_an_rpdo_s() -> None:
     bench.set_rpdo1(255)
     bench.operational()
     bench.step("205#08")
-    assert shown.number == 8
+    assert bench.value(0x2100) == 8
 
 
 def test_who_wants_to_hear_of_rpdos_does(running: PdoBench) -> None:
@@ -366,7 +367,7 @@ def test_an_rpdo_without_objects_ignores_what_comes(running: PdoBench) -> None:
 
 
 def test_a_boolean_takes_only_0_and_1() -> None:
-    bench = PdoBench(Entry(0x2100, 0, "on", DataType.BOOLEAN, RW | RPDO))
+    bench = PdoBench(EntryDescription(0x2100, 0, "on", DataType.BOOLEAN, RW | RPDO))
     bench.must_write((0x1400, 1, OFF | 0x205))
     bench.map(0x1600, 0x2100_0008)
     bench.set_rpdo1(255)

@@ -8,6 +8,7 @@ from tests.device.canopen.reference import STR as NAME
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.instant import NEVER
 
@@ -265,12 +266,12 @@ def test_one_object_may_fill_the_frame(bench: PdoBench) -> None:
 
 def test_an_object_that_is_made_on_demand_is_asked(bench: PdoBench) -> None:
     entry = bench.slave.dictionary[0x6000, 1]
-    entry.source = lambda: b"\x2a"
+    entry.source = lambda entry: b"\x2a"
     bench.set_tpdo1(1)
     bench.operational()
     assert bench.step("080#") == ["185#2A00"]
 
-    def refuse() -> bytes:
+    def refuse(entry: Entry) -> bytes:
         raise SdoAbort(AbortCode.LOCAL_CONTROL)
 
     entry.source = refuse
@@ -326,7 +327,7 @@ def test_a_default_mapping_of_too_many_bits_is_silent() -> None:
 
 
 def test_a_default_mapping_may_have_objects_that_are_not_called_mappable() -> None:
-    hidden = Entry(0x2100, 0, "hidden", R32, RO, default=1.0)
+    hidden = EntryDescription(0x2100, 0, "hidden", R32, RO, default=1.0)
     bench = PdoBench(hidden)
     bench.slave.dictionary[0x1A00, 1].value = 0x2100_0020
     bench.slave.dictionary[0x1A00, 0].value = 1
@@ -334,7 +335,7 @@ def test_a_default_mapping_may_have_objects_that_are_not_called_mappable() -> No
 
 
 def test_a_string_goes_into_a_tpdo_by_bytes() -> None:
-    name = Entry(0x2100, 0, "name", NAME, RO | TPDO, default="ab")
+    name = EntryDescription(0x2100, 0, "name", NAME, RO | TPDO, default="ab")
     bench = PdoBench(name)
     bench.silence_tpdo2()
     bench.must_write((0x1800, 1, OFF | 0x185))

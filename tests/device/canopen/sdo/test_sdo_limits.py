@@ -6,10 +6,10 @@ from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.sdo_client import Client
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import Abort, DownloadInitiateRequest, Response
@@ -27,10 +27,10 @@ RW = Access.READ | Access.WRITE
 
 def booted(sdo: SdoLimits = USUAL, most: int | None = None) -> Bus:
     """Make a slave with a domain and a string of four bytes."""
-    domain = Entry(FIRMWARE, 1, "Program", DataType.DOMAIN, RW)
+    domain = EntryDescription(FIRMWARE, 1, "Program", DataType.DOMAIN, RW)
     if most is not None:
         domain.max_bytes = most
-    text = Entry(TEXT, 0, "Text", DataType.VISIBLE_STRING, RW, default="text")
+    text = EntryDescription(TEXT, 0, "Text", DataType.VISIBLE_STRING, RW, default="text")
     bus = Bus(make_slave(Dictionary([domain, text]), NODE_ID, sdo=sdo))
     bus.step()
     return bus

@@ -218,6 +218,6 @@ def test_the_object_changes_with_the_last_segment_and_not_before() -> None:
     bus = booted()
     entry = bus.slave.dictionary[0x2007, 0]
     seen: list[bytes] = []
-    entry.watchers.append(lambda: seen.append(entry.data))
+    entry.watch(lambda entry: seen.append(entry.data))
     Client(bus).download(0x2007, b"fifteen letters")
     assert seen == [b"fifteen letters"]

@@ -5,10 +5,10 @@ import pytest
 from tests.device.canopen.objects import make_bus, u32
 from tests.device.canopen.reference import make_dictionary
 from tests.device.canopen.sdo_client import OPEN_SECOND, booted
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.nmt import NmtState
 
 RW = Access.READ | Access.WRITE
@@ -22,7 +22,7 @@ def test_the_default_server_needs_no_object() -> None:
 
 
 def test_1200h_tells_the_truth_whatever_the_eds_says() -> None:
-    server = [Entry(0x1200, sub, f"{sub}", DataType.UNSIGNED32, RW) for sub in (1, 2)]
+    server = [EntryDescription(0x1200, sub, f"{sub}", DataType.UNSIGNED32, RW) for sub in (1, 2)]
     bus = make_bus(server, node_id=0x7F)
     bus.step()
     assert bus.step("67F#4000120100000000") == ["5FF#430012017F060000"]
@@ -31,7 +31,7 @@ def test_1200h_tells_the_truth_whatever_the_eds_says() -> None:
 
 
 def test_1200h_of_another_type_is_left_alone() -> None:
-    bus = make_bus([Entry(0x1200, 1, "odd", DataType.UNSIGNED8, RW, default=3)])
+    bus = make_bus([EntryDescription(0x1200, 1, "odd", DataType.UNSIGNED8, RW, default=3)])
     bus.step()
     assert bus.step("605#4000120100000000") == ["585#4F00120103000000"]
 
@@ -151,14 +151,15 @@ def test_a_can_id_changes_only_while_it_is_invalid() -> None:
 
 
 def test_a_server_with_one_cob_id_in_the_dictionary_is_left_out() -> None:
-    bus = make_bus([Entry(0x1201, 1, "half", DataType.UNSIGNED32, RW, default=0x6A0)])
+    bus = make_bus([EntryDescription(0x1201, 1, "half", DataType.UNSIGNED32, RW, default=0x6A0)])
     bus.step()
     assert 0x6A0 not in (bus.slave.accepts or (0x6A0,))
 
 
 def test_an_additional_server_of_the_eds_serves_from_the_start() -> None:
     cob_ids = [
-        Entry(0x127F, sub, "cob", DataType.UNSIGNED32, RW, default=0x69F + sub) for sub in (1, 2)
+        EntryDescription(0x127F, sub, "cob", DataType.UNSIGNED32, RW, default=0x69F + sub)
+        for sub in (1, 2)
     ]
     bus = make_bus(cob_ids, u32(0x1000, 7))
     bus.step()

@@ -227,7 +227,7 @@ def test_a_drive_that_does_not_answer_is_given_up_in_virtual_time() -> None:
     node = bench.drive()
     bench.network.run_for(10_000)
     node.setup_402_state_machine(read_pdos=False)
-    bench.slave.dictionary[0x6041, 0].source = lambda: b"\x40\x00"
+    bench.slave.dictionary[0x6041, 0].source = lambda entry: b"\x40\x00"
     before_us, real_s = bench.rig.now_us, time.monotonic()
     with pytest.raises(RuntimeError, match="Timeout when trying to change state"):
         node.state = "OPERATION ENABLED"

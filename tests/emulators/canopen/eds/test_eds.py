@@ -5,8 +5,6 @@ from pathlib import Path
 import pytest
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import ObjectCode, ObjectInfo
-from tickrig.device.canopen.core.entry import Access
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
 from tickrig.emulators.canopen.eds.eds import describe, read_eds
@@ -14,6 +12,7 @@ from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.object_table import Access, ObjectCode, ObjectDescription
 
 SAMPLE = Path(__file__).parent / "sample.dcf"
 NODE_ID = 5
@@ -93,7 +92,7 @@ def test_defaults_of_every_data_type_are_read(
 def test_the_node_id_is_added_and_cob_ids_have_the_usual_default(
     sample: DeviceDescription, index: int, sub: int, value: int
 ) -> None:
-    data = sample.template[index, sub].power_on_data(NODE_ID)
+    data = sample.template[index, sub].description.power_on_data(NODE_ID)
     assert int.from_bytes(data, "little") == value
 
 
@@ -109,12 +108,15 @@ def test_the_node_id_is_added_and_cob_ids_have_the_usual_default(
     ],
 )
 def test_access_types_are_read(sample: DeviceDescription, index: int, access: Access) -> None:
-    assert sample.template[index, 0].access == access
+    assert sample.template[index, 0].description.access == access
 
 
 def test_limits_are_read_in_every_notation(sample: DeviceDescription) -> None:
     limits = {
-        index: (sample.template[index, 0].low, sample.template[index, 0].high)
+        index: (
+            sample.template[index, 0].description.low,
+            sample.template[index, 0].description.high,
+        )
         for index in (0x2002, 0x2003, 0x2005, 0x2020)
     }
     assert limits == {
@@ -127,20 +129,20 @@ def test_limits_are_read_in_every_notation(sample: DeviceDescription) -> None:
 
 def test_a_compact_array_has_all_its_elements(sample: DeviceDescription) -> None:
     elements = [entry for entry in sample.template if entry.index == 0x2031]
-    assert [entry.name for entry in elements] == [
+    assert [entry.description.name for entry in elements] == [
         "Number of entries",
         "Status1",
         "Second",
         "Status3",
     ]
     assert elements[0].value == 3
-    assert {entry.access for entry in elements[1:]} == {Access.READ | Access.TPDO}
-    assert sample.template.objects[0x2031] == ObjectInfo("Status", ObjectCode.ARRAY)
+    assert {entry.description.access for entry in elements[1:]} == {Access.READ | Access.TPDO}
+    assert sample.template.objects[0x2031] == ObjectDescription("Status", ObjectCode.ARRAY)
 
 
 def test_a_compact_error_field_begins_empty_and_ends_at_254(sample: DeviceDescription) -> None:
     count = sample.template[0x1003, 0]
-    assert (count.value, count.writable) == (0, True)
+    assert (count.value, count.description.writable) == (0, True)
     assert len(sample.template.elements(0x1003)) == 254
 
 
@@ -158,7 +160,7 @@ def test_unknown_and_derived_data_types_are_taken(sample: DeviceDescription) -> 
 
 
 def test_a_string_may_be_limited(sample: DeviceDescription) -> None:
-    assert sample.template[0x2009, 0].max_bytes == 9
+    assert sample.template[0x2009, 0].description.max_bytes == 9
 
 
 def test_a_slave_just_starts_from_its_eds(sample: DeviceDescription) -> None:

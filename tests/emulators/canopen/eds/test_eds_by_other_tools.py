@@ -11,13 +11,13 @@ from dcf.parse import parse_file
 
 from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 ROOT = Path(__file__).parents[4]
 SHIPPED = (*(ROOT / "examples").rglob("*.eds"), *(ROOT / "tests" / "golden").rglob("*.eds"))
@@ -54,22 +54,23 @@ def test_dcfchk_has_nothing_to_say_of_what_is_shipped(path: Path) -> None:
 
 def test_dcfchk_has_nothing_to_say_of_a_component_or_a_dcf(tmp_path: Path) -> None:
     path, component = tmp_path / "gripper.eds", describe_rtc(GRIPPER)
-    path.write_text(write_eds(component.template, component.info), "utf-8")
+    path.write_text(write_eds(component.template.description, component.info), "utf-8")
     check(path)
     for name, model in MODELS.items():
         path = tmp_path / f"{name}.dcf"
-        path.write_text(write_dcf(model.dictionary(), NODE_ID, 500_000), "utf-8")
+        path.write_text(write_dcf(model.dictionary().description, NODE_ID, 500_000, {}), "utf-8")
         check(path)
 
 
 def test_dcfchk_reads_floats_with_their_limits(tmp_path: Path) -> None:
     path = tmp_path / "floats.eds"
     kinds = (DataType.REAL32, DataType.REAL64)
-    rows = [*make_dictionary()] + [
-        Entry(0x5000 + number, 0, "x", kind, RW, default=-1.5, low=-2.5, high=3.0e8)
+    rows = [*make_dictionary().description] + [
+        EntryDescription(0x5000 + number, 0, "x", kind, RW, default=-1.5, low=-2.5, high=3.0e8)
         for number, kind in enumerate(kinds)
     ]
-    path.write_text(write_eds(Dictionary(rows), DeviceInfo(product_name="floats")), "utf-8")
+    table = Dictionary(rows).description
+    path.write_text(write_eds(table, DeviceInfo(product_name="floats")), "utf-8")
     check(path)
 
 

@@ -8,13 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.eds.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
+from tickrig.wire.canopen.eds.object_table import (
+    Access,
+    EntryDescription,
+    ObjectCode,
+    ObjectDescription,
+)
 
 R1_EDS = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 SAMPLE = Path(__file__).parent / "sample.dcf"
@@ -35,9 +40,8 @@ NAMES = st.text(st.characters(exclude_categories=["C", "Z"]), max_size=8)
 
 
 def rows(dictionary: Dictionary) -> list[tuple[object, ...]]:
-    ours = ("guard", "written", "source", "watchers")
-    described = [name for name in Entry.__slots__ if name not in ours]
-    return [tuple(getattr(entry, name) for name in described) for entry in dictionary]
+    described = [name for name in EntryDescription.__slots__ if name != "has_default"]
+    return [tuple(getattr(entry, name) for name in described) for entry in dictionary.description]
 
 
 def read_again(text: str) -> Dictionary:
@@ -58,11 +62,11 @@ def limits(draw: st.DrawFn, kind: DataType) -> list[float | None]:
 
 
 @st.composite
-def entries(draw: st.DrawFn, index: int, sub: int) -> Entry:
+def entries(draw: st.DrawFn, index: int, sub: int) -> EntryDescription:
     kind = draw(st.sampled_from(list(DataType)))
     low, high = draw(limits(kind))
     relative = kind.is_integer and not kind.signed and kind.size > 1 and draw(st.booleans())
-    entry = Entry(
+    entry = EntryDescription(
         *(index, sub, draw(NAMES), kind, draw(ACCESS)),
         low=low,
         high=high,
@@ -76,7 +80,7 @@ def entries(draw: st.DrawFn, index: int, sub: int) -> Entry:
     )
     if kind is DataType.BOOLEAN:
         data = bytes([data[0] & 1])
-    entry.default = entry.data = data
+    entry.default = data
     return entry
 
 
@@ -91,13 +95,15 @@ def dictionaries(draw: st.DrawFn) -> Dictionary:
             else draw(st.sets(st.integers(0, 254), min_size=1, max_size=3))
         )
         found += [draw(entries(index, sub)) for sub in subs]
-        infos[index] = ObjectInfo(found[-1].name if code is ObjectCode.VAR else draw(NAMES), code)
+        infos[index] = ObjectDescription(
+            found[-1].name if code is ObjectCode.VAR else draw(NAMES), code
+        )
     return Dictionary(found, infos)
 
 
 @given(dictionaries())
 def test_what_is_written_is_read_again_without_loss(dictionary: Dictionary) -> None:
-    again = read_again(write_eds(dictionary))
+    again = read_again(write_eds(dictionary.description))
     assert rows(again) == rows(dictionary)
     assert again.objects == dictionary.objects
 
@@ -106,12 +112,12 @@ def test_the_eds_of_r1_is_r1() -> None:
     description = read_eds(R1_EDS)
     assert rows(description.template) == rows(make_dictionary())
     assert description.info == R1_INFO
-    assert write_eds(make_dictionary(), R1_INFO) == R1_EDS.read_text()
+    assert write_eds(make_dictionary().description, R1_INFO) == R1_EDS.read_text()
 
 
 def test_an_eds_of_others_survives_writing() -> None:
     sample = read_eds(SAMPLE)
-    again = describe(EdsFile("again.eds", write_eds(sample.template, sample.info)))
+    again = describe(EdsFile("again.eds", write_eds(sample.template.description, sample.info)))
     assert rows(again.template) == rows(sample.template)
     assert again.info == sample.info
 
@@ -128,7 +134,8 @@ def test_a_dcf_holds_present_values() -> None:
     dictionary = make_dictionary()
     dictionary[0x1017, 0].value = 100
     dictionary[0x2007, 0].value = "a value\n"
-    text = write_dcf(dictionary, node_id=7, bit_rate=250_000)
+    values = {entry.key: entry.data for entry in dictionary}
+    text = write_dcf(dictionary.description, 7, 250_000, values)
     again = describe(EdsFile("again.dcf", text))
     assert (again.node_id, again.bit_rate) == (7, 250_000)
     assert again.template[0x1017, 0].value == 100
@@ -137,20 +144,20 @@ def test_a_dcf_holds_present_values() -> None:
 
 def test_an_object_of_several_entries_is_no_variable() -> None:
     u8 = DataType.UNSIGNED8
-    dictionary = Dictionary([Entry(0x2000, sub, "x", u8, Access.READ) for sub in (0, 1)])
-    again = read_again(write_eds(dictionary))
-    assert again.objects[0x2000] == ObjectInfo("x", ObjectCode.RECORD)
+    dictionary = Dictionary([EntryDescription(0x2000, sub, "x", u8, Access.READ) for sub in (0, 1)])
+    again = read_again(write_eds(dictionary.description))
+    assert again.objects[0x2000] == ObjectDescription("x", ObjectCode.RECORD)
 
 
 @pytest.mark.parametrize("name", ["two\nlines", " blank", "a ;comment"])
 def test_a_name_that_an_eds_cannot_hold_is_refused(name: str) -> None:
-    entry = Entry(0x2000, 0, name, DataType.UNSIGNED8, Access.READ)
+    entry = EntryDescription(0x2000, 0, name, DataType.UNSIGNED8, Access.READ)
     with pytest.raises(ValueError, match="an EDS cannot hold the name"):
-        write_eds(Dictionary([entry]))
+        write_eds(Dictionary([entry]).description)
 
 
 @pytest.mark.parametrize("access", [Access.NONE, Access.READ | Access.RPDO])
 def test_an_access_that_an_eds_cannot_express_is_refused(access: Access) -> None:
-    entry = Entry(0x2000, 0, "x", DataType.UNSIGNED8, access)
+    entry = EntryDescription(0x2000, 0, "x", DataType.UNSIGNED8, access)
     with pytest.raises(ValueError, match=r"an EDS cannot express the access of 2000h:00 x: "):
-        write_eds(Dictionary([entry]))
+        write_eds(Dictionary([entry]).description)

@@ -6,11 +6,17 @@ from typing import Any
 import pytest
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary, ObjectCode, ObjectInfo
-from tickrig.device.canopen.core.entry import Access, Entry
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.physical import SignalType
 from tickrig.emulators.canopen.node.signals import ObjectSignal, find_object, object_name
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import (
+    Access,
+    EntryDescription,
+    ObjectCode,
+    ObjectDescription,
+)
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 RO, RW, CONST = Access.READ, Access.READ | Access.WRITE, Access.READ | Access.CONST
@@ -19,16 +25,16 @@ D = DataType
 
 def dictionary() -> Dictionary:
     entries = [
-        Entry(0x1000, 0, "device type", D.UNSIGNED32, CONST, default=0x191),
-        Entry(0x1017, 0, "heartbeat", D.UNSIGNED16, RW),
-        Entry(0x2006, 0, "limited", D.INTEGER16, RO, low=-5, high=5),
-        Entry(0x2007, 0, "text", D.VISIBLE_STRING, Access.WRITE, max_bytes=4),
-        Entry(0x2008, 0, "blob", D.DOMAIN, Access.NONE),
-        Entry(0x200A, 0, "real", D.REAL32, RW),
-        Entry(0x6000, 0, "count", D.UNSIGNED8, CONST, default=1),
-        Entry(0x6000, 1, "input", D.UNSIGNED8, RO),
+        EntryDescription(0x1000, 0, "device type", D.UNSIGNED32, CONST, default=0x191),
+        EntryDescription(0x1017, 0, "heartbeat", D.UNSIGNED16, RW),
+        EntryDescription(0x2006, 0, "limited", D.INTEGER16, RO, low=-5, high=5),
+        EntryDescription(0x2007, 0, "text", D.VISIBLE_STRING, Access.WRITE, max_bytes=4),
+        EntryDescription(0x2008, 0, "blob", D.DOMAIN, Access.NONE),
+        EntryDescription(0x200A, 0, "real", D.REAL32, RW),
+        EntryDescription(0x6000, 0, "count", D.UNSIGNED8, CONST, default=1),
+        EntryDescription(0x6000, 1, "input", D.UNSIGNED8, RO),
     ]
-    return Dictionary(entries, {0x6000: ObjectInfo("inputs", ObjectCode.ARRAY)})
+    return Dictionary(entries, {0x6000: ObjectDescription("inputs", ObjectCode.ARRAY)})
 
 
 def signal(name: str, objects: Dictionary | None = None) -> tuple[ObjectSignal, Entry]:
@@ -123,11 +129,11 @@ def test_the_owner_of_an_object_judges_and_acts() -> None:
     hand, entry = signal("0x1017")
     acted: list[int] = []
 
-    def guard(value: object) -> None:
+    def guard(entry: Entry, value: object) -> None:
         if value == 7:
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
-    entry.guard, entry.written = guard, lambda: acted.append(entry.number)
+    entry.guard, entry.written = guard, lambda entry: acted.append(entry.number)
     with pytest.raises(ValueError, match="0x1017 7: refused, VALUE_RANGE"):
         hand.write(7)
     hand.write(8)
@@ -136,7 +142,7 @@ def test_the_owner_of_an_object_judges_and_acts() -> None:
 
 def test_a_value_that_is_made_on_demand_is_made() -> None:
     hand, entry = signal("0x1017")
-    entry.source = lambda: b"\x34\x12"
+    entry.source = lambda entry: b"\x34\x12"
     assert hand.read() == 0x1234
-    entry.source = lambda: b"\x34"
+    entry.source = lambda entry: b"\x34"
     assert hand.read() == "(1 bytes for UNSIGNED16, which has 2)"

@@ -111,9 +111,9 @@ def test_a_slave_that_got_its_node_id_hears_its_first_request() -> None:
 @pytest.mark.parametrize("transmission_type", [0xFF, 1])
 def test_an_rpdo_that_changes_a_cob_id_lets_the_next_frame_pass(transmission_type: int) -> None:
     dictionary = make_dictionary(())  # a mapping of an object that no EDS should call mappable
-    dictionary[0x1600, 0].default = b"\x01"
-    dictionary[0x1600, 1].default = (0x1005_0020).to_bytes(4, "little")
-    dictionary[0x1400, 2].default = bytes([transmission_type])
+    dictionary[0x1600, 0].description.default = b"\x01"
+    dictionary[0x1600, 1].description.default = (0x1005_0020).to_bytes(4, "little")
+    dictionary[0x1400, 2].description.default = bytes([transmission_type])
     bus, counters = SlaveOnBus(dictionary), list[int]()
     bus.slave.on_sync.append(counters.append)
     bus.send("000#0105")

@@ -4,9 +4,8 @@ import pytest
 
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
-from tickrig.wire.canopen.eds.eds_entry import EdsEntry
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.object_table import RO, RW, WO
+from tickrig.wire.canopen.eds.object_table import RO, RW, WO, EntryDescription
 
 U8 = "ParameterName=x\nDataType=5\nAccessType=rw\n"
 SOUND = f"[1000]\n{U8}"
@@ -18,7 +17,7 @@ def read(text: str) -> tuple[EdsDevice, list[str], list[str]]:
     return device, [str(one) for one in file.errors], [str(one) for one in file.warnings]
 
 
-def entries(text: str) -> list[EdsEntry]:
+def entries(text: str) -> list[EntryDescription]:
     device, errors, _ = read(text)
     assert errors == []
     return list(device.entries)
@@ -189,7 +188,7 @@ def test_a_compact_record_has_its_elements_and_counts_those_in_use() -> None:
         *(b"\x02", RW),
     )
     assert [row.sub for row in elements] == [1, 2, 3, 4]
-    assert [row.default for row in elements] == [
+    assert [row.default if row.has_default else None for row in elements] == [
         *(bytes.fromhex("08010020"), bytes.fromhex("10010120")),
         *(None, None),
     ]
@@ -198,7 +197,9 @@ def test_a_compact_record_has_its_elements_and_counts_those_in_use() -> None:
 
 def test_a_compact_array_counts_its_elements() -> None:
     text = f"[2000]\n{U8}ObjectType=8\nCompactSubObj=3\n[2000Name]\nNrOfEntries=1\n2=second\n"
-    assert [(row.sub, row.name, row.default) for row in entries(text)] == [
+    assert [
+        (row.sub, row.name, row.default if row.has_default else None) for row in entries(text)
+    ] == [
         *[(0, "Number of entries", b"\x03"), (1, "x1", None), (2, "second", None)],
         (3, "x3", None),
     ]

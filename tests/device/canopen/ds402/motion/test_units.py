@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Access, Entry
 from tickrig.device.canopen.ds402.motion.units import Units
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
 from tickrig.device.canopen.ds402.objects.settings import read_settings
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 TURN = 2_000
 
@@ -18,7 +18,9 @@ def parameters(**values: int) -> Parameters:
     for name, value in values.items():
         index, _, sub = name[1:].partition("_")
         kind = DataType.INTEGER32 if value < 0 else DataType.UNSIGNED32
-        entries.append(Entry(int(index, 16), int(sub or 0), name, kind, Access.READ, default=value))
+        entries.append(
+            EntryDescription(int(index, 16), int(sub or 0), name, kind, Access.READ, default=value)
+        )
     return Parameters(Dictionary(entries))
 
 
