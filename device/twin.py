@@ -9,11 +9,13 @@ original.
 from __future__ import annotations
 
 import pickle
+from collections.abc import Mapping
 from enum import Enum
 from io import BytesIO
-from typing import Any, NoReturn, SupportsIndex, TypeVar
+from typing import Any, ClassVar, NoReturn, SupportsIndex, TypeVar
 
 T = TypeVar("T")
+K = TypeVar("K")
 
 
 class Immutable:
@@ -38,9 +40,23 @@ class Copyable:
 
     A twin that is fed the same does the same to the byte; fed otherwise it leaves the
     original untouched.
+
+    Attributes:
+        new_in_twins: attributes, and what they are in a twin whatever the original has:
+            callbacks of somebody outside.
     """
 
     __slots__ = ()
+    new_in_twins: ClassVar[Mapping[str, object]] = {}
+
+    def __getstate__(self) -> object:
+        """Return the state that a twin begins with."""
+        state = super().__getstate__()
+        attributes = state[1] if isinstance(state, tuple) else state
+        if self.new_in_twins and isinstance(attributes, dict):
+            attributes = {**attributes, **self.new_in_twins}
+            return (state[0], attributes) if isinstance(state, tuple) else attributes
+        return state
 
     def __copy__(self) -> NoReturn:
         """Refuse: a shallow copy would share its parts with the original."""
@@ -75,6 +91,19 @@ class Listeners(list[T]):
         return Listeners, ()
 
 
+class Cache(dict[K, T]):
+    """What can be worked out again. A twin begins with nothing."""
+
+    def __reduce_ex__(self, protocol: SupportsIndex, /) -> tuple[type[Cache[K, T]], tuple[()]]:
+        """Copy nothing of it."""
+        return Cache, ()
+
+
+def itself(item: T) -> T:
+    """Return what it is given: what `__reduce__` of a listener leaves is what it listens to."""
+    return item
+
+
 def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
     """Return an independent copy of a device, a wire or a rig, as it is now.
 
@@ -92,7 +121,8 @@ def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
     try:
         pickler.dump(machine)
     except (AttributeError, pickle.PicklingError) as error:
-        raise TypeError(f"{type(machine).__name__} cannot be copied: {error}") from error
+        what = machine[0] if isinstance(machine, tuple) else machine
+        raise TypeError(f"{type(what).__name__} cannot be copied: {error}") from error
     stream.seek(0)
     unpickler = _Unpickler(stream, pickler.shared)
     copied: T = unpickler.load()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Final, Protocol
+from functools import partial
+from typing import ClassVar, Final, Protocol
 
 from tickrig.device.physical import SignalType
+from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.emulated import Inputs
@@ -54,7 +56,16 @@ class WireFaults(Protocol):
         """Let a fault end; one that is not armed is no error."""
 
 
-class Operator:
+def _ignore(text: str) -> None:
+    """Tell nobody."""
+
+
+def _at(action: Callable[[], None], now_us: int) -> None:
+    """Do something that is the same whenever it is done."""
+    action()
+
+
+class Operator(Copyable):
     """Sets inputs, presses buttons, makes faults come and go.
 
     What is done between two ticks is seen by the next one; a press is seen by
@@ -69,13 +80,15 @@ class Operator:
         note: told of each change, as `power_button=1`.
     """
 
+    new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
+
     def __init__(
         self,
         inputs: Inputs,
         tick_us: int,
         event_queue: EventQueue,
         wire: WireFaults,
-        note: Callable[[str], None] = lambda text: None,
+        note: Callable[[str], None] = _ignore,
     ) -> None:
         self._inputs, self._tick_us, self._event_queue, self._wire = (
             inputs,
@@ -116,7 +129,7 @@ class Operator:
         self._put(name, 1)
         seen_us = -(-now_us // self._tick_us) * self._tick_us
         self._event_queue.put(
-            ("release", name), seen_us + duration_us, lambda now_us: self._put(name, 0)
+            ("release", name), seen_us + duration_us, partial(_at, partial(self._put, name, 0))
         )
 
     def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
@@ -138,13 +151,13 @@ class Operator:
         self._drop_fault(spec.name)
         if spec.from_us > now_us:
             self._event_queue.put(
-                ("begin", spec.name), spec.from_us, lambda now_us: self._begin(spec)
+                ("begin", spec.name), spec.from_us, partial(_at, partial(self._begin, spec))
             )
         else:
             self._begin(spec)
         if spec.to_us != NEVER:
             self._event_queue.put(
-                ("end", spec.name), spec.to_us, lambda now_us: self._end(spec.name)
+                ("end", spec.name), spec.to_us, partial(_at, partial(self._end, spec.name))
             )
 
     def check_fault(self, spec: FaultSpec) -> None:

@@ -16,7 +16,6 @@ from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER
 
 
@@ -69,12 +68,7 @@ class CanEmulator(RunningEmulator):
     def _open_end(self, accepts: Accepted = None) -> CanEnd:
         """Connect an end that comes back from bus-off at once."""
         end = self._wire.end(accepts)
-
-        def recover(at_us: int, state: ErrorState) -> None:
-            if state is ErrorState.BUS_OFF:
-                end.recover(at_us)
-
-        end.on_error_state = recover
+        end.auto_recovery = True
         self._ends.append(end)
         return end
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from tickrig.device.core import Device
+from tickrig.device.twin import Copyable
 from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -55,7 +56,18 @@ class ErrorAware(Protocol):
         """Hear of a change; it is seen to in the next tick."""
 
 
-class CanEnd:
+def _ignore(at_us: int) -> None:
+    """Wake nobody: nobody ticks at this end."""
+
+
+_NEW_IN_TWINS: Final[Mapping[str, object]] = {
+    **dict.fromkeys(("on_error_state", "_device", "_error_aware")),
+    "wake": _ignore,
+}
+"""A rig attaches its devices anew."""
+
+
+class CanEnd(Copyable):
     """One node on a `CanWire`; a `WirePort[Frames]`.
 
     Frames leave in the order in which they were given. A frame is received by
@@ -71,13 +83,16 @@ class CanEnd:
         lost: frames that found a queue or inbox full, or the node bus-off.
         unfiltered: its filter is out of use until it is polled.
         on_error_state: told the time and the new state when the error state changes.
+        auto_recovery: it leaves bus-off by itself, as most drivers let it.
     """
 
     __slots__ = (
-        *("_accepts", "_device", "_error_aware", "_reconfigured_by", "controller", "held", "inbox"),
-        *("unfiltered", "lost", "number", "on_error_state", "queue", "room", "segment", "stamps"),
-        *("wake", "wire"),
+        *("_accepts", "_device", "_error_aware", "_reconfigured_by", "auto_recovery"),
+        *("controller", "held", "inbox", "lost", "number", "on_error_state", "queue", "room"),
+        *("segment", "stamps", "unfiltered", "wake", "wire"),
     )
+
+    new_in_twins = _NEW_IN_TWINS
 
     def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
         self.wire, self.number, self._accepts = wire, number, accepts
@@ -90,6 +105,7 @@ class CanEnd:
         self._reconfigured_by: frozenset[int] = frozenset()
         self.wake: Callable[[int], None] = _ignore
         self.on_error_state: Callable[[int, ErrorState], None] | None = None
+        self.auto_recovery = False
         self._device: Filtering | None = None
         self._error_aware: ErrorAware | None = None
 
@@ -196,9 +212,7 @@ class CanEnd:
             self._error_aware.bus_state(self.controller.state)
         if self.on_error_state is not None:
             self.on_error_state(at_us, self.controller.state)
+        if self.auto_recovery and self.controller.state is ErrorState.BUS_OFF:
+            self.recover(at_us)
         self.wake(at_us)
         self.segment.heard = True
-
-
-def _ignore(at_us: int) -> None:
-    """Wake nobody: nobody ticks at this end."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
@@ -38,24 +37,22 @@ class CanFaultType:
     verdict: Verdict | None = None
 
 
-CAN_FAULTS: Final[Mapping[str, CanFaultType]] = MappingProxyType(
-    {
-        "drop": CanFaultType(
-            "each frame is acknowledged and then taken by nobody, at this rate",
-            verdict=Verdict.DROPPED,
-        ),
-        "corrupt": CanFaultType(
-            "a bit of each frame is turned over, at this rate", verdict=Verdict.CORRUPTED
-        ),
-        "duplicate": CanFaultType(
-            "each frame is sent again, its sender saw the last bit wrong, at this rate",
-            verdict=Verdict.DUPLICATED,
-        ),
-        "delay": CanFaultType("each time a node sends, it is held for 10 ms, at this rate"),
-        "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
-        "short": CanFaultType("the lines touch: nobody can send", rated=False),
-    }
-)
+CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
+    "drop": CanFaultType(
+        "each frame is acknowledged and then taken by nobody, at this rate",
+        verdict=Verdict.DROPPED,
+    ),
+    "corrupt": CanFaultType(
+        "a bit of each frame is turned over, at this rate", verdict=Verdict.CORRUPTED
+    ),
+    "duplicate": CanFaultType(
+        "each frame is sent again, its sender saw the last bit wrong, at this rate",
+        verdict=Verdict.DUPLICATED,
+    ),
+    "delay": CanFaultType("each time a node sends, it is held for 10 ms, at this rate"),
+    "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
+    "short": CanFaultType("the lines touch: nobody can send", rated=False),
+}
 
 
 class CanFaults:

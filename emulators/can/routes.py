@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
+from tickrig.device.twin import Cache
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ class CanRoutes:
     def __init__(self) -> None:
         self.ends: list[CanEnd] = []
         self.unfiltered: list[CanEnd] = []
-        self._table: dict[int, tuple[CanEnd, ...]] = {}
+        self._table: Cache[int, tuple[CanEnd, ...]] = Cache()
 
     def forget(self) -> None:
         """Begin anew: an end joined, left or has another filter."""

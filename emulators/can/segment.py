@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
+from tickrig.device.twin import Cache, Listeners
 from tickrig.emulators.can.arbiter import CanArbiter
 from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.emulators.can.fault_confinement import FaultConfinement
@@ -53,7 +54,7 @@ class CanSegment:
     """
 
     def __init__(
-        self, bit_rate: int, start_us: int, faults: CanFaults, observers: list[Observer]
+        self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
     ) -> None:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
@@ -67,7 +68,7 @@ class CanSegment:
         self._on_bus = 0  # ends that acknowledge
         self._repeating = False  # a node is alone, and nothing changes any more
         self._news: list[tuple[int, CanEnd]] = []  # whose error state changed when
-        self._lengths: dict[CanFrame, int] = {}
+        self._lengths: Cache[CanFrame, int] = Cache()
         self._stale = True  # the plan that follows is to be made
         self._winners: list[CanEnd] = []
         self._start = self._free = self._due_us = NEVER

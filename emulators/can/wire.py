@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
+from tickrig.device.twin import Copyable, Listeners
 from tickrig.emulators.can.end import Accepted, CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.segment import CanSegment, Observer
@@ -15,7 +16,7 @@ WINDOW_US: Final = 1_000_000
 BABBLER: Final = -1  # number of the node that the fault `babble` adds
 
 
-class CanWire:
+class CanWire(Copyable):
     r"""A classic CAN bus (ISO 11898-1) whose nodes are `CanEnd`s.
 
     A frame takes exactly the bits that it has, stuff bits included; it is
@@ -53,7 +54,7 @@ class CanWire:
             raise ValueError(f"bit rate {bit_rate} is not in {BIT_RATES[0]}..{BIT_RATES[-1]} bit/s")
         self.bit_rate = bit_rate
         self.faults = CanFaults(seed, self._fault_changed)
-        self.observers: list[Observer] = []
+        self.observers: Listeners[Observer] = Listeners()
         self.bus = CanSegment(bit_rate, 0, self.faults, self.observers)
         self._apart: dict[int, CanSegment] = {}  # ends that are disconnected, each by itself
         self._count = 0
@@ -106,7 +107,7 @@ class CanWire:
         if end.number not in self._apart:
             now_us = self.bus.now_us
             self.bus.leave(end, now_us)
-            apart = CanSegment(self.bit_rate, now_us, CanFaults(0, _ignore), [])
+            apart = CanSegment(self.bit_rate, now_us, CanFaults(0, _ignore), Listeners())
             self._apart[end.number] = apart
             apart.join(end, now_us)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tickrig.device.physical import Output
+from tickrig.device.twin import NonCopyable, itself
 from tickrig.emulators.record.trace import RESET, Header, Mark, Record
 from tickrig.emulators.rig.emulated import Emulated, Inputs
 from tickrig.host.text.log import log_of
@@ -15,7 +16,7 @@ from tickrig.host.text.values import Setting
 _logger = log_of(__name__)
 
 
-class TraceFile:
+class TraceFile(NonCopyable):
     """A trace on its way to a file; each tick is written at once, so a kill loses nothing.
 
     Where writing fails the recording ends with one warning, and the run goes on.
@@ -30,6 +31,8 @@ class TraceFile:
     Raises:
         OSError: the file cannot be opened.
     """
+
+    why_not_copied = "it is an open file"
 
     def __init__(self, path: Path, header: Header) -> None:
         self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
@@ -77,6 +80,10 @@ class TracedDevice:
             item.name: item.initial for item in device.inputs.table.values()
         }
         self._was_reset = False
+
+    def __reduce__(self) -> tuple[Callable[[object], object], tuple[object]]:
+        """Copy the device alone: nobody records a twin."""
+        return itself, (self._device,)
 
     @property
     def tick_us(self) -> int:

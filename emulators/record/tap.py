@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Generic
 
 from tickrig.device.core import W
+from tickrig.device.twin import itself
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.port import Port
 
@@ -20,6 +21,10 @@ class Tap(Generic[W]):
 
     def __init__(self, port: Port[W], hear: Callable[[int, Mark, W], None]) -> None:
         self._port, self._hear = port, hear
+
+    def __reduce__(self) -> tuple[Callable[[Port[W]], Port[W]], tuple[Port[W]]]:
+        """Copy the port alone: nobody listens to a twin."""
+        return itself, (self._port,)
 
     @property
     def due_us(self) -> int:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from heapq import heappop, heappush
-from itertools import count
-from typing import Final
+from typing import Any, Final
 
 from tickrig.wire.instant import NEVER
 
@@ -23,7 +22,7 @@ class EventQueue:
     """Actions by time; those of the same time in the order they were entered."""
 
     def __init__(self) -> None:
-        self._numbers = count()
+        self._number = 0
         self._heap: list[_Entry] = []
         self._entered: dict[Hashable, int] = {}
         """The number of what holds for each key; others in the heap were forgotten."""
@@ -31,9 +30,14 @@ class EventQueue:
 
     def put(self, key: Hashable, t_us: int, action: Action) -> None:
         """Enter an action; one entered before under the same key is forgotten."""
-        self._entered[key] = number = next(self._numbers)
-        heappush(self._heap, (t_us, number, key, action))
+        self._number += 1
+        self._entered[key] = self._number
+        heappush(self._heap, (t_us, self._number, key, action))
         self._note_due()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without what was forgotten: it need not be copied."""
+        return {**vars(self), "_heap": sorted(filter(self._holds, self._heap))}
 
     def drop(self, key: Hashable) -> None:
         """Forget an action; one that is not there is no error."""

@@ -8,14 +8,15 @@ from typing import Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
+from tickrig.device.twin import Copyable, Immutable
 from tickrig.emulators.rig.port import Port
 
 Fault = Callable[[int, W], W]
-"""What a fault makes of the traffic that passes at a time in microseconds."""
+"""What a fault makes of the traffic that passes at a time in us; it is state, so no closure."""
 
 
 @dataclass(frozen=True, slots=True)
-class FaultType(Generic[W]):
+class FaultType(Immutable, Generic[W]):
     """A fault that can be armed by name.
 
     Attributes:
@@ -29,7 +30,7 @@ class FaultType(Generic[W]):
     rated: bool = True
 
 
-class FaultyPort(Generic[W]):
+class FaultyPort(Copyable, Generic[W]):
     """A port whose traffic suffers the faults that are armed, in the order of arming.
 
     Each direction has a chance of its own, drawn only for traffic that is

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Generic, Protocol
+from functools import partial
+from typing import Any, Final, Generic, Protocol, TypeVar, overload
 
 from tickrig.device.core import Device, W
-from tickrig.device.twin import NonCopyable
+from tickrig.device.twin import Copyable, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -16,6 +17,10 @@ from tickrig.wire.instant import NEVER
 
 LATE_US: Final = 1_000
 """A step that begins later than this counts as late."""
+
+
+T = TypeVar("T")
+U = TypeVar("U")
 
 
 class Joint(Protocol):
@@ -65,7 +70,7 @@ class Station(Generic[W]):
         return _next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
 
 
-class Rig(NonCopyable):
+class Rig(Copyable):
     """Stations that share a clock.
 
     A step has two phases, as registers on one clock line have: first every
@@ -81,6 +86,8 @@ class Rig(NonCopyable):
     What the event_queue holds is done by whoever makes time pass, in whatever way:
     after all that happens before its time, and before the tick of its time.
 
+    A rig can be copied while it runs, with its devices, wires and faults: `fork`.
+
     Args:
         stations: the devices, each on its port.
         bridges: joints with the outside world (real time).
@@ -91,6 +98,7 @@ class Rig(NonCopyable):
 
     Attributes:
         event_queue: what is to be done between ticks.
+        stations: the devices, each on its port.
         acting_us: the time for which an action of the event_queue is being done, else None.
         now_us: time since the start of the rig.
         worst_late_us: by how much the worst step was late.
@@ -117,22 +125,69 @@ class Rig(NonCopyable):
         self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
         self._wires: tuple[Wire, ...] = ()
         attached = [station for station in stations if self._attach(station)]
-        self._woken = () if dense else tuple(attached)
+        self.stations, self._woken = stations, () if dense else tuple(attached)
         self._looked_at = tuple(s for s in stations if s not in self._woken)
 
     def _attach(self, station: Station[Any]) -> bool:
-        """Let a port that can say so say when a station has work."""
-
-        def wake(at_us: int) -> None:
-            if not self._dense:
-                self._enter(station, at_us)
-
+        """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
         port = station.port
         if not isinstance(port, WirePort):
             return False
-        port.attach(station.device, wake)
+        port.attach(station.device, _ignore if self._dense else partial(self._enter, station))
         self.move_on(port.wire)
         return True
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
+        begun = {"_bridges": (), "_clock": VirtualClock(), "_jumps": not self._dense}
+        return {**vars(self), **begun, "acting_us": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on as the rig that was copied; its ports know no devices yet."""
+        vars(self).update(state)
+        for station in self.stations:
+            self._attach(station)
+
+    @overload
+    def fork(self) -> Rig: ...
+
+    @overload
+    def fork(self, part: T, /) -> tuple[Rig, T]: ...
+
+    @overload
+    def fork(self, part: T, other: U, /) -> tuple[Rig, T, U]: ...
+
+    @overload
+    def fork(self, *parts: Any) -> tuple[Any, ...]: ...
+
+    def fork(self, *parts: Any) -> Any:
+        """Return a twin of the rig: a copy that goes on from here, independent of this one.
+
+        Fed the same, it does the same to the byte. It has the devices, wires, faults, couplings
+        and events of this one, runs in virtual time, and knows nobody outside: no bridge,
+        recorder or observer.
+
+        Args:
+            parts: what belongs to the rig and is wanted of the twin too, such as the host's
+                end of a line.
+
+        Returns:
+            The twin; with `parts` a tuple of the twin and of its parts.
+
+        Raises:
+            TypeError: something in it cannot be copied, such as a port that is a pty; the
+                text says what and why.
+
+        >>> from tickrig.device.rrc.machine import Rrc
+        >>> from tickrig.emulators.serial.serial_line import SerialLine
+        >>> line = SerialLine()
+        >>> rig = Rig(Station(Rrc(), line.a))
+        >>> twin, end = rig.fork(line.b)
+        >>> twin.run_for(100_000)
+        >>> end.poll(twin.now_us).strip(), rig.now_us
+        (b'EV:Initialized', 0)
+        """
+        return twin((self, *parts)) if parts else twin(self)
 
     def move_on(self, wire: Wire) -> None:
         """Let a wire go on with the rig; one with stations does so anyway."""
@@ -295,6 +350,10 @@ class Rig(NonCopyable):
             coupling.act(now_us)
         if acting:
             self._look()
+
+
+def _ignore(at_us: int) -> None:
+    """Wake nobody: a dense rig looks at all stations anyway."""
 
 
 def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:

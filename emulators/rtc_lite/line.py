@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 from tickrig.device.chance import Chance, threshold_of
@@ -13,9 +12,9 @@ from tickrig.device.rtc_lite.component import Component
 from tickrig.device.rtc_lite.config import NodeConfig
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.record.byte_text import unescape
-from tickrig.emulators.rig.faults import Fault, FaultType
+from tickrig.emulators.rig.faults import FaultType
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import Command
@@ -69,34 +68,32 @@ def _value(port_type: PortType[Any], words: list[str]) -> bytes:
 _PING_ANSWER: Final = re.compile(rb"\n" + Command.PING.value + rb"@..", re.DOTALL)
 
 
-def _noise(chance: Chance, threshold: int) -> Fault[bytes]:
-    def fault(now_us: int, data: bytes) -> bytes:
+class _Noise(ByteFault):
+    def __call__(self, now_us: int, data: bytes) -> bytes:
         out = bytearray()
         for byte in data:
-            if chance.hit(threshold):
-                out.append(chance.draw() & 0xFF)
+            if self.hits():
+                out.append(self.chance.draw() & 0xFF)
             out.append(byte)
         return bytes(out)
 
-    return fault
+
+class _LostPing:
+    """It counts; there is no chance in it. A node sends an answer whole, in one tick."""
+
+    def __init__(self, chance: Chance, threshold: int) -> None:
+        self._every, self._seen = round(threshold_of(1) / threshold), 0
+
+    def __call__(self, now_us: int, data: bytes) -> bytes:
+        return _PING_ANSWER.sub(self._cut, data)
+
+    def _cut(self, match: re.Match[bytes]) -> bytes:
+        self._seen += 1
+        return b"" if self._seen % self._every == 0 else match[0]
 
 
-def _ping(chance: Chance, threshold: int) -> Fault[bytes]:
-    """Count; there is no chance in it. A node sends an answer whole, in one tick."""
-    every, seen = round(threshold_of(1) / threshold), 0
-
-    def cut(match: re.Match[bytes]) -> bytes:
-        nonlocal seen
-        seen += 1
-        return b"" if seen % every == 0 else match[0]
-
-    return lambda now_us, data: _PING_ANSWER.sub(cut, data)
-
-
-LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = MappingProxyType(
-    {
-        **BYTE_FAULTS,
-        "noise": FaultType("a byte of chance comes before each byte at this rate", _noise),
-        "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _ping),
-    }
-)
+LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
+    **BYTE_FAULTS,
+    "noise": FaultType("a byte of chance comes before each byte at this rate", _Noise),
+    "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _LostPing),
+}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tickrig.device.twin import itself
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.port import ByteEnd
 
@@ -18,6 +19,10 @@ class HostEnd:
 
     def __init__(self, end: ByteEnd, hear: Callable[[int, Mark, bytes], None]) -> None:
         self._end, self._hear = end, hear
+
+    def __reduce__(self) -> tuple[Callable[[ByteEnd], ByteEnd], tuple[ByteEnd]]:
+        """Copy the end alone: nobody listens to a twin."""
+        return itself, (self._end,)
 
     @property
     def due_us(self) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from tickrig.device.twin import NonCopyable
 from tickrig.emulators.serial.pty_link import PtyLink
 from tickrig.emulators.serial.pty_setting import HostSetting
 from tickrig.wire.instant import NEVER
@@ -15,7 +16,7 @@ from tickrig.wire.instant import NEVER
 READ_BYTES: Final = 4_096
 
 
-class PtyPort:
+class PtyPort(NonCopyable):
     """A `Port[bytes]` whose other side any serial program can open.
 
     The emulator keeps the other side open too, so hosts may come and go. What
@@ -35,6 +36,8 @@ class PtyPort:
         FileExistsError: `link` exists, and no emulator left it over.
         OSError: no pseudo-terminal is to be had, or no link can be made there.
     """
+
+    why_not_copied = "it is a pty of this machine"
 
     def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
         self._master, self._slave = os.openpty()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from operator import itemgetter
 
+from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 
 
@@ -24,7 +26,7 @@ class _Burst:
         self.sender, self.start_us, self.end_us, self.data = sender, start_us, end_us, data
 
 
-class Rs485Line:
+class Rs485Line(Copyable):
     """Several ends on one pair of wires.
 
     A byte is heard by all other ends when its stop bit has passed. Where two speak at
@@ -207,5 +209,5 @@ class Rs485End:
                 left.append((burst, passed))
         self._inbox = deque(burst for burst, _ in left)
         self._taken = deque(taken for _, taken in left)
-        ended.sort(key=lambda byte: byte[0])
+        ended.sort(key=itemgetter(0))
         return bytes(value for _, value in ended)

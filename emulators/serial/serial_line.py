@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 
+from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 
 
-class SerialLine:
+class SerialLine(Copyable):
     """Two ends joined by two independent directions.
 
     A byte is delivered when its stop bit has passed. What is sent while the

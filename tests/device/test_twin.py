@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
+from typing import ClassVar
 
 import pytest
 
-from tickrig.device.twin import Copyable, Immutable, Listeners, NonCopyable, twin
+from tickrig.device.twin import Cache, Copyable, Immutable, Listeners, NonCopyable, itself, twin
 
 
 class Colour(Enum):
@@ -87,6 +88,44 @@ def test_nobody_listens_to_a_twin() -> None:
     assert twin(machine).listeners == []
     assert type(twin(machine).listeners) is Listeners
     assert len(machine.listeners) == 1
+
+
+class Heard(Copyable):
+    new_in_twins: ClassVar[Mapping[str, object]] = {"hear": None}
+
+    def __init__(self) -> None:
+        self.hear: object = [].append
+        self.count, self.known = 3, Cache({1: 2})
+
+
+class Ear(Heard):
+    __slots__ = ("count", "hear", "known")
+
+
+class Tap:
+    def __init__(self, part: Part) -> None:
+        self.part, self.hear = part, lambda: None
+
+    def __reduce__(self) -> tuple[Callable[[Part], Part], tuple[Part]]:
+        return itself, (self.part,)
+
+
+@pytest.mark.parametrize("made", [Heard, Ear])
+def test_a_twin_begins_without_callbacks_and_caches(made: type[Heard]) -> None:
+    machine = made()
+    other = twin(machine)
+    assert (other.hear, other.count, other.known) == (None, 3, {})
+    assert type(other.known) is Cache
+    assert (machine.hear, machine.known) != (None, {})
+
+
+def test_a_listener_is_left_out_of_a_twin() -> None:
+    machine = Machine(Part(4))
+    machine.part = Tap(machine.part)  # type: ignore[assignment] # it listens to the part
+    other = twin(machine)
+    assert type(other.part) is Part
+    other.event()
+    assert other.part.count == 5
 
 
 def test_machines_that_share_a_part_are_copied_with_one_part() -> None:

@@ -7,6 +7,7 @@ from typing import Final
 
 import can
 
+from tickrig.device.twin import NonCopyable
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
@@ -18,7 +19,7 @@ FRAMES_A_POLL: Final = 1_024
 _logger = log_of(__name__)
 
 
-class CanBusPort:
+class CanBusPort(NonCopyable):
     """A `Port[Frames]` on a real or virtual bus; it never waits.
 
     What the adapter does not take at once is kept up to `queue_frames`, and
@@ -33,6 +34,8 @@ class CanBusPort:
         errors: error frames that came in.
         failed: why the adapter last took or gave nothing, empty while all is well.
     """
+
+    why_not_copied = "it is a bus of this machine"
 
     def __init__(self, bus: can.BusABC, queue_frames: int = 4_096) -> None:
         self._bus, self._queue_frames = bus, queue_frames

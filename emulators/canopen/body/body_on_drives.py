@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from math import degrees, radians
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from tickrig.device.body.wheeled_body import WheeledBody
@@ -76,9 +75,7 @@ class BodyOnDrives:
         if body.parameters.friction is not None:
             self.physical = {**self.physical, "friction": FrictionSignal(body)}
         self.outputs: Mapping[str, Output] = {item.name: item for item in BODY_OUTPUTS}
-        self.groups: Mapping[str, tuple[str, ...]] = MappingProxyType(
-            {"pose": ("x_m", "y_m", "heading_deg")}
-        )
+        self.groups: Mapping[str, tuple[str, ...]] = {"pose": ("x_m", "y_m", "heading_deg")}
         self._load()
 
     @property

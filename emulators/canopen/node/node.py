@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.physical import Output
-from tickrig.device.twin import NonCopyable
+from tickrig.device.twin import Copyable
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
@@ -42,7 +43,7 @@ NODE_OUTPUTS: Final = (
 )
 
 
-class Node(NonCopyable):
+class Node(Copyable):
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
     Without power it neither sends nor hears, and begins anew when power is back.
@@ -68,7 +69,7 @@ class Node(NonCopyable):
     def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
         self.name, self.slave, self.application = name, slave, Application.of(slave)
         self.port = wire.end()
-        self.port.on_error_state = self._error_state_changed
+        self.port.auto_recovery = True
         self._wire, self._on, self._ticked = wire, True, False
         self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
@@ -111,6 +112,10 @@ class Node(NonCopyable):
     def on_accepts(self) -> list[Callable[[], None]]:
         """Whom to call when these two have changed."""
         return self.slave.on_accepts
+
+    def bus_state(self, state: ErrorState, /) -> None:
+        """Hear of a change of its CAN controller; the slave hears of it in the next tick."""
+        self._defer(partial(self.slave.bus_state, state))
 
     def reset(self) -> None:
         """Power-on reset."""
@@ -182,8 +187,3 @@ class Node(NonCopyable):
             self._wire.disconnect(self.port)
         elif self._on:
             self._wire.reconnect(self.port)
-
-    def _error_state_changed(self, now_us: int, state: ErrorState) -> None:
-        self._defer(lambda: self.slave.bus_state(state))
-        if state is ErrorState.BUS_OFF:
-            self.port.recover(now_us)

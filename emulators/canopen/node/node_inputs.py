@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -72,9 +73,9 @@ class Emergency:
         """Clear the error before, raise this one."""
         old, self._code = self._code, self.check(value)
         if old and old != self._code:
-            self._later(lambda: self._slave.emergency_clear(old))
+            self._later(partial(self._slave.emergency_clear, old))
         if code := self._code:
-            self._later(lambda: self._slave.emergency(code, _register_bit(code)))
+            self._later(partial(self._slave.emergency, code, _register_bit(code)))
 
 
 class Quantity:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
+from tickrig.device.twin import Listeners
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
@@ -34,7 +35,7 @@ class Node:
     delay_us: int = 3_000
     accepts: Accepted = frozenset()
     reconfigured_by: frozenset[int] = frozenset({SWITCH})
-    on_accepts: list[Callable[[], None]] = field(default_factory=list)
+    on_accepts: Listeners[Callable[[], None]] = field(default_factory=Listeners)
     ticks: list[int] = field(default_factory=list)
     heard: list[str] = field(default_factory=list)
     count: int = 0

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import copy
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -118,12 +116,6 @@ def test_of_several_wires_each_frame_is_heard_at_its_time() -> None:
     asked.send(1_000, frames("300#11223344 301#11223344 080#"))
     rig.run_to(10_000)
     assert (listener.heard, listener.ticks) == (["080#"], [2_000, 5_000])
-
-
-def test_a_rig_is_not_copied() -> None:
-    rig = Rig(Station(Echo(), SerialLine().a))
-    with pytest.raises(TypeError, match="Rig cannot be copied or pickled"):
-        copy.copy(rig)
 
 
 @pytest.mark.parametrize(("late_us", "late_ticks"), [(1_000, 0), (1_001, 3)])
