@@ -12,7 +12,7 @@ from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.options.game_pad import GamePad
 from tickrig.host.motion.options.switch_input import SwitchInput
 from tickrig.host.rtc import Manager
-from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.system.real_time import RealTime
 
 
 def main(device: str) -> None:

@@ -10,7 +10,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc_lite import attach
 
 

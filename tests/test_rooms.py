@@ -38,7 +38,6 @@ ROOM_CIRCLES = {
     "tickrig.host.monitor": "frames, logs, traffic",
     "tickrig.host.monitor.logs.reading": "can_log, log_reader",
     "tickrig.host.monitor.logs.writing": "can_log_writer, log_writer",
-    "tickrig.host.rtc": "component, execution, ports, errors, system",
 }
 
 

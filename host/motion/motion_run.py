@@ -8,8 +8,8 @@ from itertools import groupby, pairwise
 from math import sqrt
 from typing import Final, NamedTuple
 
+from tickrig.host.motion.control_laws import Limits
 from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.limiter import Limits
 
 LONG_M: Final = 1.0
 """A leg from here on is judged by its cross-track error."""

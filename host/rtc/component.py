@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar, TypeVar
 
 from tickrig.host.rtc.component_action import ComponentAction, guarded
-from tickrig.host.rtc.configuration.configuration import Configuration
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.configuration import Configuration
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import ReturnCode
 from tickrig.host.rtc.ports.port import AnyPort, PortProfile
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
 P = TypeVar("P", bound=AnyPort)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, ParamSpec
 
-from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 
 if TYPE_CHECKING:

@@ -1,14 +1,18 @@
 """The names of the component model, in one place."""
 
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
-from tickrig.host.rtc.configuration.parameter import Parameter
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import ExecutionKind, LifeCycleState, ReturnCode
+from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
-from tickrig.host.rtc.ports.port_status import PortStatus
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServicePort
+from tickrig.host.rtc.states import (
+    ExecutionKind,
+    LifeCycleState,
+    PortStatus,
+    ReturnCode,
+    RtcRefused,
+)
 from tickrig.host.rtc.system.manager import Manager
 
 __all__ = [

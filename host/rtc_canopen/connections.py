@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 
 from tickrig.host.canopen.dialogue import Failure, QueuedScript
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_canopen.definition.definition import PdoEntry, PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.errors import ServerRefused

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.node.served_node import ServedNode
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource

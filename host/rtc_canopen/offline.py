@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.canopen.script import Ask, Step
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.ports.data_port import InPort
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.dot import Box, Edge, write_dot
 from tickrig.host.rtc_canopen.connections import are_there, check_lengths, find_layout
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, PdoLink, PdoName, SdoEntry

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.links.link import Stamped
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_canopen.connections import Connections, Links
 from tickrig.host.rtc_canopen.data_flow import DataFlow

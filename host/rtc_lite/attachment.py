@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from tickrig.host.links.link import Link
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_lite.conversation import POLL_US, Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell

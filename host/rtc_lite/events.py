@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Final
 
 from tickrig.host.rtc.component_action import guarded
-from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 
 _LOG: Final = log_of(__name__)

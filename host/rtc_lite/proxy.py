@@ -8,9 +8,8 @@ from typing import ClassVar, Final
 from tickrig.host.links.errors import DeviceRefused, LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import ReturnCode
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.rtc_lite.conversation import RETRIES, Conversation
 from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
 from tickrig.host.rtc_lite.relays import Relays

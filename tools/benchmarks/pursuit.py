@@ -13,8 +13,8 @@ from itertools import pairwise
 from math import copysign, cos, hypot, sin, sqrt
 from typing import ClassVar, Final
 
+from tickrig.host.motion.control_laws import Limits
 from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.limiter import Limits
 from tickrig.host.motion.ports import newest, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis

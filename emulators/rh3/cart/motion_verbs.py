@@ -16,14 +16,14 @@ from tickrig.emulators.rh3.cart.options import (
     stopping_at_the_end,
     watched,
 )
-from tickrig.emulators.rh3.cart.path_file import FARTHEST_M, read_path, within_reach
-from tickrig.emulators.rh3.cart.run_table import limits_of, table
 from tickrig.emulators.rh3.cart.squares import Size, play_squares
 from tickrig.emulators.rh3.cart.track_plot import write_track
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.drive import drive
 from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.path_file import FARTHEST_M, read_path, within_reach
 from tickrig.host.motion.ports import sound
+from tickrig.host.motion.run_report import limits_of, table
 from tickrig.host.motion.umbmark import SIDE_M
 
 

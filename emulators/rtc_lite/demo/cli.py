@@ -20,7 +20,7 @@ def rtc_lite(virtual: bool) -> None:
     with loading():
         from tickrig.emulators.rtc_lite.demo.play import run_demo  # noqa: PLC0415
         from tickrig.emulators.rtc_lite.demo.stage import VirtualStage, pty_stage  # noqa: PLC0415
-        from tickrig.host.rtc.errors import RtcRefused  # noqa: PLC0415
+        from tickrig.host.rtc.states import RtcRefused  # noqa: PLC0415
 
     try:
         if virtual:

@@ -17,8 +17,8 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.real_time import RealTime
 
 CAST: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
 """Which node plays which part."""

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Final
 
-from tickrig.host.motion.conf_file import read_conf
 from tickrig.host.motion.dead_reckoning import Wheels, moved
 from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.motion.ports import arrived, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import TimedDoubleSeq
+
+_CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 
 
 class Odometry(RtComponent):
@@ -98,3 +101,23 @@ class Odometry(RtComponent):
         right = (angles[1] - before[1]) * self.right_radius.value
         self.pose = moved(self.pose, left, right, self.axle.value)
         self.position.write(iis.TimedPose2D(sample.tm, data=to_pose_2d(self.pose)))
+
+
+def read_conf(path: Path) -> dict[str, dict[str, str]]:
+    """Return the values of each configuration set of a file: `conf.default.lengthOfAxle: 0.464`.
+
+    Other lines are OpenRTM's own.
+
+    Raises:
+        OSError: the file cannot be read.
+        RtcRefused: a line with `conf.` that is no such line; it says which.
+    """
+    sets: dict[str, dict[str, str]] = {}
+    for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+        text = line.partition("#")[0].strip()
+        if not text.startswith("conf."):
+            continue
+        if (match := _CONF_LINE.fullmatch(text)) is None:
+            raise RtcRefused(f"{path}:{number}: {text!r} is not conf.SET.NAME: VALUE")
+        sets.setdefault(match[1], {})[match[2]] = match[3]
+    return sets

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
+from tickrig.host.motion.control_laws import (
+    ControlLaw,
+    Limits,
+    ReferenceSpin,
+    Regulator,
+    TimeOptimalSpin,
+    steps,
+)
 from tickrig.host.motion.dead_reckoning import twist_of
 from tickrig.host.motion.geometry import Pose, Twist, clip
-from tickrig.host.motion.limiter import Limits, steps
 from tickrig.host.motion.ports import newest, sound, to_pose
-from tickrig.host.motion.regulator import ControlLaw, Regulator
-from tickrig.host.motion.turning import ReferenceSpin, TimeOptimalSpin
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time

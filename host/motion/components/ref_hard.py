@@ -25,7 +25,7 @@ from tickrig.host.rtc import (
     RtComponent,
     ServicePort,
 )
-from tickrig.host.rtc.configuration.parameter import Parameter
+from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.text.log import log_of
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
 from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide

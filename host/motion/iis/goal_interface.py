@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from tickrig.host.motion.iis.conversions import with_wrapped_heading
+from tickrig.host.motion.iis.adapters import with_wrapped_heading
 from tickrig.host.motion.ports import newest
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis

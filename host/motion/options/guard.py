@@ -6,11 +6,13 @@ from typing import Final
 
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.ref_hard import Opener
-from tickrig.host.motion.options.collision_detection import CollisionDetection
 from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
-from tickrig.host.motion.options.obstacle_monitor import ObstacleMonitor
-from tickrig.host.motion.options.obstacles_avoidance import ObstaclesAvoidance
-from tickrig.host.motion.options.urg_to_obstacles import UrgToObstacles
+from tickrig.host.motion.options.obstacles import (
+    CollisionDetection,
+    ObstacleMonitor,
+    ObstaclesAvoidance,
+    UrgToObstacles,
+)
 from tickrig.host.rtc import Manager
 
 _LATEST: Final = {"dataport.buffer.length": "8"}

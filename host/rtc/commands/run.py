@@ -20,8 +20,8 @@ from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.commands.system_file import file_format, read_system, write_system
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
-from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc.system.system import System, restore
 from tickrig.host.text.user_file import explain_error, find_class
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
+from tickrig.host.rtc.commands.probes import Probes
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.configuration.configuration import Configuration
-from tickrig.host.rtc.configuration.parameter import as_text
-from tickrig.host.rtc.execution.real_time import RealTime
-from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc.configuration import Configuration
+from tickrig.host.rtc.parameter import as_text
 from tickrig.host.rtc.ports.literal import literal
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
-from tickrig.host.rtc.ports.probes import Probes
+from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
+from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc.system.rts_profile import write_rts_profile
 from tickrig.host.rtc.system.system import describe
 from tickrig.host.rtc.system.system_toml import write_toml

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import System
 from tickrig.host.rtc.system.system_toml import parse_toml

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.rtc.execution.participant import Callback, Participant
-from tickrig.host.rtc.execution.states import ExecutionKind, LifeCycleState, ReturnCode
+from tickrig.host.rtc.states import ExecutionKind, LifeCycleState, ReturnCode
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.rtc.component_action import ComponentAction, guarded
-from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 
 if TYPE_CHECKING:
     from tickrig.host.rtc.component import RtComponent

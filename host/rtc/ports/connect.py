@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution.states import ReturnCode
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.connector_options import ConnectorOptions
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServiceConnector, ServicePort
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
 Properties = Mapping[str, str]
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import MAX_RATE_HZ, MIN_RATE_HZ
 from tickrig.host.rtc.ports.ring_buffer import (
     DEFAULT_LENGTH,
@@ -16,6 +15,7 @@ from tickrig.host.rtc.ports.ring_buffer import (
     FullPolicy,
     ReadPolicy,
 )
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types.cdr import Endian
 
 E = TypeVar("E", bound=StrEnum)

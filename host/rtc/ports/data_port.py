@@ -8,7 +8,7 @@ from typing import Final, Generic, TypeVar
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.connector_options import DataflowType, InterfaceType, SubscriptionType
 from tickrig.host.rtc.ports.port import Port
-from tickrig.host.rtc.ports.port_status import PortStatus
+from tickrig.host.rtc.states import PortStatus
 from tickrig.wire.rtc_types.idl import Struct
 
 T = TypeVar("T", bound=Struct)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping
 from enum import IntEnum
 from typing import Annotated, Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.cdr import encode

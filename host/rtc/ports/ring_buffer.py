@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Generic, TypeVar
 
-from tickrig.host.rtc.ports.port_status import PortStatus
+from tickrig.host.rtc.states import PortStatus
 
 T = TypeVar("T")
 

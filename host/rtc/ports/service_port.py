@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Generic, TypeVar
 
-from tickrig.host.rtc.errors import RtcRefused
-from tickrig.host.rtc.execution.states import ReturnCode
 from tickrig.host.rtc.ports.port import (
     AnyPort,
     ConnectorBase,
@@ -13,6 +11,7 @@ from tickrig.host.rtc.ports.port import (
     InterfaceProfile,
     Port,
 )
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
 T = TypeVar("T")  # an interface: a Protocol
 

@@ -7,14 +7,12 @@ from itertools import count
 from typing import Final, TypeVar
 
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.schedule import Schedule
-from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
-from tickrig.host.rtc.system.name_service import NameService
+from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
+from tickrig.host.rtc.system.schedule import Schedule
 
 Factory = Callable[[str], RtComponent]
 """Makes a component of an instance name; a class of components is one."""
@@ -22,6 +20,42 @@ Factory = Callable[[str], RtComponent]
 R = TypeVar("R", bound=RtComponent)
 
 DEFAULT_RATE_HZ: Final = 1_000.0
+
+
+class NameService:
+    """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
+
+    In process: not emulated is the CORBA naming service, which others could ask.
+    """
+
+    def __init__(self) -> None:
+        self._components: dict[str, RtComponent] = {}
+
+    def bind(self, path: str, component: RtComponent) -> None:
+        """Give a component a path; RtcRefused if it is taken."""
+        path = _plain(path)
+        if path in self._components:
+            raise RtcRefused(f"{path} is taken")
+        self._components[path] = component
+
+    def unbind(self, path: str) -> None:
+        """Take a path away; one that is not there is no error."""
+        self._components.pop(_plain(path), None)
+
+    def resolve(self, path: str) -> RtComponent:
+        """Return the component at a path; RtcRefused if there is none."""
+        path = _plain(path)
+        if path not in self._components:
+            known = ", ".join(self._components) or "none"
+            raise RtcRefused(f"nothing at {path}; known: {known}")
+        return self._components[path]
+
+    def names(self, context: str = "") -> tuple[str, ...]:
+        """Return what stands in a naming context: names, and contexts with `/` at their end."""
+        prefix = f"{_plain(context)}/" if _plain(context) else ""
+        rests = (path.removeprefix(prefix) for path in self._components if path.startswith(prefix))
+        heads = (rest.partition("/") for rest in rests)
+        return tuple(dict.fromkeys(head + slash for head, slash, _ in heads))
 
 
 class Manager(Schedule):
@@ -38,7 +72,7 @@ class Manager(Schedule):
 
     def __init__(self, host: str = "localhost") -> None:
         super().__init__()
-        self.names = NameService[RtComponent]()
+        self.names = NameService()
         self._host = host
         self._factories: dict[str, Factory] = {}
         self._components: dict[str, RtComponent] = {}
@@ -226,3 +260,7 @@ class Manager(Schedule):
             self.remove_context(own)
         for context in tuple(component.contexts):
             context.remove_component(component)
+
+
+def _plain(path: str) -> str:
+    return path.strip("/")

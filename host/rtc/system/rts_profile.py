@@ -11,10 +11,10 @@ from typing import Final
 from xml.etree import ElementTree as ET
 
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.configuration.configuration import DEFAULT
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.configuration import DEFAULT
 from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.configuration.configuration import DEFAULT
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.configuration import DEFAULT
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc.states import LifeCycleState, RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 
 Sets = Mapping[str, Mapping[str, str]]

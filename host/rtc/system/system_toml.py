@@ -25,7 +25,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
 
 _COMPONENT: Final[Mapping[str, type]] = {

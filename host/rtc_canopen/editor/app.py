@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc_canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc_canopen.editor.session import Session
 from tickrig.host.rtc_canopen.editor.status import event_lines, status_line

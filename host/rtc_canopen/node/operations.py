@@ -8,7 +8,7 @@ from typing import Any, Final
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.canopen.script import Command, Script
-from tickrig.host.rtc.execution.states import LifeCycleState
+from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
 from tickrig.host.rtc_canopen.events import EventKind, Note
 from tickrig.host.rtc_canopen.node.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES

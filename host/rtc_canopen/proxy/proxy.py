@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.execution.states import LifeCycleState, ReturnCode
+from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource

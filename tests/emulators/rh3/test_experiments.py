@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.rh3.cart.convoy import Convoy
-from tickrig.emulators.rh3.cart.omni_cart import OmniCart
+from tickrig.emulators.rh3.cart.convoy import Convoy, OmniCart
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager, OutPort, connect
 from tickrig.wire.rtc_types import iis

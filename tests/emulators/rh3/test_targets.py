@@ -14,10 +14,10 @@ import pytest
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.omni_to_2wd import plan
+from tickrig.host.motion.control_laws import Limits
 from tickrig.host.motion.drive import drive, expect, start
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.least_time import least_time_s
-from tickrig.host.motion.limiter import Limits
 from tickrig.host.motion.motion_run import MotionRun
 
 Points = tuple[Pose, ...]

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.motion.components.odometry import Odometry
-from tickrig.host.motion.conf_file import read_conf
+from tickrig.host.motion.components.odometry import Odometry, read_conf
 from tickrig.host.rtc import RtcRefused
 
 TEXT = """\

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+from tickrig.host.motion.control_laws import Limits
 from tickrig.host.motion.geometry import Pose, Twist
-from tickrig.host.motion.limiter import Limits
 from tickrig.host.motion.motion_run import MotionRun, Sample
 
 LINE = Pose(2.0, 0.0, 0.0)

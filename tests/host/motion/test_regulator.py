@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tickrig.host.motion.control_laws import ControlLaw, Regulator
 from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.regulator import ControlLaw, Regulator
 
 H = 0.02
 SPEC = Regulator(800.0, 300.0, 400.0, 0.05, 0.01, H)

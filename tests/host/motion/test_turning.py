@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tickrig.host.motion.control_laws import Limits, ReferenceSpin, TimeOptimalSpin
 from tickrig.host.motion.geometry import Twist, wrap
-from tickrig.host.motion.limiter import Limits
-from tickrig.host.motion.turning import ReferenceSpin, TimeOptimalSpin
 
 H, LATENCY = 0.02, 0.03
 LIMITS = Limits(1.0, 0.3, 0.006, 0.1)

@@ -16,7 +16,7 @@ from tickrig.host.links.reopening_link import ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.execution.real_time import RealTime
+from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
 
 EMULATOR = "tickrig.emulators.rtc_lite.cli"

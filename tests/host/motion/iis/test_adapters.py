@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from tests.host.motion.port_bench import PortBench, at
 from tickrig.host.motion.geometry import wrap
-from tickrig.host.motion.iis import conversions
 from tickrig.host.motion.iis.adapters import (
     Position2To3,
     Position3To2,
@@ -80,17 +79,17 @@ def test_a_pose_with_a_number_that_is_none_is_left_out(
 @given(numbers, numbers, numbers)
 def test_velocities_survive_the_way_to_phase_3_and_back(vx: float, vy: float, w: float) -> None:
     value = iis_phase2.TimedVelocity(TM, (1, 2), vx, vy, w, (0.5,))
-    assert conversions.velocity_3_to_2(conversions.velocity_2_to_3(value)) == value
+    assert Velocity3To2("B0").convert(Velocity2To3("A0").convert(value)) == value
 
 
 @given(numbers, numbers, st.floats(-50, 50))
 def test_headings_are_converted_and_mean_the_same(x: float, y: float, heading: float) -> None:
     pose = at(x, y, heading)
-    positive = conversions.with_positive_heading(pose)
+    positive = PositiveHeading("A0").convert(pose)
     assert positive is not None
     assert 0 <= positive.data.heading <= 2 * pi
     assert abs(wrap(positive.data.heading - heading)) < 1e-9
-    wrapped = conversions.with_wrapped_heading(positive)
+    wrapped = WrappedHeading("B0").convert(positive)
     assert wrapped is not None
     assert -pi <= wrapped.data.heading <= pi
     assert abs(wrap(wrapped.data.heading - heading)) < 1e-9

@@ -7,10 +7,12 @@ from math import nan, pi
 import pytest
 
 from tests.host.motion.port_bench import PERIOD_US, PortBench
-from tickrig.host.motion.options.collision_detection import CollisionDetection
-from tickrig.host.motion.options.obstacle_monitor import ObstacleMonitor
-from tickrig.host.motion.options.obstacles_avoidance import ObstaclesAvoidance
-from tickrig.host.motion.options.urg_to_obstacles import UrgToObstacles
+from tickrig.host.motion.options.obstacles import (
+    CollisionDetection,
+    ObstacleMonitor,
+    ObstaclesAvoidance,
+    UrgToObstacles,
+)
 from tickrig.host.rtc import Provider, ServicePort, connect
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import TimedDouble

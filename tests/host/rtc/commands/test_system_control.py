@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from tests.host.rtc.chain import Chain
 from tickrig.host.rtc import ModuleSpec, RtComponent
 from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.execution.real_time import RealTime
 from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.system.real_time import RealTime
 
 
 class NoClock:

@@ -10,11 +10,10 @@ from tickrig.host.rtc import (
     LifeCycleState,
     Manager,
     ReturnCode,
-    RtComponent,
     RtcRefused,
 )
 from tickrig.host.rtc.components import ConsoleIn, SeqIn, SeqOut
-from tickrig.host.rtc.system.name_service import NameService
+from tickrig.host.rtc.system.manager import NameService
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedLongSeq
 
@@ -285,7 +284,7 @@ def test_console_out_shows_what_arrives() -> None:
 
 
 def test_a_path_is_bound_once_and_may_be_deep() -> None:
-    names = NameService[RtComponent]()
+    names = NameService()
     names.bind("/localhost/my.host_cxt/A0.rtc", component := ConsoleIn("A0"))
     assert names.names("localhost") == ("my.host_cxt/",)
     assert names.resolve("localhost/my.host_cxt/A0.rtc") is component

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from tickrig.host.rtc.execution.schedule import Schedule
+from tickrig.host.rtc.system.schedule import Schedule
 
 LATE_US: Final = 1_000
 """A tick that begins later than this counts as late."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.omni_to_2wd import plan
+from tickrig.host.motion.control_laws import Limits, steps
 from tickrig.host.motion.drive import PERIOD_US
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.least_time import least_time_s
-from tickrig.host.motion.limiter import Limits, steps
 from tickrig.host.motion.motion_run import MotionRun
 
 

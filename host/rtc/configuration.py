@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from tickrig.host.rtc.configuration.parameter import Parameter, V
-from tickrig.host.rtc.errors import RtcRefused
+from tickrig.host.rtc.parameter import Parameter, V
+from tickrig.host.rtc.states import RtcRefused
 
 DEFAULT: Final = "default"
 

@@ -1,12 +1,13 @@
-"""A map of a cart's track in braille letters."""
+"""A map of a cart's track in braille letters, once or again and again in one place."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, TextIO
 
 from tickrig.host.monitor.graph.plot import DOTS_X, DOTS_Y, Canvas
 from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.motion_run import Sample
 
 WIDTH: Final = 60
 HEIGHT: Final = 16
@@ -14,6 +15,8 @@ HEIGHT: Final = 16
 MARGIN: Final = 0.08
 """Share of the larger side that is left free all round."""
 SMALLEST_M: Final = 0.5
+EVERY: Final = 10
+"""Samples from one drawing to the next."""
 _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
@@ -61,3 +64,32 @@ class TrackMap:
     def _set(self, x: int, y: int) -> None:
         if 0 <= x < self._canvas.width * DOTS_X:
             self._canvas.fill(x, y, y)
+
+
+class LiveMap:
+    """Told each sample, it draws the map and a line of numbers below it.
+
+    Args:
+        track: what is drawn.
+        out: a terminal.
+    """
+
+    def __init__(self, track: TrackMap, out: TextIO) -> None:
+        self._track, self._out = track, out
+        self._count = self._height = 0
+
+    def watch(self, sample: Sample) -> None:
+        """Take a sample; draw if it is time."""
+        self._track.add(sample.pose)
+        if self._count % EVERY == 0:
+            self._draw(sample)
+        self._count += 1
+
+    def _draw(self, sample: Sample) -> None:
+        (x, y, heading), (v, w) = sample.pose, sample.twist
+        numbers = f"{sample.time_s:7.2f} s  {x:+.3f} {y:+.3f} m  {heading:+.3f} rad"
+        lines = [*self._track.rows(), f"{numbers}  {v:+.2f} m/s  {w:+.2f} rad/s"]
+        up = f"\x1b[{self._height}A" if self._height else ""
+        self._out.write(up + "".join(f"{line}\x1b[K\n" for line in lines))
+        self._out.flush()
+        self._height = len(lines)

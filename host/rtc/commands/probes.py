@@ -6,11 +6,11 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from tickrig.host.rtc.errors import RtcRefused
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.literal import read_literal
 from tickrig.host.rtc.ports.port import AnyPort
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.rtc_types.idl import Struct
 

@@ -1,0 +1,179 @@
+"""Example components, after those that come with OpenRTM-aist."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Final
+
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.states import ReturnCode
+from tickrig.wire.rtc_types import basic
+from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.idl import Struct
+
+SEQ_PORTS: Final[Mapping[str, type[Struct]]] = {
+    "Octet": basic.TimedOctet,
+    "Short": basic.TimedShort,
+    "Long": basic.TimedLong,
+    "Float": basic.TimedFloat,
+    "Double": basic.TimedDouble,
+    "OctetSeq": basic.TimedOctetSeq,
+    "ShortSeq": basic.TimedShortSeq,
+    "LongSeq": basic.TimedLongSeq,
+    "FloatSeq": basic.TimedFloatSeq,
+    "DoubleSeq": basic.TimedDoubleSeq,
+}
+"""Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
+
+LENGTH: Final = 10
+"""Elements of a sequence that SeqOut writes."""
+
+
+class ConsoleIn(RtComponent):
+    """Writes one number that was entered in each period.
+
+    OpenRTM's asks for a number and waits; here nothing waits, and `enter` is
+    called by whoever has the console.
+
+    Attributes:
+        waiting: what was entered and not yet written.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleIn", "Console input component")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.out = self.add_port(OutPort("out", TimedLong))
+        self.waiting: deque[int] = deque()
+
+    def enter(self, *numbers: int) -> None:
+        """Enter numbers, -2**31..2**31-1."""
+        self.waiting.extend(numbers)
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Write the oldest number that was entered."""
+        if self.waiting:
+            self.out.write(TimedLong(Time.from_us(ec.now_us), self.waiting.popleft()))
+        return ReturnCode.RTC_OK
+
+
+class ConsoleOut(RtComponent):
+    """Shows each number that arrives.
+
+    Attributes:
+        received: all that arrived, in order.
+        show: called with each value; whoever has the console prints it.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleOut", "Console output component")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.in_ = self.add_port(InPort("in", TimedLong))
+        self.received: list[TimedLong] = []
+        self.show: Callable[[TimedLong], None] | None = None
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Show what arrived."""
+        while self.in_.is_new and (value := self.in_.read()) is not None:
+            self.received.append(value)
+            if self.show is not None:
+                self.show(value)
+        return ReturnCode.RTC_OK
+
+
+class SeqIn(RtComponent):
+    """Keeps the latest value of each of its ports, as OpenRTM's shows it.
+
+    Attributes:
+        ins: its ports by name.
+        latest: the values by the name of their port.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("SeqIn", "Sequence InPort component")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.ins = {name: self.add_port(InPort(name, kind)) for name, kind in SEQ_PORTS.items()}
+        self.latest: dict[str, Struct] = {}
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take what arrived."""
+        for name, port in self.ins.items():
+            while port.is_new and (value := port.read()) is not None:
+                self.latest[name] = value
+        return ReturnCode.RTC_OK
+
+
+class SeqOut(RtComponent):
+    """Writes a value to each of its ports in each period: counted up, where OpenRTM's are random.
+
+    Attributes:
+        outs: its ports by name.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("SeqOut", "Sequence OutPort component")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.outs = {name: self.add_port(OutPort(name, kind)) for name, kind in SEQ_PORTS.items()}
+        self._count = 0
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Count from 0 again."""
+        self._count = 0
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Write the next values."""
+        for value in _values(Time.from_us(ec.now_us), self._count):
+            self.outs[type(value).__name__.removeprefix("Timed")].write(value)
+        self._count += 1
+        return ReturnCode.RTC_OK
+
+
+class ConfigSample(RtComponent):
+    """Has parameters, and does nothing with them; names and defaults are OpenRTM's."""
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("ConfigSample", "Configuration example component")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.int_param0 = bind("int_param0", 0, "0<=x<=150", widget="slider.10")
+        self.int_param1 = bind("int_param1", 1, "0<=x<=1000", widget="spin.10")
+        self.double_param0 = bind("double_param0", 0.11, "0<=x<=10", widget="slider.1")
+        self.double_param1 = bind("double_param1", 9.9, "0<=x<=10", widget="spin.1")
+        self.str_param0 = bind("str_param0", "dara", widget="radio")
+        self.str_param1 = bind("str_param1", "hoge", "(hoge, fuga, foo)", widget="radio")
+        vector: tuple[float, ...] = (0.0, 1.0, 2.0, 3.0, 4.0)
+        self.vector_param0 = bind("vector_param0", vector, widget="text")
+
+
+EXAMPLES: tuple[type[RtComponent], ...] = (
+    ConsoleIn,
+    ConsoleOut,
+    SeqIn,
+    SeqOut,
+    ConfigSample,
+)
+
+
+def _values(tm: Time, n: int) -> tuple[Struct, ...]:
+    octets = bytes(k & 0xFF for k in range(n, n + LENGTH))
+    shorts = tuple(k & 0x7FFF for k in range(n, n + LENGTH))
+    return (
+        basic.TimedOctet(tm, octets[0]),
+        basic.TimedShort(tm, shorts[0]),
+        basic.TimedLong(tm, n),
+        basic.TimedFloat(tm, shorts[0] / 4),
+        basic.TimedDouble(tm, n / 4),
+        basic.TimedOctetSeq(tm, octets),
+        basic.TimedShortSeq(tm, shorts),
+        basic.TimedLongSeq(tm, tuple(range(n, n + LENGTH))),
+        basic.TimedFloatSeq(tm, tuple(k / 4 for k in shorts)),
+        basic.TimedDoubleSeq(tm, tuple(k / 4 for k in range(n, n + LENGTH))),
+    )

@@ -1,1 +1,0 @@
-"""Configuration sets, parameters and their constraints (OMG SDO)."""

@@ -1,0 +1,54 @@
+"""Codes and states of OMG RTC 1.0 with the numbers of its IDL, and what refuses with them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ReturnCode(IntEnum):
+    """What an operation or a callback returns (ReturnCode_t)."""
+
+    RTC_OK = 0
+    RTC_ERROR = 1
+    BAD_PARAMETER = 2
+    UNSUPPORTED = 3
+    OUT_OF_RESOURCES = 4
+    PRECONDITION_NOT_MET = 5
+
+
+class LifeCycleState(IntEnum):
+    """State of a component in an execution context (LifeCycleState)."""
+
+    CREATED = 0
+    INACTIVE = 1
+    ACTIVE = 2
+    ERROR = 3
+
+
+class ExecutionKind(IntEnum):
+    """What an execution context runs its components on (ExecutionKind)."""
+
+    PERIODIC = 0
+    EVENT_DRIVEN = 1
+    OTHER = 2
+
+
+class RtcRefused(ValueError):  # noqa: N818 - what the model did
+    """An operation on components, ports or connectors that cannot be.
+
+    Attributes:
+        code: what OMG RTC returns for it.
+    """
+
+    def __init__(self, message: str, code: ReturnCode = ReturnCode.BAD_PARAMETER) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class PortStatus(IntEnum):
+    """Result of a write (OpenRTM-aist 1.x, DataPortStatus); what cannot come is left out."""
+
+    PORT_OK = 0
+    BUFFER_FULL = 3
+    BUFFER_TIMEOUT = 5
+    INVALID_ARGS = 10
