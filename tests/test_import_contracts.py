@@ -14,6 +14,11 @@ VIOLATIONS = {
     "wire does I/O": ("wire/errors.py", "import os"),
     "device knows the host": ("device/core.py", "import tickrig.host.links.link"),
     "host knows the device": ("host/links/link.py", "import tickrig.device.core"),
+    "host knows an emulator by its public name": ("host/links/link.py", "from tickrig import Rig"),
+    "the door of devices leads to the host": (
+        "device/__init__.py",
+        "import tickrig.host.links.link",
+    ),
     "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.rig.clock"),
 }
 
@@ -47,7 +52,7 @@ def test_a_seeded_violation_breaks_a_contract(name: str, tmp_path: Path) -> None
     path, line = VIOLATIONS[name]
     module = copied(tmp_path) / "tickrig" / path
     source = module.read_text("utf-8")
-    module.write_text(source.replace("import annotations\n", f"import annotations\n{line}\n", 1))
+    module.write_text(f"{source}\n{line}\n")
     done = lint(tmp_path)
     assert done.returncode != 0
     assert "broken" in done.stdout.lower()

@@ -22,7 +22,7 @@ MADE = {"__pycache__", "tickrig.egg-info"}
 QUICK = (
     "tests/wire/rrc",
     "tests/device/canopen/nmt",
-    "tests/host/test_rrc_drive.py",
+    "tests/host/rrc",
     "tests/emulators/record",
     "tests/test_rooms.py",
     "tests/test_docs.py::test_every_link_and_named_test_is_there",

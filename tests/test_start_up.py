@@ -66,7 +66,7 @@ def test_a_command_imports_what_it_needs(imported: dict[str, list[str]], line: s
     assert packages - sys.stdlib_module_names <= {"tickrig", "click"}
     assert not packages & SLOW
     assert "tickrig ctl" not in line or "pathlib" not in packages
-    ours = [name for name in names if name.startswith("tickrig")]
+    ours = [name for name in names if name.startswith("tickrig.")]
     assert len(ours) <= MOST[line], ours
 
 

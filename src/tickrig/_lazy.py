@@ -1,0 +1,32 @@
+"""Names of a package that are imported when somebody asks for them (PEP 562)."""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False  # as typing has it: importing typing would take longer than all else here
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+
+def lazy(
+    package: str, modules: Mapping[str, str]
+) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
+    """Make a package offer names of modules that are not imported yet.
+
+    Args:
+        package: its name, for the message about a name that it has not.
+        modules: the module of each name.
+
+    Returns:
+        Its `__all__`, `__getattr__` and `__dir__`.
+    """
+
+    def find(name: str) -> object:
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        from importlib import import_module  # noqa: PLC0415 - not before it is needed
+
+        found: object = getattr(import_module(modules[name]), name)
+        return found
+
+    names = sorted(modules)
+    return names, find, names.copy

@@ -1,0 +1,74 @@
+"""The five places that users import from: their names, and that nothing else is needed."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections import Counter
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.testing")
+NAMES = {name: place for place in PLACES for name in import_module(place).__all__}
+DEFINED = Counter(
+    node.name
+    for floor in ("wire", "device", "host", "emulators")
+    for path in (ROOT / floor).rglob("*.py")
+    for node in ast.walk(ast.parse(path.read_text("utf-8")))
+    if isinstance(node, ast.ClassDef | ast.FunctionDef)
+)
+MEANT_THRICE = {"InPort", "OutPort"}
+"""Names that the component models of two devices have too."""
+
+
+def typed_names(place: str) -> dict[str, str]:
+    """Return what type checkers see: names, and the modules that they come from."""
+    file = import_module(place).__file__
+    assert file is not None
+    return {
+        name.name: str(node.module)
+        for node in ast.walk(ast.parse(Path(file).read_text("utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module != "tickrig._lazy"
+        for name in node.names
+    }
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_place_offers_at_run_time_what_type_checkers_see(place: str) -> None:
+    module = import_module(place)
+    typed = typed_names(place)
+    assert sorted(typed) == module.__all__
+    assert set(module.__all__) <= set(dir(module))
+    for name, path in typed.items():
+        assert getattr(module, name) is getattr(import_module(path), name)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_name_that_a_place_has_not_is_an_attribute_error(place: str) -> None:
+    with pytest.raises(AttributeError, match=f"module '{place}' has no attribute 'nothing'"):
+        import_module(place).nothing  # noqa: B018 - that it raises
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_place_imports_nothing_before_a_name_is_asked_for(place: str) -> None:
+    program = f"import sys; old = {{*sys.modules}}; import {place}; print(*{{*sys.modules}} - old)"
+    words = [sys.executable, "-S", "-c", program]
+    said = subprocess.check_output(words, text=True, env={"PYTHONPATH": str(ROOT / "src")})
+    assert {*said.split()} - {"__future__"} == {"tickrig", "tickrig._lazy", place}
+
+
+def test_what_is_public_is_what_the_file_says() -> None:
+    words = [sys.executable, str(ROOT / "tools" / "api")]
+    found = subprocess.check_output(words, text=True).splitlines()
+    listed = (ROOT / "tests" / "api.txt").read_text("utf-8").splitlines()
+    assert [line for line in listed if line not in found] == [], "gone: this breaks programs"
+    assert found == listed, "new: tools/api --renew"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_public_name_means_one_thing(name: str) -> None:
+    assert DEFINED[name] <= (3 if name in MEANT_THRICE else 1)
