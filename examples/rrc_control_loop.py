@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def main(url: str) -> None:
     """Wait for the power button, then close the loop over the host once a status line."""
     with RrcClient.open(url) as client:
         print("press the power button", flush=True)
-        client.wait_for(EventKind.POWER_ON_SUCCESS, timeout_us=60_000_000)
+        client.wait_for(RrcEvent.POWER_ON_SUCCESS, timeout_us=60_000_000)
         client.stablemode()  # the manual demands both, stablemode and watchdog
         client.watchdog(100_000)
         client.status()

@@ -7,7 +7,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def main() -> None:
@@ -17,7 +17,7 @@ def main() -> None:
     with RrcClient(SimLink(rig, line.b)) as client:
         client.start()
         rrc.inputs.set("power_button", 1)
-        client.wait_for(EventKind.POWER_ON_SUCCESS, timeout_us=1_000_000)
+        client.wait_for(RrcEvent.POWER_ON_SUCCESS, timeout_us=1_000_000)
         client.stablemode()
         client.watchdog(200_000)
         client.drive_by_host(v_pct=30, w_pct=0)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.host.live import live_rrc, pty
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "tests/hil/README.md"])
@@ -50,7 +50,7 @@ def test_the_host_program_of_the_rrc_page_runs() -> None:
     with pty() as port, live_rrc(port) as rrc:
         with RrcClient.open(port.path) as client:
             rrc.set("power_button", 1)
-            client.wait_for(EventKind.POWER_ON_SUCCESS, 3_000_000)
+            client.wait_for(RrcEvent.POWER_ON_SUCCESS, 3_000_000)
         exec(compile(program.replace("/tmp/rrc", port.path), "docs/rrc.md", "exec"), {})
         assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tickrig.device.twin import Immutable
-from tickrig.wire.rrc.replies import POWER_ON_TRIGGER, EventKind
+from tickrig.wire.rrc.replies import POWER_ON_TRIGGER, RrcEvent
 
 
 class FailTarget(Enum):
@@ -56,7 +56,7 @@ class RrcConfig(Immutable):
 
     def __post_init__(self) -> None:
         """Refuse what no RRC could be."""
-        names = (POWER_ON_TRIGGER, EventKind.POWER_ON.value)
+        names = (POWER_ON_TRIGGER, RrcEvent.POWER_ON.value)
         if self.power_on_event not in names:
             raise ValueError(f"power-on event {self.power_on_event!r} is none of {names}")
         for name in (

@@ -20,7 +20,7 @@ from tickrig.device.rrc.terminals import OUTPUTS, new_inputs
 from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, EventKind, Ok, Refusal, Text
+from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, Ok, Refusal, RrcEvent, Text
 from tickrig.wire.rrc.replies import StatusA as Status
 
 TICK_US: Final = 10_000
@@ -207,7 +207,7 @@ class Rrc(Copyable):
             case cmd.Date():
                 self._reply(Text(self.config.date))
             case cmd.PowerOff():
-                self._sent.append(Event(EventKind.BY_HOST).encode())
+                self._sent.append(Event(RrcEvent.BY_HOST).encode())
             case _:
                 return
 
@@ -215,9 +215,9 @@ class Rrc(Copyable):
         """Trip the watchdog (DECISION R20)."""
         ticks = self._settings.watchdog_ticks
         if ticks and self.state in POWERED_ON and tick - self._renewed >= ticks:
-            self._stop_by_force(EventKind.BY_WATCHDOG, tick)
+            self._stop_by_force(RrcEvent.BY_WATCHDOG, tick)
 
-    def _stop_by_force(self, cause: EventKind, tick: int) -> None:
+    def _stop_by_force(self, cause: RrcEvent, tick: int) -> None:
         self._move(Move.FORCED, tick)
         self._sent.append(Event(cause).encode())
 
@@ -229,7 +229,7 @@ class Rrc(Copyable):
         extra_pct = self.inputs["extra_load_pct"]
         self._load.spend(self._commands, self._replies, status=status, extra_pct=extra_pct)
         if self.config.overtime and self._load.too_far_behind and self.state in POWERED_ON:
-            self._stop_by_force(EventKind.BY_OVER_TIME, tick)
+            self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
 
     def _status(self) -> Status:
         settings, inputs = self._settings, self.inputs

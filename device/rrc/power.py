@@ -10,7 +10,7 @@ from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.states import POWERED_ON, Move, RrcState
 from tickrig.device.rrc.terminals import POWER_ON_FAULTS, RUNNING_FAULTS
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 class Step(NamedTuple):
@@ -65,7 +65,7 @@ class PowerSequence:
 
     def _running(self, tick: int, inputs: InputBank, *, pressed: bool) -> Step:
         if pressed:
-            return Step(EventKind.BY_BUTTON, Move.POWER_BUTTON)
+            return Step(RrcEvent.BY_BUTTON, Move.POWER_BUTTON)
         for name, event in RUNNING_FAULTS.items():
             if not inputs[name]:
                 self._faults.pop(name, None)
@@ -94,24 +94,24 @@ class PowerSequence:
             return NOTHING
         match state:
             case RrcState.INITIALIZE:
-                return Step(EventKind.INITIALIZED, Move.INITIALIZED)
+                return Step(RrcEvent.INITIALIZED, Move.INITIALIZED)
             case RrcState.WAIT_POWER_ON:
                 return self._power_on_result(waited, inputs)
             case _:
-                return Step(EventKind.POWER_OFF_FINISHED, Move.TRAFFIC_ENDED)
+                return Step(RrcEvent.POWER_OFF_FINISHED, Move.TRAFFIC_ENDED)
 
     def _power_on_result(self, waited: int, inputs: InputBank) -> Step:
         if inputs["bus_unplugged"]:
             if waited < self.config.power_on_timeout_ticks:
                 return NOTHING
-            return self._power_on_failed(EventKind.POWER_ON_TIMEOUT)
+            return self._power_on_failed(RrcEvent.POWER_ON_TIMEOUT)
         for name, event in POWER_ON_FAULTS.items():
             if inputs[name]:
                 return self._power_on_failed(event)
         self._since = None
-        return Step(EventKind.POWER_ON_SUCCESS, Move.POWER_ON_SUCCEEDED)
+        return Step(RrcEvent.POWER_ON_SUCCESS, Move.POWER_ON_SUCCEEDED)
 
-    def _power_on_failed(self, event: EventKind) -> Step:
+    def _power_on_failed(self, event: RrcEvent) -> Step:
         self._since = None
         again = self.config.power_on_fail_target is FailTarget.INITIALIZE
         return Step(event, Move.POWER_ON_FAILED if again else None)

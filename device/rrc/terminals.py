@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.device.physical import Input, InputBank, Output, SignalType
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 BUTTON: Final = SignalType.BUTTON
 FAULT: Final = SignalType.FAULT
@@ -28,19 +28,19 @@ INPUTS: Final = (
 )
 
 RUNNING_FAULTS: Final = {
-    "bus_noise": EventKind.BY_COMMUNICATION_ERROR,
-    "joystick_fault": EventKind.BY_JOYSTICK_MODULE_ERROR,
-    "power_module_fault": EventKind.BY_POWER_MODULE_ERROR,
-    "vr2_fault": EventKind.BY_SYSTEM_ERROR,
-    "bus_unplugged": EventKind.BY_NO_COMMUNICATION,
+    "bus_noise": RrcEvent.BY_COMMUNICATION_ERROR,
+    "joystick_fault": RrcEvent.BY_JOYSTICK_MODULE_ERROR,
+    "power_module_fault": RrcEvent.BY_POWER_MODULE_ERROR,
+    "vr2_fault": RrcEvent.BY_SYSTEM_ERROR,
+    "bus_unplugged": RrcEvent.BY_NO_COMMUNICATION,
 }
 """What each fault is called once it has lasted (condition 8, DECISION R25)."""
 
 POWER_ON_FAULTS: Final = {
-    "bus_noise": EventKind.POWER_ON_ERROR1,
-    "joystick_fault": EventKind.POWER_ON_ERROR1,
-    "power_module_fault": EventKind.POWER_ON_ERROR2,
-    "vr2_fault": EventKind.POWER_ON_ERROR2,
+    "bus_noise": RrcEvent.POWER_ON_ERROR1,
+    "joystick_fault": RrcEvent.POWER_ON_ERROR1,
+    "power_module_fault": RrcEvent.POWER_ON_ERROR2,
+    "vr2_fault": RrcEvent.POWER_ON_ERROR2,
 }
 """What each fault does to a power-on. The manual names two causes without saying which."""
 

@@ -12,7 +12,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 Echo = Callable[[str], None]
 
@@ -120,7 +120,7 @@ def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo
         rrc.command(sample.command)
     yield "The operator switches VR2 off and on again."
     hand.ask("press", name="power_button")
-    rrc.wait_for(EventKind.INITIALIZED, 2_000_000)
+    rrc.wait_for(RrcEvent.INITIALIZED, 2_000_000)
     rrc.run_for(300_000)
     _switch_on(rrc, hand)
     yield "Output mode: the slowest speed mode first, then 30 % forward; the status shows it (1E)."
@@ -138,4 +138,4 @@ def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo
 
 def _switch_on(rrc: RrcClient, hand: ControlClient) -> None:
     hand.ask("press", name="power_button")
-    rrc.wait_for(EventKind.POWER_ON_SUCCESS, 2_000_000)
+    rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, 2_000_000)

@@ -13,7 +13,7 @@ from tickrig.host.rrc.reply_matcher import OnRefusals, ReplyMatcher
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
-from tickrig.wire.rrc.replies import Event, EventKind, Ok, Refusal
+from tickrig.wire.rrc.replies import Event, Ok, Refusal, RrcEvent
 
 LINE_US: Final = 5_000
 """The RRC's time for a line in either direction: about two in 10 ms (RRC manual, notes)."""
@@ -24,7 +24,7 @@ PERIOD_US: Final = 10_000
 RENEWALS: Final = 3
 """The watchdog is renewed this many times in its time: one renewal may be lost."""
 
-FORGETTING: Final = (EventKind.POWER_OFF_FINISHED, EventKind.INITIALIZED)
+FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
 """Events after which the RRC has none of its settings (RRC manual, notes)."""
 
 _log = log_of(__name__)

@@ -16,7 +16,7 @@ from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.commands import Command
-from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, EventKind, StatusA
+from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
 
 TIMEOUT_US: Final = 200_000
 SETTLE_US: Final = 100_000
@@ -192,7 +192,7 @@ class RrcClient:
         """Give status lines, the oldest untaken one first; end when none came for `timeout_us`."""
         return self._drain(self._inbox.statuses, timeout_us)
 
-    def wait_for(self, kind: EventKind, timeout_us: int) -> Arrival[Event]:
+    def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
         """Take events up to the first of this kind; one that came before the call counts.
 
         Raises:

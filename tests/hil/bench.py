@@ -24,7 +24,7 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import VERSION
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind, StatusA
+from tickrig.wire.rrc.replies import RrcEvent, StatusA
 
 QUICK = RrcConfig(power_on_ticks=5, button_off_ticks=5)
 """An RRC that does not keep the real-time tests waiting."""
@@ -87,12 +87,12 @@ class Bench:
     def switch_on(self) -> None:
         """Bring VR2 on."""
         self.operator.press("power_button")
-        self.client.wait_for(EventKind.POWER_ON_SUCCESS, PATIENCE_US)
+        self.client.wait_for(RrcEvent.POWER_ON_SUCCESS, PATIENCE_US)
 
     def switch_off(self) -> None:
         """Bring VR2 off in the regular way."""
         self.operator.press("power_button")
-        self.client.wait_for(EventKind.INITIALIZED, PATIENCE_US)
+        self.client.wait_for(RrcEvent.INITIALIZED, PATIENCE_US)
 
     def sent(self, sample: bytes, check: bytes) -> bool:
         """Whether this sample of the manual was sent, with CHECK if that is wanted."""

@@ -6,13 +6,13 @@ import pytest
 
 from tests.hil.bench import PATIENCE_US, Bench
 from tickrig.wire.rrc.commands import Joystick
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_the_power_button_brings_vr2_on(bench: Bench) -> None:
     bench.operator.press("power_button")
-    on = bench.client.wait_for(EventKind.POWER_ON, PATIENCE_US)
-    success = bench.client.wait_for(EventKind.POWER_ON_SUCCESS, PATIENCE_US)
+    on = bench.client.wait_for(RrcEvent.POWER_ON, PATIENCE_US)
+    success = bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, PATIENCE_US)
     assert on.at_us <= success.at_us
     assert bench.operator.sees_motion(0, 0)
 
@@ -90,7 +90,7 @@ def test_watchdog_stops_vr2_after_1_s_of_silence(ready: Bench) -> None:
     assert ready.sent(b"watchdog64", b"B")
     last_us, _ = ready.link.sent[-1]
     ready.hang()
-    trip = ready.client.wait_for(EventKind.BY_WATCHDOG, PATIENCE_US)
+    trip = ready.client.wait_for(RrcEvent.BY_WATCHDOG, PATIENCE_US)
     assert 990_000 <= trip.at_us - last_us <= 1_030_000 + ready.time_us
     assert ready.operator.sees_error()
 
@@ -116,7 +116,7 @@ def test_stablemode_wants_check_and_leaves_out_ok(standby: Bench) -> None:
 def test_poweroff_stops_vr2(ready: Bench) -> None:
     ready.client.output(30, 0)
     ready.client.poweroff()
-    ready.client.wait_for(EventKind.BY_HOST, PATIENCE_US)
+    ready.client.wait_for(RrcEvent.BY_HOST, PATIENCE_US)
     assert ready.operator.sees_motion(0, 0)
     assert ready.operator.sees_error()
     assert ready.sent(b"poweroff", b"8")

@@ -6,7 +6,7 @@ import pytest
 
 from tests.hil.bench import PATIENCE_US, Bench
 from tickrig.host.rrc import RrcRefused, RrcStopped
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 WATCHDOG_US = 300_000
 
@@ -29,7 +29,7 @@ def stream(bench: Bench) -> None:
 def test_a_host_that_hangs_stops_the_motors(standby: Bench) -> None:
     drive(standby)
     standby.hang()
-    standby.client.wait_for(EventKind.BY_WATCHDOG, WATCHDOG_US + 50_000 + standby.time_us)
+    standby.client.wait_for(RrcEvent.BY_WATCHDOG, WATCHDOG_US + 50_000 + standby.time_us)
     assert standby.operator.sees_motion(0, 0)
     assert standby.operator.sees_error()
 
@@ -45,7 +45,7 @@ def test_commands_in_error_do_not_renew_the_watchdog(standby: Bench) -> None:
     standby.link.spoil = lambda line: b"?" + line
     with pytest.raises(RrcStopped, match="CommandChecksum"):
         standby.client.run_for(PATIENCE_US)
-    standby.client.wait_for(EventKind.BY_WATCHDOG, WATCHDOG_US + 50_000 + standby.time_us)
+    standby.client.wait_for(RrcEvent.BY_WATCHDOG, WATCHDOG_US + 50_000 + standby.time_us)
     assert standby.operator.sees_motion(0, 0)
 
 
@@ -54,7 +54,7 @@ def test_three_checksum_errors_in_a_row_power_vr2_off(standby: Bench) -> None:
     standby.link.spoil = lambda line: line.replace(b"output1e00", b"output1e01")
     with pytest.raises(RrcStopped):
         stream(standby)
-    standby.client.wait_for(EventKind.BY_HOST, 50_000 + standby.time_us)
+    standby.client.wait_for(RrcEvent.BY_HOST, 50_000 + standby.time_us)
     assert standby.operator.sees_motion(0, 0)
 
 
@@ -77,8 +77,8 @@ def test_nothing_drives_before_vr2_is_on(bench: Bench) -> None:
 def test_the_power_button_stops_the_motors(standby: Bench) -> None:
     drive(standby)
     standby.operator.press("power_button")
-    standby.client.wait_for(EventKind.BY_BUTTON, PATIENCE_US)
-    standby.client.wait_for(EventKind.POWER_OFF_FINISHED, PATIENCE_US)
+    standby.client.wait_for(RrcEvent.BY_BUTTON, PATIENCE_US)
+    standby.client.wait_for(RrcEvent.POWER_OFF_FINISHED, PATIENCE_US)
     assert standby.operator.sees_motion(0, 0)
     assert not standby.operator.sees_error()
 
@@ -87,7 +87,7 @@ def test_a_power_cycle_after_a_forced_stop_begins_afresh(standby: Bench) -> None
     drive(standby)
     standby.client.speedmode(5)
     standby.client.poweroff()
-    standby.client.wait_for(EventKind.BY_HOST, PATIENCE_US)
+    standby.client.wait_for(RrcEvent.BY_HOST, PATIENCE_US)
     standby.switch_off()
     assert (standby.client.stable, standby.client.watchdog_us) == (False, 0)
     standby.switch_on()
@@ -100,7 +100,7 @@ def test_a_power_cycle_after_a_forced_stop_begins_afresh(standby: Bench) -> None
 def test_a_power_cut_of_the_rrc_stops_the_motors(standby: Bench) -> None:
     drive(standby)
     standby.operator.cut_power()
-    standby.client.wait_for(EventKind.INITIALIZED, PATIENCE_US)
+    standby.client.wait_for(RrcEvent.INITIALIZED, PATIENCE_US)
     assert standby.operator.sees_motion(0, 0)
     assert not standby.client.stable
 
@@ -108,7 +108,7 @@ def test_a_power_cut_of_the_rrc_stops_the_motors(standby: Bench) -> None:
 def test_too_much_work_stops_the_motors(standby: Bench) -> None:
     drive(standby)
     standby.operator.make_fault("extra_load_pct", 200)
-    standby.client.wait_for(EventKind.BY_OVER_TIME, PATIENCE_US)
+    standby.client.wait_for(RrcEvent.BY_OVER_TIME, PATIENCE_US)
     standby.operator.make_fault("extra_load_pct", 0)
     assert standby.operator.sees_motion(0, 0)
 
@@ -116,14 +116,14 @@ def test_too_much_work_stops_the_motors(standby: Bench) -> None:
 @pytest.mark.parametrize(
     ("fault", "event"),
     [
-        ("bus_noise", EventKind.BY_COMMUNICATION_ERROR),
-        ("joystick_fault", EventKind.BY_JOYSTICK_MODULE_ERROR),
-        ("power_module_fault", EventKind.BY_POWER_MODULE_ERROR),
-        ("vr2_fault", EventKind.BY_SYSTEM_ERROR),
-        ("bus_unplugged", EventKind.BY_NO_COMMUNICATION),
+        ("bus_noise", RrcEvent.BY_COMMUNICATION_ERROR),
+        ("joystick_fault", RrcEvent.BY_JOYSTICK_MODULE_ERROR),
+        ("power_module_fault", RrcEvent.BY_POWER_MODULE_ERROR),
+        ("vr2_fault", RrcEvent.BY_SYSTEM_ERROR),
+        ("bus_unplugged", RrcEvent.BY_NO_COMMUNICATION),
     ],
 )
-def test_a_fault_of_vr2_stops_the_motors(standby: Bench, fault: str, event: EventKind) -> None:
+def test_a_fault_of_vr2_stops_the_motors(standby: Bench, fault: str, event: RrcEvent) -> None:
     drive(standby)
     standby.operator.make_fault(fault)
     standby.client.wait_for(event, PATIENCE_US)

@@ -4,7 +4,7 @@
 >>> status.in_v_pct, status.out_v_pct, status.gauge
 (100, 50, 10)
 >>> parse_reply(b"EV:PowerOnTrigger").kind
-<EventKind.POWER_ON: 'PowerOn'>
+<RrcEvent.POWER_ON: 'PowerOn'>
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ COMMAND_UNKNOWN: Final = "CommandUnknown"
 RECEIVE_BUFFER_OVERFLOW: Final = "ReceiveBufferOverflow"
 
 
-class EventKind(StrEnum):
+class RrcEvent(StrEnum):
     """The 16 events of the manual."""
 
     INITIALIZED = "Initialized"
@@ -76,12 +76,12 @@ class Event:
     name: str
 
     @property
-    def kind(self) -> EventKind | None:
+    def kind(self) -> RrcEvent | None:
         """Which of the manual's events this is; None for one it does not list."""
         if self.name == POWER_ON_TRIGGER:
-            return EventKind.POWER_ON
+            return RrcEvent.POWER_ON
         try:
-            return EventKind(self.name)
+            return RrcEvent(self.name)
         except ValueError:
             return None
 

@@ -34,7 +34,7 @@ from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 DESCRIPTION = read_eds(Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds")
 TO_US = 4_000_000
@@ -125,7 +125,7 @@ def test_a_button_pressed_beside_a_client_is_released() -> None:
     client = RrcClient(SimLink(emulator.rig, emulator.host_end))
     client.start()
     emulator.operator.press(emulator.effective_us, "power_button", 300_000)
-    client.wait_for(EventKind.POWER_ON_SUCCESS, 5_000_000)
+    client.wait_for(RrcEvent.POWER_ON_SUCCESS, 5_000_000)
     client.run_for(300_000)
     assert rrc.inputs["power_button"] == 0
 

@@ -15,7 +15,7 @@ from tests.host.live import LiveRrc, Rfc2217Port, TcpPort, live_rrc, pty
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_a_loop_gives_back_what_was_sent() -> None:
@@ -118,7 +118,7 @@ def test_the_client_works_on_a_serial_server_of_rfc_2217() -> None:
 def test_status_lines_are_whole_on_a_socket() -> None:
     with socket_client() as (client, rrc):
         rrc.set("power_button", 1)
-        client.wait_for(EventKind.POWER_ON_SUCCESS, 3_000_000)
+        client.wait_for(RrcEvent.POWER_ON_SUCCESS, 3_000_000)
         client.status()
         assert len(list(islice(client.statuses(100_000), 50))) == 50
         assert not client.unknown
@@ -137,7 +137,7 @@ def socket_client() -> Iterator[tuple[RrcClient, LiveRrc]]:
 def drive_forward(client: RrcClient, rrc: LiveRrc) -> None:
     """Switch VR2 on, set up what safe driving needs, drive for longer than the watchdog."""
     rrc.set("power_button", 1)
-    client.wait_for(EventKind.POWER_ON_SUCCESS, 3_000_000)
+    client.wait_for(RrcEvent.POWER_ON_SUCCESS, 3_000_000)
     client.stablemode()
     client.watchdog(200_000)
     client.output(30, 0, confirm=True)
@@ -167,7 +167,7 @@ CALLS: list[Callable[[RrcClient], object]] = [
     lambda client: client.run_for(1_000_000),
     lambda client: list(client.events(1_000_000)),
     lambda client: list(client.statuses(1_000_000)),
-    lambda client: client.wait_for(EventKind.INITIALIZED, 1_000_000),
+    lambda client: client.wait_for(RrcEvent.INITIALIZED, 1_000_000),
     lambda client: client.device(),
     lambda client: client.start(),
 ]

@@ -4,7 +4,7 @@ import pytest
 
 from tests.host.rigs import powered_off_bench, standby_bench
 from tickrig.host.rrc import RrcRefused
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_the_slowest_speed_mode_comes_before_a_change_of_the_driver() -> None:
@@ -42,9 +42,9 @@ def test_after_a_power_cycle_the_driver_is_unknown() -> None:
     bench = standby_bench()
     bench.client.drive_by_host(30, 0)
     bench.press_power()
-    bench.client.wait_for(EventKind.INITIALIZED, 1_000_000)
+    bench.client.wait_for(RrcEvent.INITIALIZED, 1_000_000)
     bench.press_power()
-    bench.client.wait_for(EventKind.POWER_ON_SUCCESS, 1_000_000)
+    bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, 1_000_000)
     bench.link.sent.clear()
     bench.client.drive_by_host(30, 0)
     assert bench.link.lines == [b"speedmode10", b"output1e00"]

@@ -7,14 +7,14 @@ import pytest
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import Arrival, RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_events_come_in_order_until_none_comes_in_time() -> None:
     bench = powered_off_bench()
     bench.press_power()
     kinds = [arrival.value.kind for arrival in bench.client.events(500_000)]
-    assert kinds == [EventKind.POWER_ON, EventKind.POWER_ON_SUCCESS]
+    assert kinds == [RrcEvent.POWER_ON, RrcEvent.POWER_ON_SUCCESS]
 
 
 def test_an_event_carries_the_time_it_arrived() -> None:
@@ -28,7 +28,7 @@ def test_an_event_carries_the_time_it_arrived() -> None:
 def test_both_names_of_the_power_on_event_are_one(name: bytes) -> None:
     link = ScriptedLink()
     link.comes(5_000, b"EV:" + name + b"\n")
-    arrival = RrcClient(link).wait_for(EventKind.POWER_ON, 10_000)
+    arrival = RrcClient(link).wait_for(RrcEvent.POWER_ON, 10_000)
     assert arrival.value.name == name.decode()
 
 
@@ -36,13 +36,13 @@ def test_an_event_that_came_during_a_command_is_not_lost() -> None:
     bench = standby_bench()
     bench.client.poweroff()
     before_us = bench.client.now_us
-    assert bench.client.wait_for(EventKind.BY_HOST, 1_000_000).at_us <= before_us
+    assert bench.client.wait_for(RrcEvent.BY_HOST, 1_000_000).at_us <= before_us
 
 
 def test_wait_for_takes_the_events_before_it() -> None:
     bench = powered_off_bench()
     bench.press_power()
-    bench.client.wait_for(EventKind.POWER_ON_SUCCESS, 500_000)
+    bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, 500_000)
     assert list(bench.client.events(0)) == []
 
 
@@ -50,8 +50,8 @@ def test_an_event_that_does_not_come_is_a_timeout_that_says_which_came() -> None
     bench = powered_off_bench()
     bench.press_power()
     with pytest.raises(LinkTimeout, match="200 ms for EV:PowerOffFinished; PowerOnTrigger came"):
-        bench.client.wait_for(EventKind.POWER_OFF_FINISHED, 200_000)
-    bench.client.wait_for(EventKind.POWER_ON_SUCCESS, 300_000)
+        bench.client.wait_for(RrcEvent.POWER_OFF_FINISHED, 200_000)
+    bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, 300_000)
 
 
 def test_an_event_no_manual_lists_is_given_and_reported() -> None:

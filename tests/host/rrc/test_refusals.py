@@ -4,7 +4,7 @@ import pytest
 
 from tests.host.rigs import Bench, powered_off_bench, standby_bench
 from tickrig.host.rrc import OnRefusals, RrcRefused, RrcStopped
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def spoil_output(line: bytes) -> bytes:
@@ -85,7 +85,7 @@ def test_a_stopped_client_still_hears() -> None:
     with pytest.raises(RrcStopped):
         bench.client.limit(100, 100)
     bench.press_power()
-    bench.client.wait_for(EventKind.POWER_ON_SUCCESS, 1_000_000)
+    bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, 1_000_000)
 
 
 def test_the_stop_sends_poweroff() -> None:
@@ -94,7 +94,7 @@ def test_the_stop_sends_poweroff() -> None:
     bench.link.spoil = spoil_output
     with pytest.raises(RrcStopped):
         stream(bench, 10)
-    bench.client.wait_for(EventKind.BY_HOST, 100_000)
+    bench.client.wait_for(RrcEvent.BY_HOST, 100_000)
 
 
 def test_the_stop_can_be_left_to_the_watchdog() -> None:
@@ -104,7 +104,7 @@ def test_the_stop_can_be_left_to_the_watchdog() -> None:
     with pytest.raises(RrcStopped):
         stream(bench, 10)
     assert b"poweroff8" not in bench.link.lines
-    bench.client.wait_for(EventKind.BY_WATCHDOG, 300_000)
+    bench.client.wait_for(RrcEvent.BY_WATCHDOG, 300_000)
 
 
 def test_without_a_watchdog_there_is_nothing_to_leave_it_to() -> None:
@@ -112,7 +112,7 @@ def test_without_a_watchdog_there_is_nothing_to_leave_it_to() -> None:
     bench.link.spoil = spoil_output
     with pytest.raises(RrcStopped):
         stream(bench, 10)
-    bench.client.wait_for(EventKind.BY_HOST, 100_000)
+    bench.client.wait_for(RrcEvent.BY_HOST, 100_000)
 
 
 def test_a_stopped_client_may_send_poweroff() -> None:
@@ -144,9 +144,9 @@ def test_a_power_cycle_lifts_the_stop() -> None:
         bench.client.output(30, 0)
     bench.link.spoil = lambda line: line
     bench.press_power()
-    bench.client.wait_for(EventKind.INITIALIZED, 1_000_000)
+    bench.client.wait_for(RrcEvent.INITIALIZED, 1_000_000)
     bench.press_power()
-    bench.client.wait_for(EventKind.POWER_ON_SUCCESS, 1_000_000)
+    bench.client.wait_for(RrcEvent.POWER_ON_SUCCESS, 1_000_000)
     bench.client.output(30, 0)
     assert bench.state() == "Output"
 

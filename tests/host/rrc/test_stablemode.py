@@ -6,7 +6,7 @@ from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
 from tickrig.wire.rrc.commands import StableMode
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def spoiled(line: bytes) -> bytes:
@@ -116,7 +116,7 @@ def test_switching_it_on_twice_is_no_error() -> None:
 def test_a_power_cycle_of_vr2_ends_it_for_the_client_too() -> None:
     bench = standby_bench(stable=True)
     bench.press_power()
-    bench.client.wait_for(EventKind.POWER_OFF_FINISHED, 1_000_000)
+    bench.client.wait_for(RrcEvent.POWER_OFF_FINISHED, 1_000_000)
     assert not bench.client.stable
     assert bench.client.device() == "RRC"
 
@@ -126,7 +126,7 @@ def test_a_power_cycle_of_the_rrc_ends_it_for_the_client_too() -> None:
     bench.rrc.inputs.set("rrc_power", 0)
     bench.client.run_for(100_000)
     bench.rrc.inputs.set("rrc_power", 1)
-    bench.client.wait_for(EventKind.INITIALIZED, 100_000)
+    bench.client.wait_for(RrcEvent.INITIALIZED, 100_000)
     assert not bench.client.stable
 
 

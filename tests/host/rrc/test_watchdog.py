@@ -5,7 +5,7 @@ import pytest
 from tests.host.rigs import ScriptedLink, standby_bench
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import EventKind
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 @pytest.mark.parametrize("stable", [False, True])
@@ -69,7 +69,7 @@ def test_a_program_that_hangs_lets_it_trip() -> None:
     bench = standby_bench(stable=True)
     bench.client.watchdog(100_000)
     bench.rig.run_for(200_000)  # not in the client
-    bench.client.wait_for(EventKind.BY_WATCHDOG, 0)
+    bench.client.wait_for(RrcEvent.BY_WATCHDOG, 0)
     assert bench.state() == "PowerOffByOthers"
 
 
@@ -114,7 +114,7 @@ def test_the_client_stops_renewing_when_vr2_is_off() -> None:
     bench = standby_bench()
     bench.client.watchdog(100_000)
     bench.press_power()
-    bench.client.wait_for(EventKind.INITIALIZED, 1_000_000)
+    bench.client.wait_for(RrcEvent.INITIALIZED, 1_000_000)
     bench.link.sent.clear()
     bench.client.run_for(1_000_000)
     assert bench.link.sent == []

@@ -8,10 +8,10 @@ from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireErr
 from tickrig.wire.rrc.check import check_digit
 from tickrig.wire.rrc.replies import (
     Event,
-    EventKind,
     Ok,
     Refusal,
     Reply,
+    RrcEvent,
     StatusA,
     Text,
     parse_reply,
@@ -47,12 +47,12 @@ def test_noise_is_a_wire_error_or_a_reply(line: bytes) -> None:
 
 
 def test_both_names_of_power_on_are_one_event() -> None:
-    assert Event("PowerOn").kind is Event("PowerOnTrigger").kind is EventKind.POWER_ON
+    assert Event("PowerOn").kind is Event("PowerOnTrigger").kind is RrcEvent.POWER_ON
 
 
 def test_all_sixteen_events_of_the_manual_are_known() -> None:
-    assert len(EventKind) == 16
-    assert all(Event(kind.value).kind is kind for kind in EventKind)
+    assert len(RrcEvent) == 16
+    assert all(Event(kind.value).kind is kind for kind in RrcEvent)
 
 
 def test_an_event_of_a_newer_firmware_keeps_its_name() -> None:
