@@ -85,8 +85,8 @@ def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
         restore(manager, replace(system, components=made))
         proxies = there.intersection(entry.name for entry in system.components if entry.active)
         manager.activate(*sorted(proxies))
-    except ValueError as error:
-        raise Refused(f"system {options.system}: {error}") from None
+    except Exception as error:  # a constructor of somebody's component may raise anything
+        raise Refused(f"system {options.system}: {explain_error(error)}") from None
 
 
 def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:

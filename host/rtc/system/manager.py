@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from itertools import count
 from typing import Final, TypeVar
 
+from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.component_types import COMPONENT_TYPES
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
@@ -61,7 +64,8 @@ class NameService:
 class Manager(Schedule):
     """Components with their names, ports and execution contexts (OpenRTM-aist 1.x, Manager).
 
-    Not emulated: loading of modules from files, and managers that command others.
+    Not emulated: loading of modules from files, and managers that command others. Component
+    types are registered, or found by the name that an installed package gives them.
 
     Args:
         host: naming context of its components.
@@ -79,8 +83,8 @@ class Manager(Schedule):
 
     @property
     def types(self) -> tuple[str, ...]:
-        """Names of the types that can be created."""
-        return tuple(self._factories)
+        """Names of the types that can be created: registered ones, then those installed."""
+        return tuple(dict.fromkeys((*self._factories, *self._installed)))
 
     @property
     def components(self) -> tuple[RtComponent, ...]:
@@ -111,17 +115,18 @@ class Manager(Schedule):
         rate_hz: float = DEFAULT_RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> RtComponent:
-        """Create a component of a registered type, and add it; see `add`.
+        """Create a component of a type that is registered or installed, and add it; see `add`.
 
         Args:
-            type_name: as registered.
+            type_name: as registered, or as a package names it (docs/extending.md).
             instance_name: the type name with the lowest number that is free, if left out.
             rate_hz: of its own execution context.
             context: an execution context to take part in, in place of an own one.
+
+        Raises:
+            RtcRefused: no such type, one that cannot be loaded, and what `add` refuses.
         """
-        if (factory := self._factories.get(type_name)) is None:
-            known = ", ".join(self.types) or "none"
-            raise RtcRefused(f"no component type {type_name!r}; known: {known}")
+        factory = self._factories.get(type_name) or self._installed_type(type_name)
         component = factory(instance_name or self.free_name(type_name))
         return self.add(component, rate_hz, context)
 
@@ -237,6 +242,22 @@ class Manager(Schedule):
     def path(self, name: str) -> str:
         """Return the path of a component in the name service."""
         return f"{self._host}/{name}.rtc"
+
+    @cached_property
+    def _installed(self) -> tuple[str, ...]:
+        """Names of the types that installed packages have, ours first."""
+        return tuple(COMPONENT_TYPES.names())
+
+    def _installed_type(self, name: str) -> type[RtComponent]:
+        if name not in self._installed:
+            raise RtcRefused(f"no component type {name!r}; known: {', '.join(self.types)}")
+        try:
+            found = COMPONENT_TYPES.load(name)
+        except ExtensionError as error:
+            raise RtcRefused(str(error)) from error
+        if found.spec.type_name != name:
+            raise RtcRefused(f"component type {name!r} calls itself {found.spec.type_name!r}")
+        return found
 
     def _demand(self, code: ReturnCode, name: str, what: str) -> None:
         if code is not ReturnCode.RTC_OK:

@@ -92,7 +92,7 @@ def test_what_is_not_there_is_refused_with_what_is() -> None:
         (chain.manager.port, "ConsoleIn0.in", "known: out"),
         (chain.manager.create, "Console", "ConsoleIn, ConsoleOut"),
         (Manager().find, "A0", "known: none"),
-        (Manager().create, "A", "known: none"),
+        (Manager().create, "A", "known: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample"),
     ):
         with pytest.raises(RtcRefused, match=known):
             ask(name)

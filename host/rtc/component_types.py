@@ -1,0 +1,32 @@
+"""Component types that a manager finds by name: ours, and those of installed packages."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.cli.extensions import ExtensionGroup
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+
+_HERE: Final = "tickrig.host.rtc.components"
+
+
+def is_component_type(found: object) -> bool:
+    """Return whether this is a class of components, one that can be registered."""
+    return (
+        isinstance(found, type)
+        and issubclass(found, RtComponent)
+        and isinstance(getattr(found, "spec", None), ModuleSpec)
+    )
+
+
+COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
+    "tickrig.components",
+    "component type",
+    {
+        name: f"{_HERE}:{name}"
+        for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
+    },
+    is_component_type,
+    "an RtComponent with a spec",
+)
+"""The entry-point group `tickrig.components` (docs/extending.md)."""
