@@ -15,6 +15,7 @@ from tickrig.host.control.requests import Object
 from tickrig.host.text.values import format_time, parse_setting
 
 EMULATOR: Final = "emulator"
+SERVER: Final = "server"
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 
@@ -114,6 +115,15 @@ def status(socket: str, as_json: bool) -> None:
 
 
 @ctl.command()
+@click.argument("node", type=click.IntRange(1, 127))
+@as_json
+@click.pass_obj
+def restart(socket: str, node: int, as_json: bool) -> None:
+    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
+    _show(ask(socket, SERVER, "restart", node=node), _nothing, as_json)
+
+
+@ctl.command()
 @as_json
 @click.pass_obj
 def stop(socket: str, as_json: bool) -> None:
@@ -140,10 +150,16 @@ def _lines(answer: Any) -> list[str]:
 
 def _status(answer: Any) -> list[str]:
     fields = {name: value for name, value in answer.items() if name not in ("v", "ok")}
-    return [f"{name} {value}".rstrip() for name, value in fields.items()]
+    nodes = fields.pop("nodes", [])
+    return [f"{name} {value}".rstrip() for name, value in fields.items()] + [
+        " ".join(f"{name} {value}" for name, value in node.items() if value not in ("", None))
+        for node in nodes
+    ]
 
 
 def _describe(answer: Any) -> list[str]:
+    if "components" in answer:  # a system of RT components, or a server that has one
+        return [f"{x['name']} {x['type']} {x['state']}" for x in answer["components"]]
     out = [f"{answer['device']}, a tick each {answer['tick_us'] / 1_000:g} ms", "", "inputs"]
     for x in answer["inputs"]:
         limits = "" if x["kind"] == "text" else f"{x['low']}..{x['high']}"

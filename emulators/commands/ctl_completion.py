@@ -18,24 +18,24 @@ Names = Callable[[Any], Iterator[str]]
 
 def buttons(told: Any) -> Iterator[str]:
     """Give what can be pressed."""
-    return (each["name"] for each in told["inputs"] if each["kind"] == "button")
+    return (each["name"] for each in told.get("inputs", ()) if each["kind"] == "button")
 
 
 def faults(told: Any) -> Iterator[str]:
     """Give faults of the wire, then of the device."""
-    yield from (each["name"] for each in told["wire_faults"])
-    yield from (each["name"] for each in told["inputs"] if each["kind"] == "fault")
+    yield from (each["name"] for each in told.get("wire_faults", ()))
+    yield from (each["name"] for each in told.get("inputs", ()) if each["kind"] == "fault")
 
 
 def settable(told: Any) -> Iterator[str]:
     """Give groups and inputs."""
-    yield from told["groups"]
-    yield from (each["name"] for each in told["inputs"])
+    yield from told.get("groups", ())
+    yield from (each["name"] for each in told.get("inputs", ()))
 
 
 def seen(told: Any) -> Iterator[str]:
     """Give inputs and outputs."""
-    yield from (each["name"] for each in [*told["inputs"], *told["outputs"]])
+    yield from (each["name"] for each in [*told.get("inputs", ()), *told.get("outputs", ())])
 
 
 def complete(names: Names) -> Complete:

@@ -7,12 +7,22 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
+from typing import Protocol
 
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.cli.start import TERMINATING
-from tickrig.host.control.clock import ServingClock
 from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.control.server import ControlServer
+
+
+class Waiting(Protocol):
+    """What waits, and may serve somebody meanwhile: a `ServingClock`, the loop of a server.
+
+    Attributes:
+        serve: called with the time in microseconds that it may take.
+    """
+
+    serve: Callable[[int], None] | None
 
 
 @contextmanager
@@ -31,15 +41,13 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 
 
 @contextmanager
-def serving_control(
-    path: Path, dispatcher: RequestDispatcher, clock: ServingClock
-) -> Iterator[None]:
+def serving_control(path: Path, dispatcher: RequestDispatcher, clock: Waiting) -> Iterator[None]:
     """Serve a control socket whenever the clock waits.
 
     Args:
         path: of the socket.
         dispatcher: answers the requests.
-        clock: what the run waits by.
+        clock: what the run waits by; it serves the socket meanwhile.
 
     Raises:
         Refused: no socket can be made there.

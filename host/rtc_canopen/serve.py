@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tickrig.host.links.link import StampedLink
+from tickrig.host.rtc.system.real_time import LATE_US, PAUSE_US
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_reader import read_definition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile, read_device_file
@@ -26,9 +27,60 @@ def serve(
         LinkClosed: the bus is gone.
     """
     while link.now_us < until_us and not done():
-        now_us, heard = link.hear(max(0, min(server.due_us, until_us) - link.now_us))
-        if sent := server.tick(now_us, heard):
-            link.send(sent)
+        _step(server, link, until_us)
+
+
+class ServerRunner:
+    """Runs a server on a link until somebody stops it.
+
+    Args:
+        server: the server.
+        link: the bus.
+
+    Attributes:
+        running: False once `stop` was called.
+        late_ticks: how many ticks began more than 1 ms after they were due.
+        worst_late_us: by how much the worst of them was late, us.
+        after_tick: told the time after each tick.
+        serve: called between the ticks with the time in us that it may take, every 20 ms
+            at least; a control socket, say.
+    """
+
+    def __init__(self, server: Server, link: StampedLink) -> None:
+        self._server, self._link = server, link
+        self.running, self.late_ticks, self.worst_late_us = True, 0, 0
+        self.after_tick: list[Callable[[int], None]] = []
+        self.serve: Callable[[int], None] | None = None
+
+    def run(self, until_us: int = NEVER) -> None:
+        """Let the server work until a time on the link's clock, or until somebody calls `stop`.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        while self.running and self._link.now_us < until_us:
+            pause_us = until_us
+            if self.serve is not None:
+                self.serve(0)
+                pause_us = min(until_us, self._link.now_us + PAUSE_US)
+            late_us = _step(self._server, self._link, pause_us)
+            self.worst_late_us = max(self.worst_late_us, late_us)
+            self.late_ticks += late_us > LATE_US
+            for listener in tuple(self.after_tick):
+                listener(self._server.now_us)
+
+    def stop(self) -> None:
+        """End `run` after the present tick."""
+        self.running = False
+
+
+def _step(server: Server, link: StampedLink, until_us: int) -> int:
+    """Wait for what is heard or due, tick the server, send; return how late that was, us."""
+    due_us = min(server.due_us, until_us)
+    now_us, heard = link.hear(max(0, due_us - link.now_us))
+    if sent := server.tick(now_us, heard):
+        link.send(sent)
+    return max(0, now_us - due_us) if due_us else 0
 
 
 def open_server(path: Path) -> Server:

@@ -211,6 +211,10 @@ class ServerView:
         """Set a node up again, one that was refused, too; its proxy is made anew."""
         self._node(node_id).boot(self._server.now_us)
 
+    def restart(self, node_id: int) -> None:
+        """Reset a node by NMT, one that was lost, too; it is Active again if it was."""
+        self._node(node_id).restart(self._server.now_us)
+
     def connect(self, first: str, second: str, properties: Mapping[str, str] | None = None) -> None:
         """Join two ports through the PC; RtcRefused if they do not fit."""
         self._server.manager.connect(first, second, properties)

@@ -13,9 +13,11 @@ from pathlib import Path
 
 import can
 import pytest
+from click.testing import CliRunner
 
 from tests.interop.buses import Bus
 from tests.interop.slave import Slave, running
+from tickrig.emulators.commands.ctl_cli import ctl
 
 pytestmark = pytest.mark.realtime
 
@@ -39,8 +41,8 @@ PATIENCE_S = 60.0
 class Server:
     """A running server, and the events that it tells."""
 
-    def __init__(self, bus: Bus, file: Path) -> None:
-        words = [str(file), *bus.arguments, "--quiet", "--log", "-"]
+    def __init__(self, bus: Bus, file: Path, *options: str) -> None:
+        words = [str(file), *bus.arguments, "--quiet", "--log", "-", *options]
         self.process = subprocess.Popen(
             [sys.executable, "-u", "-c", PROGRAM, *words],
             stdout=subprocess.PIPE,
@@ -155,3 +157,30 @@ def test_the_motor_of_fig_120_follows_though_the_server_is_killed(
     nodes.wait_for("32/0x6411:1", 16_384)
     nodes.wait_for("32/0x2001", 3)  # on, reached
     assert abs(nodes.get("32/angle_deg") - 90) < 0.1
+
+
+def test_a_node_is_restarted_by_hand_over_the_control_socket(
+    bus: Bus, nodes: Slave, tmp_path: Path
+) -> None:
+    file, socket = tmp_path / "robot.yaml", tmp_path / "robot.ctl"
+    file.write_text(DEFINITION, "utf-8")
+    server = Server(bus, file, "--control", str(socket))
+    try:
+        server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+        nodes.set("16/unplugged", 1)
+        server.wait_for("HeartbeatLost", 16)
+        nodes.set("16/unplugged", 0)
+        result = CliRunner().invoke(ctl, [str(socket), "restart", "16"])
+        assert (result.exit_code, result.output) == (0, "")
+        server.wait_for("Restarted", 16, "by hand")
+        server.wait_for("StateChanged", 16, "INACTIVE to ACTIVE")
+        status = CliRunner().invoke(ctl, [str(socket), "status"])
+        assert "node 16 name Palette0 phase ready nmt_state " in status.output
+        described = CliRunner().invoke(ctl, [str(socket), "describe"])
+        components = ["Motor0 ProxyRTC ACTIVE", "Palette0 ProxyRTC ACTIVE"]
+        assert sorted(described.output.splitlines()) == components
+        assert CliRunner().invoke(ctl, [str(socket), "stop"]).exit_code == 0
+        assert server.process.wait(PATIENCE_S) == 0
+    finally:
+        server.end(signal.SIGKILL)
+    assert not socket.exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.rtc.commands.probes import Probes
@@ -13,12 +14,34 @@ from tickrig.host.rtc.ports.literal import literal
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
-from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc.system.rts_profile import write_rts_profile
 from tickrig.host.rtc.system.system import describe
 from tickrig.host.rtc.system.system_toml import write_toml
 from tickrig.host.text.user_file import explain_error
 from tickrig.wire.instant import NEVER
+
+
+class Runner(Protocol):
+    """What runs a system: `RealTime`, or the loop of a server that has one.
+
+    Attributes:
+        after_tick: told the time after each tick.
+    """
+
+    after_tick: list[Callable[[int], None]]
+
+    @property
+    def late_ticks(self) -> int:
+        """How many ticks began late."""
+        ...
+
+    @property
+    def worst_late_us(self) -> int:
+        """By how much the worst of them was late."""
+        ...
+
+    def stop(self) -> None:
+        """End after the present tick."""
 
 
 class SystemControl(RequestDispatcher):
@@ -29,7 +52,7 @@ class SystemControl(RequestDispatcher):
         runner: who runs it.
     """
 
-    def __init__(self, manager: Manager, runner: RealTime) -> None:
+    def __init__(self, manager: Manager, runner: Runner) -> None:
         self._manager, self._runner, self._probes = manager, runner, Probes(manager)
         runner.after_tick.append(self._probes.tick)
         super().__init__(

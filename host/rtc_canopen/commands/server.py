@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,7 +12,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.start import TERMINATING
+from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
@@ -39,6 +36,7 @@ if TYPE_CHECKING:
 @component_option
 @click.option("--log", type=PATH, help="File for the events, a line of JSON each (- is stdout).")
 @click.option("--for", "span", metavar="TIME", help="End after 90s, 500ms; else at Ctrl-C.")
+@click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'.")
 @click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
 @click.option("--check", is_flag=True, help="Read FILE and its EDS files, and end.")
 @click.option("--dot", is_flag=True, help="Draw FILE as a graph for Graphviz, and end.")
@@ -55,6 +53,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     \b
     rtc-canopen-server robot.yaml
     rtc-canopen-server robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
+    rtc-canopen-server robot.yaml --control /tmp/robot.ctl
     rtc-canopen-server robot.yaml --component Logger0=parts.py:Logger
     rtc-canopen-server robot.yaml --check
     rtc-canopen-server robot.yaml --dot | dot -Tsvg -o robot.svg
@@ -70,7 +69,8 @@ def main(file: Path, span: str | None, **options: Any) -> None:
 
         click.echo(draw_on_paper(server))
         return
-    log, quiet, start = (options.pop(name) for name in ("log", "quiet", "start"))
+    names = "log", "quiet", "start", "control"
+    log, quiet, start, control = (options.pop(name) for name in names)
     with warnings_shown(), ExitStack() as stack:
         if not quiet:
             server.log.listeners.append(lambda event: click.echo(str(event), err=True))
@@ -80,7 +80,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         click.echo(f"{len(server.nodes)} nodes on {name}. Ctrl-C ends.", err=True)
         if start:
             server.start()
-        _run(server, link, span_us)
+        _run(server, link, span_us, control, name)
 
 
 def _check(file: Path, server: Server) -> None:
@@ -91,13 +91,22 @@ def _check(file: Path, server: Server) -> None:
     click.echo(f"{file}: {len(server.nodes)} nodes, no mistake found")
 
 
-def _run(server: Server, link: StampedLink, span_us: int) -> None:
-    from tickrig.host.rtc_canopen.serve import serve  # noqa: PLC0415
+def _run(server: Server, link: StampedLink, span_us: int, control: Path | None, bus: str) -> None:
+    from tickrig.host.rtc_canopen.serve import ServerRunner  # noqa: PLC0415
 
     until_us = NEVER if span_us == NEVER else link.now_us + span_us
+    runner = ServerRunner(server, link)
     try:
-        with _stopped_by_signals() as stopped:
-            serve(server, link, until_us, lambda: bool(stopped))
+        with ExitStack() as stack:
+            stack.enter_context(stopped_by_signals(runner.stop))
+            if control is not None:
+                from tickrig.host.rtc_canopen.commands.server_control import (  # noqa: PLC0415
+                    ServerControl,
+                )
+
+                requests = ServerControl(server, runner, bus)
+                stack.enter_context(serving_control(control, requests, runner))
+            runner.run(until_us)
         link.send(server.stop(link.now_us))
     except LinkClosed as error:
         raise BusFailed(str(error)) from None
@@ -108,19 +117,3 @@ def _span_us(span: str | None) -> int:
         return NEVER if span is None else parse_time_us(span)
     except ValueError as error:
         raise Refused(f"--for: {error}") from None
-
-
-@contextmanager
-def _stopped_by_signals() -> Iterator[list[int]]:
-    """Collect the signals that end a program; Ctrl-C, SIGTERM, a closed terminal."""
-    received: list[int] = []
-
-    def receive(number: int, frame: FrameType | None) -> None:
-        received.append(number)
-
-    before = {number: signal.signal(number, receive) for number in (signal.SIGINT, *TERMINATING)}
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

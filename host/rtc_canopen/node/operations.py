@@ -51,6 +51,12 @@ class Restart:
         if self.pending:
             self.forget()
 
+    def by_hand(self) -> bool:
+        """Leave it to a person who restarts it now; return whether it was lost while Active."""
+        active = self._active or self.to_activate
+        self.forget()
+        return active
+
     def take(self, now_us: int) -> str:
         """Begin a restart; return which, as `1 of 3`, or nothing if none is left."""
         active = self._active

@@ -7,6 +7,7 @@ from typing import Final, Protocol
 
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import EventKind
@@ -128,6 +129,25 @@ class ServedNode:
         self.operations.now_us = now_us
         self._boot(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._plan()
+
+    def restart(self, now_us: int) -> None:
+        """Reset the node, from whatever it is in, as somebody asks for it by hand.
+
+        Its proxy is removed; it is set up when it boots, and activated again if it was Active,
+        or lost while it was.
+        """
+        operations = self.operations
+        operations.now_us = now_us
+        was_active = operations.restart.by_hand()
+        if self.proxy is not None and self.proxy.state is not LifeCycleState.ERROR:
+            was_active = self.proxy.state is LifeCycleState.ACTIVE
+        self.to_start |= was_active
+        self._house.note(EventKind.RESTARTED, self.entry.id, "by hand")
+        self._house.gone(self)
+        self.dialogue.clear()
+        operations.begin()
+        operations.say(NmtCommand.RESET_NODE)
+        self.look(now_us)
 
     def refuse(self, problem: str) -> None:
         """Leave it as it is until it boots again."""
