@@ -20,24 +20,10 @@ ROOMS = [
 PACKAGES = sorted(name for name, path in modules().items() if path.name == "__init__.py")
 GRAPH = imports()
 # Circles that are still to be opened: who opens one takes its line away.
-MODULE_CIRCLES = [
-    [
-        "tickrig.host.monitor.logs.can_log",
-        "tickrig.host.monitor.logs.log_reader",
-    ],
-    [
-        "tickrig.host.monitor.logs.can_log_writer",
-        "tickrig.host.monitor.logs.log_writer",
-    ],
-]
+MODULE_CIRCLES: list[list[str]] = []
 ROOM_CIRCLES = {
     "tickrig.device.canopen": "bus, pdo",
     "tickrig.device.canopen.ds402": "modes, motion, objects, state",
-    "tickrig.host.canmon": "output, sources",
-    "tickrig.host.canmon.tui": "panels, settings, tasks, widgets",
-    "tickrig.host.monitor": "frames, logs, traffic",
-    "tickrig.host.monitor.logs.reading": "can_log, log_reader",
-    "tickrig.host.monitor.logs.writing": "can_log_writer, log_writer",
 }
 
 

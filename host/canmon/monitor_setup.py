@@ -10,12 +10,14 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Final, Self, TypeGuard
+from typing import TYPE_CHECKING, Any, Final, Self, TypeGuard
 
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
-from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.workspace import SettingError, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.tui.panels.panel import Panel
 
 BUS: Final = "bus"
 NODES: Final = "nodes"

@@ -12,7 +12,7 @@ from tickrig.host.canmon.output.filtered_decoder import Meant
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import log_line
-from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line
+from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
@@ -101,8 +101,6 @@ def json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     more = "" if decoded is None else _meaning_json(decoded)
     if isinstance(record, Record):
         return json_line(record, more)
-    from tickrig.host.monitor.frames.dump_line import line_json  # noqa: PLC0415 - seldom wanted
-
     return line_json(record, more)
 
 

@@ -1,7 +1,7 @@
 """What a SOURCE word names.
 
 >>> parse_source("slcan:/dev/ttyACM0@500k")
-BusWord(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None)
+BusSpec(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None)
 >>> parse_source("can0,123:7FF").chosen.passes(0x123)
 True
 >>> parse_source("serial:/dev/ttyUSB0@57600,rtc-lite").protocol

@@ -103,10 +103,10 @@ class PromptLine(Vertical):
     """Is hidden until something is asked; Enter answers, Escape does not."""
 
     DEFAULT_CSS = """
-    AskLine { display: none; height: auto; }
-    AskLine Static { height: auto; }
-    AskLine #wrong { display: none; color: $error; }
-    AskLine Input { height: 1; border: none; }
+    PromptLine { display: none; height: auto; }
+    PromptLine Static { height: auto; }
+    PromptLine #wrong { display: none; color: $error; }
+    PromptLine Input { height: 1; border: none; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "leave", show=False),

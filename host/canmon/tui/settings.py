@@ -9,11 +9,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.canmon.workspace import SettingError
 
 
@@ -72,19 +71,12 @@ def below(*path: str | int) -> Iterator[None]:
         raise SettingError(path, str(error)) from None
 
 
-def checked_bus(session: Session, settings: Mapping[str, Any]) -> str:
+def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
     """Return the bus that settings name, empty for the first; SettingError if it is not there.
 
     A log has no buses: then any name may stand there.
     """
     bus = text_of(settings, "bus", "")
-    if bus and session.buses and bus not in session.buses:
-        raise SettingError(("bus",), f"{bus!r} is none of {', '.join(session.buses)}")
+    if bus and buses and bus not in buses:
+        raise SettingError(("bus",), f"{bus!r} is none of {', '.join(buses)}")
     return bus
-
-
-def next_bus(session: Session, bus: str) -> str:
-    """Return the bus after one, the first after the last."""
-    names = list(session.buses) or [""]
-    place = names.index(bus) if bus in names else 0
-    return names[(place + 1) % len(names)]

@@ -21,8 +21,7 @@ from typing import Final
 from tickrig.host.monitor.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
 from tickrig.host.monitor.frames.ident import ident_of, ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.line_traffic import ARROWS
+from tickrig.host.monitor.frames.record import ARROWS, Record
 from tickrig.host.monitor.views.top_model import meaning_text
 from tickrig.host.monitor.views.trace import TraceRow
 from tickrig.host.tui.line_view import Line, line_text

@@ -11,19 +11,14 @@
 >>> line = LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc", None, "event"))
 >>> line_text(line, "rrc event")
 'ttyS0  <  EV:PowerOn                     rrc event'
->>> line_json(line)
-'{"v":1,"ev":"line","t":1.500000,"ch":"ttyS0","dir":"rx","data":"45563A506F7765724F6E"}'
 """
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.notation import LINE_EVENT, VERSION
-from tickrig.host.monitor.traffic.line_traffic import ARROWS
+from tickrig.host.monitor.frames.record import ARROWS, Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 
@@ -124,16 +119,6 @@ def line_text(line: LineRecord, text: str) -> str:
     data = bytes_text(line.data)
     shown = f"{data:<{DATA_WIDTH}}   {text}" if text else data
     return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
-
-
-def line_json(line: LineRecord, more: str = "") -> str:
-    """Write an event in JSON; `more` are further members, each with its comma in front."""
-    at_us = line.at_us
-    return (
-        f'{{"v":{VERSION},"ev":"{LINE_EVENT}","t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
-        f'"ch":{json.dumps(line.channel)},"dir":"{"tx" if line.sent else "rx"}",'
-        f'"data":"{line.data.hex().upper()}"{more}}}'
-    )
 
 
 def bytes_text(data: bytes) -> str:

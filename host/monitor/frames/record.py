@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+
+ARROWS: Final = {True: ">", False: "<"}
+"""How a line is shown that is sent to the device, and one from it."""
 
 
 class Record(NamedTuple):

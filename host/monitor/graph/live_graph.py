@@ -104,10 +104,10 @@ class LiveGraph:
         """Return the picture as lines with ANSI colours."""
         return render(self.series, self.view(), width, height, colour=True)
 
-    def show(self, mode: ViewMode) -> None:
+    def show(self, mode: str) -> None:
         """See something else, without the cursor; `HELD` stops what is seen now."""
         self._held = self.view()
-        self.mode, self.cursor_us = mode, None
+        self.mode, self.cursor_us = ViewMode(mode), None
 
     def zoom(self, factor: float) -> None:
         """Come closer by a factor: to the end of a live window, else to the cursor or middle."""

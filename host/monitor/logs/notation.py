@@ -13,7 +13,7 @@ import re
 from binascii import a2b_base64, b2a_base64
 from typing import Any, Final
 
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.frames.record import LineRecord, Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import CanFrame
@@ -57,6 +57,21 @@ def json_line(record: Record, more: str = "") -> str:
     return (
         f'{{"v":{VERSION},"t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},"ch":{_quoted(channel)},'
         f'{what},"dir":"{"tx" if sent else "rx"}","data":"{frame.data.hex().upper()}"{more}}}'
+    )
+
+
+def line_json(line: LineRecord, more: str = "") -> str:
+    """Write an event in JSON; `more` are further members, each with its comma in front.
+
+    >>> from tickrig.host.monitor.decode.decoded import Decoded
+    >>> line_json(LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc")))
+    '{"v":1,"ev":"line","t":1.500000,"ch":"ttyS0","dir":"rx","data":"45563A506F7765724F6E"}'
+    """
+    at_us = line.at_us
+    return (
+        f'{{"v":{VERSION},"ev":"{LINE_EVENT}","t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
+        f'"ch":{_quoted(line.channel)},"dir":"{"tx" if line.sent else "rx"}",'
+        f'"data":"{line.data.hex().upper()}"{more}}}'
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.frames.quantity import ms_text, rate_text, s_text
+from tickrig.host.monitor.frames.record import ARROWS
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -16,8 +17,6 @@ ANSWERS: Final = ("ok", "refused", "event")
 COMMAND: Final = "command"
 STATUS: Final = "status"
 OTHER: Final = "other"
-ARROWS: Final = {True: ">", False: "<"}
-"""To the device, and from it."""
 
 
 class LineRow(NamedTuple):

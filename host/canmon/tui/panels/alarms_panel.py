@@ -13,7 +13,7 @@ from textual.widgets import Static, TextArea
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarms import HEAD, Alarms, State, render_alarms
 from tickrig.host.monitor.check.parse_rules import SWITCHES, VALUES, parse_rules
@@ -26,7 +26,7 @@ LOOK_US: Final = 100_000
 """How often it is seen whether something is missing."""
 
 
-class AlarmTask:
+class AlarmTask(Task):
     """Takes frames, and looks for what is missing; it sends nothing.
 
     Args:
@@ -35,8 +35,6 @@ class AlarmTask:
     Attributes:
         alarms: how the rules stand.
     """
-
-    channel = ""
 
     def __init__(self, model: Model) -> None:
         self._model = model
@@ -68,9 +66,6 @@ class AlarmTask:
             self._due_us = now_us + LOOK_US
             self.alarms.look(self._model.now_us, self._model.lost)
         return ()
-
-    def stop(self) -> None:
-        """Do nothing: it sends nothing."""
 
 
 STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
@@ -150,15 +145,11 @@ class AlarmsPanel(Panel):
 
     def action_acknowledge(self) -> None:
         """Take note of all that was broken."""
-        with self.session.lock:
-            self.held.alarms.acknowledge()
-        self.look()
+        self.change(self.held.alarms.acknowledge)
 
     def action_clear(self) -> None:
         """Begin anew."""
-        with self.session.lock:
-            self.held.alarms.clear()
-        self.look()
+        self.change(self.held.alarms.clear)
 
     def action_edit(self) -> None:
         """Write rules."""

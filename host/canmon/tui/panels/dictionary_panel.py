@@ -10,7 +10,7 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import next_bus, text_of
+from tickrig.host.canmon.tui.settings import text_of
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
@@ -117,15 +117,12 @@ class DictionaryPanel(Panel):
 
     def action_read(self) -> None:
         """Read the chosen object."""
-        self._transfer(lambda row: self.client.read(self.session.now_us, row.entry))
+        self._transfer(self._read)
 
     def action_read_all(self) -> None:
         """Read all objects that are shown."""
-        if self._may_send():
-            with self.session.lock:
-                for row in self._rows:
-                    self.client.read(self.session.now_us, row.entry)
-            self.look()
+        if self.may_send():
+            self.change(lambda: self._read(*self._rows))
 
     def action_watch(self) -> None:
         """Read the chosen object each second, or no more."""
@@ -134,7 +131,7 @@ class DictionaryPanel(Panel):
     def action_write(self) -> None:
         """Ask for a value of the chosen object, and write it."""
         row = self._chosen()
-        if row is not None and self._may_send():
+        if row is not None and self.may_send():
             kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))
             question = f"{write_entry(row.entry)} {row.text.name} ({kind})"
             self.query_one(PromptLine).ask(question, "", lambda text: self._write(row, text))
@@ -144,10 +141,8 @@ class DictionaryPanel(Panel):
         self.query_one(PromptLine).ask("name or index", self.filter_text, self._filter)
 
     def _show(self, node: Node) -> None:
-        with self.session.lock:
-            self._choose(node)
         self._wanted_node = node[1]
-        self.look()
+        self.change(lambda: self._choose(node))
 
     def _choose(self, node: Node) -> None:
         self.node = node
@@ -156,7 +151,7 @@ class DictionaryPanel(Panel):
     def _go(self, text: str) -> None:
         if not text.isdecimal() or not 1 <= int(text) <= 127:
             raise ValueError(f"{text!r} is no node-ID 1 to 127")
-        bus = self.node[0] if self.node else next_bus(self.session, "")
+        bus = self.node[0] if self.node else self.session.next_bus("")
         self._show((bus, int(text)))
 
     def _filter(self, text: str) -> None:
@@ -165,25 +160,20 @@ class DictionaryPanel(Panel):
 
     def _write(self, row: ObjectRow, text: str) -> None:
         data = encode_value(row.text, text)
-        with self.session.lock:
-            self.client.write(self.session.now_us, row.entry, data)
-        self.look()
+        self.change(lambda: self.client.write(self.session.now_us, row.entry, data))
+
+    def _read(self, *rows: ObjectRow) -> None:
+        for row in rows:
+            self.client.read(self.session.now_us, row.entry)
 
     def _transfer(self, act: Callable[[ObjectRow], None]) -> None:
         row = self._chosen()
-        if row is not None and self._may_send():
-            with self.session.lock:
-                act(row)
-            self.look()
+        if row is not None and self.may_send():
+            self.change(lambda: act(row))
 
     def _chosen(self) -> ObjectRow | None:
         number = self.query_one(ChoiceView).chosen
         return self._rows[number] if number < len(self._rows) else None
-
-    def _may_send(self) -> bool:
-        if not self.session.armed:
-            self.notify("not armed: nothing is sent; A arms", markup=False)
-        return self.session.armed
 
     def _title(self) -> str:
         if self.node is None:

@@ -7,7 +7,7 @@ r"""The tab of the graph: curves of signals, live or of a log.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -21,7 +21,7 @@ from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, text_of, texts_of
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH
@@ -30,7 +30,6 @@ from tickrig.host.monitor.graph.signal_spec import SignalSpec, parse_signal
 from tickrig.host.text.values import parse_time_us
 from tickrig.host.tui.line_view import Line
 from tickrig.wire.can import Frames
-from tickrig.wire.instant import NEVER
 
 COLOURS: Final = {
     "31": "red",
@@ -51,15 +50,12 @@ def colour_line(text: str) -> Line:
     return tuple((part, COLOURS.get(code, "")) for part, code in found if part)
 
 
-class GraphTask:
+class GraphTask(Task):
     """Takes the values of signals; it sends nothing.
 
     Args:
         graph: the curves.
     """
-
-    channel = ""
-    due_us = NEVER
 
     def __init__(self, graph: LiveGraph) -> None:
         self._graph = graph
@@ -70,9 +66,6 @@ class GraphTask:
             for one, decoded in records:
                 self._graph.take(one, decoded)
         return ()
-
-    def stop(self) -> None:
-        """Do nothing: it sends nothing."""
 
 
 PICTURE: Final = (960, 400)
@@ -99,24 +92,24 @@ class GraphPanel(Panel):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("a", "add", "add"),
         Binding("x", "remove", "remove"),
-        Binding("plus,equals_sign", "zoom(2)", "zoom", key_display="+ -"),
-        Binding("minus", "zoom(0.5)", "zoom out", show=False),
-        Binding("left", "cursor(-0.01)", "cursor", key_display="← →"),
-        Binding("right", "cursor(0.01)", "cursor right", show=False),
-        Binding("shift+left", "cursor(-0.1)", "cursor far left", show=False),
-        Binding("shift+right", "cursor(0.1)", "cursor far right", show=False),
-        Binding("comma", "move(-0.25)", "move", key_display=", ."),
-        Binding("full_stop", "move(0.25)", "move on", show=False),
-        Binding("l", "show('live')", "live"),
-        Binding("h", "show('all')", "all"),
-        Binding("space", "show('held')", "hold"),
-        Binding("y", "next_axis", "axis"),
-        Binding("up", "lift(0.1)", "axis up", show=False),
-        Binding("down", "lift(-0.1)", "axis down", show=False),
-        Binding("i", "stretch(2)", "axis closer", show=False),
-        Binding("o", "stretch(0.5)", "axis farther", show=False),
-        Binding("r", "fit", "fit axis", show=False),
-        Binding("c", "clear", "clear"),
+        Binding("plus,equals_sign", "graph('zoom', 2)", "zoom", key_display="+ -"),
+        Binding("minus", "graph('zoom', 0.5)", "zoom out", show=False),
+        Binding("left", "graph('move_cursor', -0.01)", "cursor", key_display="← →"),
+        Binding("right", "graph('move_cursor', 0.01)", "cursor right", show=False),
+        Binding("shift+left", "graph('move_cursor', -0.1)", "cursor far left", show=False),
+        Binding("shift+right", "graph('move_cursor', 0.1)", "cursor far right", show=False),
+        Binding("comma", "graph('move', -0.25)", "move", key_display=", ."),
+        Binding("full_stop", "graph('move', 0.25)", "move on", show=False),
+        Binding("l", "graph('show', 'live')", "live"),
+        Binding("h", "graph('show', 'all')", "all"),
+        Binding("space", "graph('show', 'held')", "hold"),
+        Binding("y", "graph('next_axis')", "axis"),
+        Binding("up", "graph('lift', 0.1)", "axis up", show=False),
+        Binding("down", "graph('lift', -0.1)", "axis down", show=False),
+        Binding("i", "graph('stretch', 2)", "axis closer", show=False),
+        Binding("o", "graph('stretch', 0.5)", "axis farther", show=False),
+        Binding("r", "graph('fit')", "fit axis", show=False),
+        Binding("c", "graph('clear')", "clear"),
         Binding("s", "write", "write a file"),
     ]
 
@@ -169,41 +162,9 @@ class GraphPanel(Panel):
         if self._texts:
             self.query_one(PromptLine).ask("take out", self._texts[-1], self._remove)
 
-    def action_zoom(self, factor: float) -> None:
-        """Come closer in time."""
-        self._act(lambda: self.graph.zoom(factor))
-
-    def action_move(self, fraction: float) -> None:
-        """Move in time."""
-        self._act(lambda: self.graph.move(fraction))
-
-    def action_cursor(self, fraction: float) -> None:
-        """Move the cursor."""
-        self._act(lambda: self.graph.move_cursor(fraction))
-
-    def action_show(self, mode: str) -> None:
-        """See what comes, all, or what stands still."""
-        self._act(lambda: self.graph.show(ViewMode(mode)))
-
-    def action_next_axis(self) -> None:
-        """Choose a vertical axis."""
-        self._act(self.graph.next_axis)
-
-    def action_lift(self, fraction: float) -> None:
-        """Move the vertical axis."""
-        self._act(lambda: self.graph.lift(fraction))
-
-    def action_stretch(self, factor: float) -> None:
-        """Come closer in height."""
-        self._act(lambda: self.graph.stretch(factor))
-
-    def action_fit(self) -> None:
-        """Fit the vertical axis."""
-        self._act(self.graph.fit)
-
-    def action_clear(self) -> None:
-        """Forget all samples."""
-        self._act(self.graph.clear)
+    def action_graph(self, change: str, *arguments: Any) -> None:
+        """Change what is seen, as a method of the graph does: `zoom`, `move`, `fit` and others."""
+        self.change(lambda: getattr(self.graph, change)(*arguments))
 
     def action_write(self) -> None:
         """Ask for a file, and write the picture or the samples."""
@@ -217,11 +178,6 @@ class GraphPanel(Panel):
             share = min(max(0.0, (event.x - LABEL_WIDTH - 1) / inner), 1.0)
             self.graph.cursor_us = view.from_us + round(view.span_us * share)
             self.graph.move_cursor(0)
-        self.look()
-
-    def _act(self, act: Callable[[], None]) -> None:
-        with self.session.lock:
-            act()
         self.look()
 
     def _add(self, text: str) -> None:

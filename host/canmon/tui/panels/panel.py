@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from textual.containers import Vertical
 
+from tickrig.host.canmon.tui.settings import checked_bus
 from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.tui.line_view import LineView
 
 
@@ -51,6 +52,18 @@ class Panel(Vertical):
             self.snapshot(self.session.model)
         self.paint()
 
+    def change(self, act: Callable[[], object]) -> None:
+        """Do something to the model or a task, and show what comes of it."""
+        with self.session.lock:
+            act()
+        self.look()
+
+    def may_send(self) -> bool:
+        """Say whether frames are sent; where they are not, tell people why."""
+        if not self.session.armed:
+            self.notify("not armed: nothing is sent; A arms", markup=False)
+        return self.session.armed
+
     def snapshot(self, model: Model) -> None:
         """Keep what of the model is painted; the session waits meanwhile, so be quick."""
 
@@ -72,3 +85,33 @@ class Panel(Vertical):
         It is asked also while the panel is on no screen: do not look at widgets.
         """
         return {}
+
+
+class SendingPanel(Panel):
+    """A tab that sends on one bus at a time.
+
+    Args:
+        session: what is heard, and how to send.
+        sender: the task that sends.
+    """
+
+    def __init__(self, session: Session, sender: Task) -> None:
+        super().__init__(session)
+        self._sender = sender
+        session.tasks.append(sender)
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take the bus."""
+        self._sender.channel = checked_bus(self.session.buses, settings)
+
+    def action_stop(self) -> None:
+        """Send no more."""
+        self.change(self._sender.stop)
+
+    def action_bus(self) -> None:
+        """Send on the next bus."""
+        self.change(self._take_next_bus)
+
+    def _take_next_bus(self) -> None:
+        self._sender.stop()
+        self._sender.channel = self.session.next_bus(self._sender.channel)

@@ -13,8 +13,7 @@ from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import checked_bus, next_bus
+from tickrig.host.canmon.tui.panels.panel import SendingPanel
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.sequence_task import (
     NEW,
@@ -33,7 +32,7 @@ STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")
 
 
-class SequencePanel(Panel):
+class SequencePanel(SendingPanel):
     """Sequences, one of them in the editor."""
 
     title = "sequence"
@@ -81,9 +80,8 @@ class SequencePanel(Panel):
     ]
 
     def __init__(self, session: Session) -> None:
-        super().__init__(session)
         self.runner = SequenceTask(session.model.eds)
-        session.tasks.append(self.runner)
+        super().__init__(session, self.runner)
         self.texts, self.number = [NEW], 0
         self._steps: list[str] = []
         self._notes: list[SequenceEvent] = []
@@ -114,7 +112,7 @@ class SequencePanel(Panel):
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the bus and the sequences."""
-        self.runner.channel = checked_bus(self.session, settings)
+        super().load(settings)
         self.texts = read_texts(settings) or [NEW]
 
     def save(self) -> dict[str, Any]:
@@ -128,21 +126,9 @@ class SequencePanel(Panel):
     def action_run(self) -> None:
         """Carry out the sequence of the editor."""
         sequence = self._read()
-        if sequence is None:
-            return
-        if not self.session.armed:
-            self.notify("not armed: nothing is sent; A arms", markup=False)
-            return
-        self._steps = []
-        with self.session.lock:
-            self.runner.start(sequence)
-        self.look()
-
-    def action_stop(self) -> None:
-        """Give it up."""
-        with self.session.lock:
-            self.runner.stop()
-        self.look()
+        if sequence is not None and self.may_send():
+            self._steps = []
+            self.change(lambda: self.runner.start(sequence))
 
     def action_steps(self) -> None:
         """Show the steps; nothing is sent."""
@@ -182,13 +168,6 @@ class SequencePanel(Panel):
         """Ask for a file, and write the sequence to it."""
         name = f"{self._called()}.toml"
         self.query_one(PromptLine).ask("write the sequence to file", name, self._write_file)
-
-    def action_bus(self) -> None:
-        """Send on the next bus."""
-        with self.session.lock:
-            self.runner.stop()
-            self.runner.channel = next_bus(self.session, self.runner.channel)
-        self.look()
 
     def _read(self) -> Sequence | None:
         """Return the sequence of the editor; say what is wrong with it, and go there."""

@@ -100,6 +100,4 @@ class StatisticsPanel(Panel):
 
     def action_press(self, key: str) -> None:
         """Act as `canmon top` does."""
-        with self.session.lock:
-            self.session.model.top.press(key)
-        self.look()
+        self.change(lambda: self.session.model.top.press(key))

@@ -13,7 +13,7 @@ from textual.widgets import Input, Static
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, text_of, truth
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter
@@ -21,7 +21,6 @@ from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.views.trace import DisplayFilter, Latest, Ring
 from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
-from tickrig.wire.instant import NEVER
 
 STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
 CHANNEL_MAX: Final = 12
@@ -228,11 +227,8 @@ class TracePanel(Panel):
         return line_text(self._look.head()) + note
 
 
-class _Follower:
-    """The task that keeps a panel's sieve up to date, whichever tab is shown."""
-
-    channel = ""
-    due_us = NEVER
+class _Follower(Task):
+    """The task that keeps a panel's rows up to date, whichever tab is shown."""
 
     def __init__(self, panel: TracePanel) -> None:
         self._panel = panel
@@ -241,6 +237,3 @@ class _Follower:
         """Follow; it sends nothing."""
         self._panel.follow()
         return ()
-
-    def stop(self) -> None:
-        """Do nothing: it sends nothing."""

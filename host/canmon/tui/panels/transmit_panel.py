@@ -13,10 +13,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import below, checked_bus, next_bus, tables, text_of, texts_of
+from tickrig.host.canmon.tui.panels.panel import SendingPanel
+from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
@@ -51,7 +51,7 @@ NOW: Final = 0
 """When frames are due that somebody sends by hand."""
 
 
-class TransmitTask:
+class TransmitTask(Task):
     """Sends rows of a list: cyclically, or by hand.
 
     Args:
@@ -117,7 +117,7 @@ class TransmitTask:
 QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
 
 
-class TransmitPanel(Panel):
+class TransmitPanel(SendingPanel):
     """Rows, each with a frame, a period, and fields that change."""
 
     title = "transmit"
@@ -144,9 +144,8 @@ class TransmitPanel(Panel):
     ]
 
     def __init__(self, session: Session) -> None:
-        super().__init__(session)
         self.transmit = TransmitTask(session.model.eds)
-        session.tasks.append(self.transmit)
+        super().__init__(session, self.transmit)
         self._lines: list[str] = []
 
     def compose(self) -> ComposeResult:
@@ -176,7 +175,7 @@ class TransmitPanel(Panel):
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the bus and the rows; none of them is enabled."""
-        self.transmit.channel = checked_bus(self.session, settings)
+        super().load(settings)
         for number, table in enumerate(tables(settings, "row")):
             with below("row", number):
                 self.transmit.add(read_row(table))
@@ -211,19 +210,6 @@ class TransmitPanel(Panel):
         """Take out the chosen row."""
         self._act(self.transmit.remove)
 
-    def action_stop(self) -> None:
-        """Send no row any more."""
-        with self.session.lock:
-            self.transmit.stop()
-        self.look()
-
-    def action_bus(self) -> None:
-        """Send on the next bus."""
-        with self.session.lock:
-            self.transmit.stop()
-            self.transmit.channel = next_bus(self.session, self.transmit.channel)
-        self.look()
-
     def _act(self, act: Callable[[int], None]) -> None:
         if self.chosen >= len(self.transmit.words):
             return
@@ -237,13 +223,9 @@ class TransmitPanel(Panel):
 
     def _add(self, text: str) -> None:
         words = parse_row_text(text)
-        with self.session.lock:
-            self.transmit.add(words)
-        self.look()
+        self.change(lambda: self.transmit.add(words))
         self.query_one(ChoiceView).choose(len(self.transmit.words) - 1)
 
     def _change(self, number: int, text: str) -> None:
         words: RowText = parse_row_text(text)
-        with self.session.lock:
-            self.transmit.change(number, words)
-        self.look()
+        self.change(lambda: self.transmit.change(number, words))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import Meant
+from tickrig.host.canmon.tui.tasks.session import Task
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.script import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
@@ -27,7 +28,7 @@ WATCH_US: Final = 1_000_000
 """How often watched objects are read."""
 
 
-class DictionaryTask:
+class DictionaryTask(Task):
     """A client of the default SDO of one node at a time (1200h).
 
     What is shown comes from the traffic alone: answers are heard as those to others are.

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from tickrig.host.canmon.tui.settings import below, tables, text_of
 from tickrig.host.canmon.tui.tasks.model import Meant
+from tickrig.host.canmon.tui.tasks.session import Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.sequence.conditions import DecodedCondition
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
@@ -75,7 +76,7 @@ LINES: Final = ("+", "loop")
 """What a sequence of plain lines begins with; others are TOML."""
 
 
-class SequenceTask:
+class SequenceTask(Task):
     """Carries out one sequence at a time.
 
     Args:

@@ -29,12 +29,12 @@ class Task(Protocol):
         channel: the bus it sends on; empty for the first.
     """
 
-    channel: str
+    channel: str = ""
 
     @property
     def due_us(self) -> int:
         """When it next wants to be called without a frame; `NEVER` if not."""
-        ...
+        return NEVER
 
     def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
         """Take what was heard, those that this program sent among it; return what to send.
@@ -47,7 +47,7 @@ class Task(Protocol):
 
     def stop(self) -> None:
         """Send no more: the operator has disarmed."""
-        ...
+        return
 
 
 class Session:
@@ -97,6 +97,12 @@ class Session:
     def can_send(self) -> bool:
         """Whether there is a bus to send on."""
         return bool(self.buses)
+
+    def next_bus(self, bus: str) -> str:
+        """Return the name of the bus after one, of the first after the last."""
+        names = list(self.buses) or [""]
+        place = names.index(bus) if bus in names else 0
+        return names[(place + 1) % len(names)]
 
     def arm(self) -> None:
         """Let tasks send, if there is a bus."""
