@@ -60,7 +60,10 @@ def test_the_share_of_survivors_is_below_5_percent() -> None:
         ("while not a:\n    pass", ["while not not a:"]),
         ("def f(): a()", [""]),
         ("def f():\n    if a == b:\n        return", ["if a != b:", ""]),
-        ("def f():\n    match a:\n        case b if c:\n            raise d", ["case b if not c:", ""]),
+        (
+            "def f():\n    match a:\n        case b if c:\n            raise d",
+            ["case b if not c:", ""],
+        ),
     ],
 )
 def test_a_mutant_has_one_change(source: str, after: list[str]) -> None:

@@ -15,7 +15,6 @@ from tickrig.device.rtc_lite.server import Server
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
 from tickrig.device.timer import Timer
 from tickrig.device.twin import Copyable
-from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
 from tickrig.wire.rtc_lite.decoder import Decoder
 from tickrig.wire.rtc_lite.frame import Frame, Framing, fault_frame
@@ -77,8 +76,6 @@ class RtcLiteNode(Copyable):
         """When anything would happen without input."""
         if self.inputs.changed:
             return 0
-        if not self._on:
-            return NEVER
         if self._free_us:
             return self._free_us
         return min(self._receiver.due_us, self._timer.due_us)

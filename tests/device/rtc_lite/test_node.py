@@ -245,6 +245,29 @@ def test_after_an_unknown_frame_20_ms_of_silence_are_needed() -> None:
     assert bench.ask("CY\x01") == "CY@\x01"
 
 
+def test_that_a_line_was_silent_takes_no_time_of_a_callback() -> None:
+    bench = NodeBench().enter("Active")
+    bench.node.inputs.set("callback_ms", 30)
+    bench.push(raw("0A 43 59"))
+    bench.run(99_000)
+    assert bench.push() == raw("0A 46 4B 01 92")
+
+
+# When it is due.
+
+
+def test_a_node_is_due_at_once_when_it_begins_is_reset_or_an_input_is_set() -> None:
+    bench = NodeBench()
+    assert bench.node.due_us == 0
+    bench.push()
+    assert bench.node.due_us == NEVER
+    bench.node.inputs.set("callback_ms", 1)
+    assert bench.node.due_us == 0
+    bench.push()
+    bench.node.reset()
+    assert bench.node.due_us == 0
+
+
 # Power.
 
 

@@ -95,6 +95,56 @@ def test_a_receiver_that_never_reads_costs_no_more_memory_than_its_buffers() -> 
     assert line.b.lost == 996
 
 
+def test_what_is_lost_does_not_occupy_the_line() -> None:
+    line = SerialLine(baud=100_000, buffer_bytes=1)
+    for now_us in (0, 100, 5_000):
+        line.a.send(now_us, b"x")
+    assert (line.b.idle_us, line.b.lost) == (200, 1)
+
+
+def test_an_unread_line_holds_one_buffer_at_each_end() -> None:
+    line = SerialLine(baud=100_000, buffer_bytes=4)
+    line.a.send(0, b"abcd")
+    line.a.send(400, b"efg")
+    assert line.a.room(10_000) == 1
+    line.a.send(10_000, b"h")
+    assert line.a.room(20_000) == 0
+
+
+def test_a_receiver_that_keeps_reading_loses_nothing() -> None:
+    line = SerialLine(buffer_bytes=4)
+    for now_us in range(0, 100_000, 10_000):
+        assert line.a.room(now_us) == 4
+        line.a.send(now_us, b"abcd")
+        assert line.b.poll(now_us + 9_000) == b"abcd"
+    assert line.b.lost == 0
+
+
+def test_a_thousand_bytes_take_as_long_in_both_directions() -> None:
+    line = SerialLine()
+    line.a.send(0, bytes(1_000))
+    line.b.send(0, bytes(1_000))
+    assert (line.a.idle_us, line.b.idle_us) == (86_806, 86_806)  # 10 000 bits at 115 200 bit/s
+
+
+def test_what_is_sent_when_the_line_is_free_again_begins_at_that_time() -> None:
+    line = SerialLine(baud=70_000)  # 142.857 us a byte
+    line.a.send(0, b"x")
+    assert line.b.idle_us == 143
+    line.a.send(143, b"abcdef")
+    assert line.b.idle_us == 143 + 858
+
+
+def test_a_buffer_has_4096_bytes_unless_told_otherwise() -> None:
+    assert SerialLine().a.room(0) == 4_096
+
+
+def test_the_slowest_and_smallest_line_carries_a_byte() -> None:
+    line = SerialLine(baud=1, frame_bits=1, buffer_bytes=1)
+    line.a.send(0, b"x")
+    assert (line.b.due_us, line.b.poll(1_000_000)) == (1_000_000, b"x")
+
+
 @pytest.mark.parametrize("wrong", [{"baud": 0}, {"frame_bits": 0}, {"buffer_bytes": 0}])
 def test_an_impossible_line_cannot_be_built(wrong: dict[str, int]) -> None:
     with pytest.raises(ValueError, match="at least 1"):

@@ -231,6 +231,13 @@ def test_without_a_job_nothing_is_due_and_nothing_moves() -> None:
     assert (dialogue.due_us, dialogue.job, dialogue.moves) == (NEVER, None, False)
 
 
+def test_what_is_heard_before_the_first_job_is_passed_over() -> None:
+    dialogue = idle()
+    dialogue.receive_sdo(0, bytes.fromhex("4300100091010700"))
+    dialogue.receive_state(0, NmtState.OPERATIONAL)
+    assert (dialogue.job, dialogue.due_us) == (None, NEVER)
+
+
 def test_a_state_that_is_awaited_ends_the_wait_and_no_other_does() -> None:
     dialogue, ended = idle(), list[str]()
     dialogue.start(0, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))

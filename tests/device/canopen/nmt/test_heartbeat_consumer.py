@@ -106,6 +106,14 @@ def test_the_first_and_the_last_node_id_are_watched(node_id: int, lost: int) -> 
     assert bus.run(300) == [f"085#308111{node_id:02X}00000000"] * lost
 
 
+@pytest.mark.parametrize("time_ms", [1, 0xFFFF])
+def test_the_shortest_and_the_longest_time_can_be_set(time_ms: int) -> None:
+    bus = booted(errors(), array(0x1016, 0))
+    assert write(bus, 0x1016, 7 << 16 | time_ms, 1) is None
+    bus.step("707#05")
+    assert bus.slave.due_us == bus.now_us + 1_000 * time_ms
+
+
 def test_a_reset_forgets_what_was_watched_since_power_on() -> None:
     bus = booted(errors(), array(0x1016, 0))
     write(bus, 0x1016, NODE_7_200_MS, 1)

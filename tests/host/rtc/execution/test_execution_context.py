@@ -77,6 +77,15 @@ def test_set_rate_while_stopped_does_not_start_it() -> None:
     assert ec.due_us == NEVER
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "period_us"),
+    [(1_000_000.0, 1), (3.0, 333_333), (1.0, 1_000_000), (1e-6, 1_000_000_000_000)],
+)
+def test_the_first_period_begins_a_period_after_the_start(rate_hz: float, period_us: int) -> None:
+    ec = ExecutionContext(rate_hz)
+    assert (ec.period_us, ec.start(), ec.due_us) == (period_us, OK, period_us)
+
+
 @pytest.mark.parametrize("rate_hz", IMPOSSIBLE_HZ)
 def test_a_rate_that_cannot_be_is_refused(rate_hz: float) -> None:
     bench = Bench()
@@ -113,6 +122,22 @@ def test_a_component_is_removed_unless_it_is_active(state: str, code: ReturnCode
     assert bench.ec.remove_component(bench.spy) is code
     assert (bench.spy in bench.ec.components) is (code is not OK)
     assert (bench.ec in bench.spy.contexts) is (code is not OK)
+
+
+def test_an_active_component_is_released_with_its_callback() -> None:
+    bench = Bench()
+    bench.bring("ACTIVE")
+    assert bench.ec.release_component(bench.spy) is OK
+    assert bench.spy.taken() == ["on_deactivated"]
+    assert (bench.ec.components, bench.ec in bench.spy.contexts) == ((), False)
+
+
+def test_closing_deactivates_stops_and_lets_all_go() -> None:
+    bench = Bench()
+    bench.bring("ACTIVE")
+    bench.ec.close()
+    assert bench.spy.taken() == ["on_deactivated", "on_shutdown"]
+    assert (bench.ec.running, bench.ec.components, bench.spy.contexts) == (False, (), [])
 
 
 def test_a_stranger_is_not_removed() -> None:
