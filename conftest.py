@@ -10,6 +10,8 @@ from hypothesis import HealthCheck, settings
 
 from tests.hil.rig_file import RIG, BadRigFile, read_rig_file
 
+collect_ignore = ["tests/stranger"]  # of somebody else: `tests/test_stranger.py` installs it
+
 # How long an example takes says something about the machine, not about the code.
 settings.register_profile("tickrig", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("tickrig")

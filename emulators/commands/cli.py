@@ -14,6 +14,7 @@ COMMANDS: Final = {
     "ctl": (f"{HERE}.ctl_cli:ctl", "Touch and watch the emulator whose control socket is SOCKET."),
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
     "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
+    "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
     "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",

@@ -79,7 +79,11 @@ class DeviceType:
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
         """Make the device that a trace was recorded on; ValueError if it cannot be."""
-        return self.build({name: value for name, value in config.items() if name != SEED})
+        settings = {name: value for name, value in config.items() if name != SEED}
+        if self.configure is None:
+            known: dict[str, Any] = {str(option.name): option.default for option in self.options}
+            check_config(settings, known, f"{self.title} has no setting", typed=False)
+        return self.build(settings)
 
 
 @dataclass(frozen=True)

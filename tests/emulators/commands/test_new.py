@@ -1,0 +1,53 @@
+"""`tickrig new device`; that what it writes runs is in `tests/test_stranger.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.emulators.commands.cli import main
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def new(*words: str) -> Result:
+    return CliRunner().invoke(main, ("new", "device", *words))
+
+
+def test_it_names_the_files_that_it_wrote() -> None:
+    made = new("my-lamp")
+    assert made.exit_code == 0
+    paths = [Path(line) for line in made.stdout.splitlines()]
+    assert all(path.is_file() for path in paths)
+    assert Path("my-lamp/my_lamp/device.py") in paths
+    assert "class MyLamp(" in Path("my-lamp/my_lamp/device.py").read_text("utf-8")
+    assert not any("$" in path.read_text("utf-8") for path in paths)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["My"], "'My' is no name: write small letters, digits and -, as my-lamp"),
+        (["../x"], "'../x' is no name: write small letters, digits and -, as my-lamp"),
+        (["class"], "'class' is no name: write small letters, digits and -, as my-lamp"),
+        (["json"], "'json' is the name of a module that is there already"),
+        (["click"], "'click' is the name of a module that is there already"),
+        (["rtc-lite"], "there is a device 'rtc-lite' already: tickrig emu rtc-lite"),
+        (["lamp", "--in", "/nowhere"], "folder /nowhere/lamp: No such file or directory"),
+    ],
+)
+def test_a_bad_name_or_place_is_one_line(words: list[str], line: str) -> None:
+    refused = new(*words)
+    assert (refused.exit_code, refused.stderr) == (2, f"Error: {line}\n")
+
+
+def test_a_folder_that_is_there_is_left_alone() -> None:
+    Path("lamp").mkdir()
+    refused = new("lamp")
+    assert (refused.exit_code, refused.stderr) == (2, "Error: folder lamp: File exists\n")
+    assert not any(Path("lamp").iterdir())
