@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
+from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary, render_dictionary
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, ViewMode
@@ -111,7 +111,7 @@ def _lateness(seconds: float) -> None:
 
 
 def _drive() -> dict[int, EdsObjects]:
-    return {5: read_eds(EPOS, 5)}
+    return {5: read_eds_objects(EPOS, 5)}
 
 
 def _batch(first: int, count: int = BATCH) -> list[Record]:

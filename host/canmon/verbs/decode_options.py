@@ -109,11 +109,11 @@ def _split(word: str) -> tuple[int, Path]:
 
 
 def _read(node: int, path: Path) -> EdsObjects:
-    from tickrig.host.monitor.decode.node_memory import read_eds  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_finding import EdsError  # noqa: PLC0415
 
     try:
-        return read_eds(path, node)
+        return read_eds_objects(path, node)
     except OSError as error:
         refuse_path("--eds", error)
     except EdsError as error:

@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.monitor.decode.bus_decoder import BusDecoder
 from tickrig.host.monitor.decode.dbc_file import DbcFile
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.node_memory import EdsObjects, NodeMemory, read_eds
+from tickrig.host.monitor.decode.node_memory import EdsObjects, NodeMemory, read_eds_objects
 from tickrig.host.monitor.decode.sdo.transfer import Transfer
 from tickrig.host.monitor.decode.services import decode_error
 from tickrig.host.monitor.frames.record import Record
@@ -36,7 +36,7 @@ class Decoder:
         self, eds: Mapping[int, Path | EdsObjects] = NO_EDS, dbc: Sequence[Path] = ()
     ) -> None:
         self._eds = {
-            node: read_eds(item, node) if isinstance(item, Path) else item
+            node: read_eds_objects(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
         self._dbc = tuple(DbcFile(path) for path in dbc)

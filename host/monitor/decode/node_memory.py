@@ -39,7 +39,7 @@ class EdsObjects:
     findings: tuple[Finding, ...] = ()
 
 
-def read_eds(path: Path, node_id: int) -> EdsObjects:
+def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
     """Read an EDS or DCF for a node.
 
     Raises:

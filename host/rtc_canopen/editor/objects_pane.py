@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.monitor.decode.node_memory import EdsObjects, Entry, read_eds
+from tickrig.host.monitor.decode.node_memory import EdsObjects, Entry, read_eds_objects
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.rtc_canopen.editor.widgets import CursorView, Row
@@ -254,6 +254,6 @@ class ObjectsPane(CursorView[Entry]):
 def _read(node_id: int, path: Path) -> NodeObjects:
     """Return the objects of an EDS; none if it is there no more."""
     try:
-        return NodeObjects(node_id, read_eds(path, node_id))
+        return NodeObjects(node_id, read_eds_objects(path, node_id))
     except (OSError, EdsError):
         return NodeObjects(node_id, EdsObjects())

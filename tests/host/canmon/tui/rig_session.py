@@ -12,7 +12,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
@@ -57,7 +57,7 @@ class RigSession(Session):
         self.drive = epos.Epos.of(slave)
         self._host = host = CanHost(Rig(Station(slave, wire.end())), wire.end())
         self.frames: list[str] = []
-        described = {NODE: read_eds(EPOS, NODE)} if eds else {}
+        described = {NODE: read_eds_objects(EPOS, NODE)} if eds else {}
         model = Model(described, bit_rate=bit_rate)
         super().__init__(RigSource(host), model, {BUS: self._put}, lambda: host.now_us)
 

@@ -14,7 +14,7 @@ from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.transmit.row_text import parse_row_text
 
 STEPS = 1_000
@@ -33,7 +33,9 @@ def test_tasks_reach_our_drive_over_an_interface_of_python_can() -> None:
     wire = CanWire()
     rig = Rig(Station(make_slave(epos.dictionary(), NODE, application=epos.make), wire.end()))
     with CHANNELS.offer("desk", rig, wire):
-        session = open_session(["sim:desk"], BusOptions(), Model({NODE: read_eds(EPOS, NODE)}))
+        session = open_session(
+            ["sim:desk"], BusOptions(), Model({NODE: read_eds_objects(EPOS, NODE)})
+        )
         client = DictionaryTask(session.model.decoder)
         sender = TransmitTask(session.model.eds)
         session.tasks += [client, sender]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.dictionary.node_dictionary import (
     NodeDictionary,
     ObjectRow,
@@ -26,7 +26,7 @@ MAPPED = """\
 
 
 def dictionary(text: str, *, eds: bool = False) -> NodeDictionary:
-    decoder = Decoder({5: read_eds(EPOS, 5)} if eds else {})
+    decoder = Decoder({5: read_eds_objects(EPOS, 5)} if eds else {})
     made = NodeDictionary(decoder.memory("can0", 5))
     for record in hear(text):
         decoded = decoder.take(record)

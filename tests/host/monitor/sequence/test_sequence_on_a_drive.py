@@ -8,7 +8,7 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.verbs.seq import Watch
-from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
 from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun
@@ -25,7 +25,7 @@ def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
     slave = make_slave(epos.dictionary(), 5, application=epos.make)
     drive = epos.Epos.of(slave)
     host = CanHost(Rig(Station(slave, wire.end())), wire.end())
-    watch = Watch({5: read_eds(EXAMPLES / "eds/epos.eds", 5)})
+    watch = Watch({5: read_eds_objects(EXAMPLES / "eds/epos.eds", 5)})
     resolve = PdoFrames(watch.eds).frame
     sequence = TomlSequence(text, START.name, resolve=resolve, condition=watch.condition).parse()
     run = SequenceRun(sequence)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds
+from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
@@ -17,7 +17,7 @@ EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 
 @pytest.fixture(scope="module")
 def messages() -> PdoFrames:
-    return PdoFrames({5: read_eds(EPOS, 5), 6: made()})
+    return PdoFrames({5: read_eds_objects(EPOS, 5), 6: made()})
 
 
 def made(**values: bytes) -> EdsObjects:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.decode.node_memory import read_eds
+from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
 from tickrig.host.monitor.transmit.transmit_list import TransmitRow, render_transmit
@@ -20,7 +20,7 @@ ROWS = (
 
 
 def row(text: str) -> TransmitRow:
-    return parse_row_text(text).row(PdoFrames({5: read_eds(EPOS, 5)}))
+    return parse_row_text(text).row(PdoFrames({5: read_eds_objects(EPOS, 5)}))
 
 
 @pytest.mark.parametrize("text", ROWS)
