@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.canopen.eds.eds import read_eds
-from tickrig.wire.can import CanFrame
+from tickrig import CanFrame, read_eds
+from tickrig.device import Ds401, make_slave
 
 EDS = Path(__file__).with_name("io_module.eds")
 

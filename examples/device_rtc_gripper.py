@@ -6,10 +6,10 @@ NMT Start activates it; while its motor is hot it ends in Error.
 
 from __future__ import annotations
 
-from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
-from tickrig.device.physical import Input
-from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT
+from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result  # internal
+from tickrig.device.canopen.device_rtc.ports import InPort, OutPort  # internal
+from tickrig.device.physical import Input  # internal
+from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT  # internal
 
 STEP_UM, HOT_DC = 500, 900
 

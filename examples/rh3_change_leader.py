@@ -6,8 +6,8 @@ the robot on omni wheels, to the right, and to nothing else.
 
 from __future__ import annotations
 
-from tickrig.emulators.rh3.cart.convoy import Convoy
-from tickrig.host.motion.geometry import Pose
+from tickrig.emulators.rh3.cart.convoy import Convoy  # internal
+from tickrig.host.motion.geometry import Pose  # internal
 
 SECOND_US = 1_000_000
 

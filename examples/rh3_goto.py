@@ -8,10 +8,10 @@ Six components run in closed loop over an emulated base; `SerialBaseConnection` 
 
 from __future__ import annotations
 
-from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.drive import drive, start
-from tickrig.host.motion.geometry import Pose
+from tickrig.device.rh3.parameters import BaseParameters  # internal
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
+from tickrig.host.motion.drive import drive, start  # internal
+from tickrig.host.motion.geometry import Pose  # internal
 
 GOAL = Pose(1.0, 0.5, 1.57)
 

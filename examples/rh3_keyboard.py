@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import sys
 
-from tickrig.host.control.clock import RealClock
-from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.options.game_pad import GamePad
-from tickrig.host.motion.options.switch_input import SwitchInput
-from tickrig.host.rtc import Manager
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig import RealClock
+from tickrig.host.motion.chain import MotionChain  # internal
+from tickrig.host.motion.options.game_pad import GamePad  # internal
+from tickrig.host.motion.options.switch_input import SwitchInput  # internal
+from tickrig.host.rtc.system.real_time import RealTime  # internal
+from tickrig.rtc import Manager
 
 
 def main(device: str) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from tickrig.device.urg.world import Post, World
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.options.guard import Guard
+from tickrig import SimLink
+from tickrig.device.urg.world import Post, World  # internal
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
+from tickrig.host.motion.geometry import Pose  # internal
+from tickrig.host.motion.options.guard import Guard  # internal
 
 SECOND_US = 1_000_000
 

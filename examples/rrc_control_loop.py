@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.host import RrcClient, RrcEvent
 
 
 def main(url: str) -> None:

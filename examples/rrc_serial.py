@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tickrig.host.links.errors import LinkError
-from tickrig.host.rrc import RrcClient
+from tickrig.host import LinkError, RrcClient
 
 
 def main(url: str) -> None:

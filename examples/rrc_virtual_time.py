@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig import Rig, SerialLine, SimLink, Station
+from tickrig.device import Rrc
+from tickrig.host import RrcClient, RrcEvent
 
 
 def main() -> None:

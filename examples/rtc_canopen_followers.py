@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.host.rtc_canopen.definition.definition import PdoName
-from tickrig.host.rtc_canopen.serve import open_server, serve
-from tickrig.host.rtc_canopen.view import ServerView
-from tickrig.wire.rtc_types.basic import Time, TimedShort
+from tickrig import CanWire
+from tickrig.emulators.can.outside.host import CanHost  # internal
+from tickrig.emulators.canopen.bench import make_bench  # internal
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # internal
+from tickrig.emulators.canopen.rig_file import read_rig  # internal
+from tickrig.host.rtc_canopen.definition.definition import PdoName  # internal
+from tickrig.host.rtc_canopen.serve import open_server, serve  # internal
+from tickrig.host.rtc_canopen.view import ServerView  # internal
+from tickrig.rtc import Time, TimedShort
 
 HERE = Path(__file__).parent
 

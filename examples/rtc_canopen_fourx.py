@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.host.rtc_canopen.robots.fourx import FourX
-from tickrig.host.rtc_canopen.robots.joystick import Joystick
-from tickrig.host.rtc_canopen.serve import open_server, serve
+from tickrig import CanWire
+from tickrig.emulators.can.outside.host import CanHost  # internal
+from tickrig.emulators.canopen.bench import make_bench  # internal
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # internal
+from tickrig.emulators.canopen.rig_file import read_rig  # internal
+from tickrig.host.rtc_canopen.robots.fourx import FourX  # internal
+from tickrig.host.rtc_canopen.robots.joystick import Joystick  # internal
+from tickrig.host.rtc_canopen.serve import open_server, serve  # internal
 
 WAY = ((0, 0, 1), (60, 0, 3), (40, 50, 2), (0, -100, 1), (0, 0, 1))
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from tickrig.device.rtc_lite.component import Echo
-from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.rig.rig_clock import RigClock
-from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.rtc import Manager
-from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.system.real_time import RealTime
-from tickrig.host.rtc_lite import attach
+from tickrig import Rig, SerialLine, SimLink, Station
+from tickrig.device import RtcLiteNode
+from tickrig.device.rtc_lite.component import Echo  # internal
+from tickrig.emulators.rig.rig_clock import RigClock  # internal
+from tickrig.host.rtc.components import ConsoleIn, ConsoleOut  # internal
+from tickrig.host.rtc.system.real_time import RealTime  # internal
+from tickrig.host.rtc_lite import attach  # internal
+from tickrig.rtc import Manager
 
 
 def main() -> None:

@@ -6,10 +6,10 @@ temperature each period, and ends in Error while the sensor is broken.
 
 from __future__ import annotations
 
-from tickrig.device.physical import Input, SignalType
-from tickrig.device.rtc_lite.component import ERROR, Component, Result
-from tickrig.device.rtc_lite.ports import InPort, OutPort
-from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT
+from tickrig.device.physical import Input, SignalType  # internal
+from tickrig.device.rtc_lite.component import ERROR, Component, Result  # internal
+from tickrig.device.rtc_lite.ports import InPort, OutPort  # internal
+from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT  # internal
 
 
 class Thermometer(Component):

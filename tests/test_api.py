@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
@@ -21,7 +23,9 @@ DEFINED = Counter(
     for node in ast.walk(ast.parse(path.read_text("utf-8")))
     if isinstance(node, ast.ClassDef | ast.FunctionDef)
 )
-MEANT_THRICE = {"InPort", "OutPort"}
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+SHOWN = [ROOT / "README.md", *EXAMPLES, *sorted((ROOT / "docs").glob("*.md"))]
+MEANT_THRICE = {"InPort", "OutPort", "ReturnCode"}
 """Names that the component models of two devices have too."""
 
 
@@ -72,3 +76,35 @@ def test_what_is_public_is_what_the_file_says() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_public_name_means_one_thing(name: str) -> None:
     assert DEFINED[name] <= (3 if name in MEANT_THRICE else 1)
+
+
+def programs(page: Path) -> str:
+    text = page.read_text("utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    return text if page.suffix == ".py" else "".join(blocks)
+
+
+def inner_imports(program: str) -> Iterator[tuple[str, ast.ImportFrom]]:
+    """Give the imports of tickrig from elsewhere than the five places, with their line."""
+    for node in ast.walk(ast.parse(program)):
+        match node:
+            case ast.ImportFrom(module=str(module)) if module.startswith("tickrig."):
+                if module not in PLACES:
+                    yield program.splitlines()[node.lineno - 1], node
+
+
+@pytest.mark.parametrize("page", SHOWN, ids=[page.name for page in SHOWN])
+def test_programs_that_users_read_import_public_names_from_the_five_places(page: Path) -> None:
+    for line, node in inner_imports(programs(page)):
+        known = {name.name for name in node.names} & NAMES.keys()
+        assert not known or (known <= MEANT_THRICE and "device" in str(node.module)), line
+
+
+@pytest.mark.parametrize("page", EXAMPLES, ids=[page.name for page in EXAMPLES])
+def test_what_is_not_public_is_marked_in_examples(page: Path) -> None:
+    for line, _ in inner_imports(programs(page)):
+        assert line.endswith("  # internal"), line
+
+
+def test_the_first_page_imports_public_names_alone() -> None:
+    assert [line for line, _ in inner_imports(programs(ROOT / "README.md"))] == []

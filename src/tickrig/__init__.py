@@ -8,6 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.device.core import Device as Device
     from tickrig.emulators.can.wire import CanWire as CanWire
+    from tickrig.emulators.canopen.eds.eds import read_eds as read_eds
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.rig import Rig as Rig
     from tickrig.emulators.rig.rig import Station as Station
@@ -21,16 +22,16 @@ else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
-            "CanFrame": "tickrig.wire.can",
-            "CanWire": "tickrig.emulators.can.wire",
-            "Device": "tickrig.device.core",
-            "NEVER": "tickrig.wire.instant",
-            "RealClock": "tickrig.host.control.clock",
-            "Rig": "tickrig.emulators.rig.rig",
-            "Rs485Line": "tickrig.emulators.serial.rs485_line",
-            "SerialLine": "tickrig.emulators.serial.serial_line",
-            "SimLink": "tickrig.emulators.rig.sim_link",
-            "Station": "tickrig.emulators.rig.rig",
-            "VirtualClock": "tickrig.emulators.rig.clock",
+            "tickrig.device.core": ("Device",),
+            "tickrig.emulators.can.wire": ("CanWire",),
+            "tickrig.emulators.canopen.eds.eds": ("read_eds",),
+            "tickrig.emulators.rig.clock": ("VirtualClock",),
+            "tickrig.emulators.rig.rig": ("Rig", "Station"),
+            "tickrig.emulators.rig.sim_link": ("SimLink",),
+            "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
+            "tickrig.emulators.serial.serial_line": ("SerialLine",),
+            "tickrig.host.control.clock": ("RealClock",),
+            "tickrig.wire.can": ("CanFrame",),
+            "tickrig.wire.instant": ("NEVER",),
         },
     )

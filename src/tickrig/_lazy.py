@@ -8,17 +8,18 @@ if TYPE_CHECKING:
 
 
 def lazy(
-    package: str, modules: Mapping[str, str]
+    package: str, names: Mapping[str, tuple[str, ...]]
 ) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
     """Make a package offer names of modules that are not imported yet.
 
     Args:
         package: its name, for the message about a name that it has not.
-        modules: the module of each name.
+        names: what it offers of each module.
 
     Returns:
         Its `__all__`, `__getattr__` and `__dir__`.
     """
+    modules = {name: module for module, offered in names.items() for name in offered}
 
     def find(name: str) -> object:
         if name not in modules:
@@ -28,5 +29,4 @@ def lazy(
         found: object = getattr(import_module(modules[name]), name)
         return found
 
-    names = sorted(modules)
-    return names, find, names.copy
+    return sorted(modules), find, lambda: sorted(modules)

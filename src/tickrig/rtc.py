@@ -4,17 +4,51 @@ from tickrig._lazy import lazy
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from tickrig.host.rtc.component import ModuleSpec as ModuleSpec
     from tickrig.host.rtc.component import RtComponent as RtComponent
+    from tickrig.host.rtc.execution.execution_context import ExecutionContext as ExecutionContext
     from tickrig.host.rtc.ports.data_port import InPort as InPort
     from tickrig.host.rtc.ports.data_port import OutPort as OutPort
+    from tickrig.host.rtc.states import ReturnCode as ReturnCode
     from tickrig.host.rtc.system.manager import Manager as Manager
+    from tickrig.wire.rtc_types.basic import Time as Time
+    from tickrig.wire.rtc_types.basic import TimedBoolean as TimedBoolean
+    from tickrig.wire.rtc_types.basic import TimedDouble as TimedDouble
+    from tickrig.wire.rtc_types.basic import TimedDoubleSeq as TimedDoubleSeq
+    from tickrig.wire.rtc_types.basic import TimedFloat as TimedFloat
+    from tickrig.wire.rtc_types.basic import TimedFloatSeq as TimedFloatSeq
+    from tickrig.wire.rtc_types.basic import TimedLong as TimedLong
+    from tickrig.wire.rtc_types.basic import TimedLongSeq as TimedLongSeq
+    from tickrig.wire.rtc_types.basic import TimedOctet as TimedOctet
+    from tickrig.wire.rtc_types.basic import TimedShort as TimedShort
+    from tickrig.wire.rtc_types.basic import TimedShortSeq as TimedShortSeq
+    from tickrig.wire.rtc_types.basic import TimedString as TimedString
+    from tickrig.wire.rtc_types.basic import TimedULong as TimedULong
+    from tickrig.wire.rtc_types.basic import TimedUShort as TimedUShort
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
-            "InPort": "tickrig.host.rtc.ports.data_port",
-            "Manager": "tickrig.host.rtc.system.manager",
-            "OutPort": "tickrig.host.rtc.ports.data_port",
-            "RtComponent": "tickrig.host.rtc.component",
+            "tickrig.host.rtc.component": ("ModuleSpec", "RtComponent"),
+            "tickrig.host.rtc.execution.execution_context": ("ExecutionContext",),
+            "tickrig.host.rtc.ports.data_port": ("InPort", "OutPort"),
+            "tickrig.host.rtc.states": ("ReturnCode",),
+            "tickrig.host.rtc.system.manager": ("Manager",),
+            "tickrig.wire.rtc_types.basic": (
+                "Time",
+                "TimedBoolean",
+                "TimedDouble",
+                "TimedDoubleSeq",
+                "TimedFloat",
+                "TimedFloatSeq",
+                "TimedLong",
+                "TimedLongSeq",
+                "TimedOctet",
+                "TimedShort",
+                "TimedShortSeq",
+                "TimedString",
+                "TimedULong",
+                "TimedUShort",
+            ),
         },
     )
