@@ -6,23 +6,23 @@ NMT Start activates it; while its motor is hot it ends in Error.
 
 from __future__ import annotations
 
-from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result  # internal
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort  # internal
+from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result  # internal
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort  # internal
 from tickrig.device.physical import Input  # internal
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT  # internal
 
 STEP_UM, HOT_DC = 500, 900
 
 
-class Gripper(Component):
+class Gripper(CanopenComponent):
     """Opens to what the in-port says, 500 um each 10 ms, and says how wide it is."""
 
     type_name = "Gripper"
     category = "actuator"
     physical = (Input("motor_dc", "at the motor", low=-400, high=1_250, unit="0.1 degC"),)
-    target_um = InPort("target_um", SHORT)
-    width_um = OutPort("width_um", SHORT)
-    moving = OutPort("moving", BOOLEAN)
+    target_um = CanopenInPort("target_um", SHORT)
+    width_um = CanopenOutPort("width_um", SHORT)
+    moving = CanopenOutPort("moving", BOOLEAN)
 
     def on_execute(self) -> Result:
         """Move towards the target."""

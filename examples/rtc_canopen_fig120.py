@@ -13,7 +13,7 @@ from tickrig.emulators.canopen.rig_file import read_rig  # internal
 from tickrig.host.rtc_canopen.definition.definition import RtConnection  # internal
 from tickrig.host.rtc_canopen.definition.definition_reader import read_definition  # internal
 from tickrig.host.rtc_canopen.serve import read_files, serve  # internal
-from tickrig.host.rtc_canopen.server import Server  # internal
+from tickrig.host.rtc_canopen.server import RtcCanopenServer  # internal
 
 HERE = Path(__file__).parent
 
@@ -26,7 +26,7 @@ def turn(*, pc: bool) -> float:
         definition = replace(definition, pdo_links=(), rt_connections=ports)
     nodes = describe_nodes(read_rig(HERE / "rigs" / "fig120.toml").nodes)
     bench = make_bench(wire := CanWire(), make_nodes(nodes, wire))
-    server = Server(definition, read_files(definition, HERE / "rtc_canopen"))
+    server = RtcCanopenServer(definition, read_files(definition, HERE / "rtc_canopen"))
     serve(server, link := CanHost(bench.rig, wire.end()), 1_000_000)
     bench.operator.set("16/ai1_v", 2.5)
     if pc:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tickrig import Rig, SerialLine, SimLink, Station
 from tickrig.device import RtcLiteNode
-from tickrig.device.rtc_lite.component import Echo  # internal
+from tickrig.device.rtc_lite.component import LiteEcho  # internal
 from tickrig.emulators.rig.rig_clock import RigClock  # internal
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut  # internal
 from tickrig.host.rtc.system.real_time import RealTime  # internal
@@ -14,7 +14,7 @@ from tickrig.rtc import Manager
 
 def main() -> None:
     """Send three numbers through the device."""
-    line, node = SerialLine(57_600), RtcLiteNode(Echo)
+    line, node = SerialLine(57_600), RtcLiteNode(LiteEcho)
     rig, manager = Rig(Station(node, line.a)), Manager()
     runner = RealTime(manager, RigClock(rig))
     source = manager.add(ConsoleIn("ConsoleIn0"), rate_hz=10.0)

@@ -7,12 +7,12 @@ temperature each period, and ends in Error while the sensor is broken.
 from __future__ import annotations
 
 from tickrig.device.physical import Input, SignalType  # internal
-from tickrig.device.rtc_lite.component import ERROR, Component, Result  # internal
-from tickrig.device.rtc_lite.ports import InPort, OutPort  # internal
+from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result  # internal
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort  # internal
 from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT  # internal
 
 
-class Thermometer(Component):
+class Thermometer(LiteComponent):
     """One sensor; an in-port sets the limit above which it is hot."""
 
     type_name = "Thermometer"
@@ -20,9 +20,9 @@ class Thermometer(Component):
         Input("temperature_dc", "at the sensor", low=-400, high=1_250, unit="0.1 degC"),
         Input("sensor_broken", "the cable of the sensor is cut", SignalType.FAULT),
     )
-    limit = InPort("limit", FLOAT)
-    celsius = OutPort("celsius", FLOAT)
-    hot = OutPort("hot", BOOLEAN)
+    limit = LiteInPort("limit", FLOAT)
+    celsius = LiteOutPort("celsius", FLOAT)
+    hot = LiteOutPort("hot", BOOLEAN)
 
     def on_execute(self) -> Result:
         """Measure."""

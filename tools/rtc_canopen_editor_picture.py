@@ -16,7 +16,7 @@ from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.session import Session
+from tickrig.host.rtc_canopen.editor.session import EditorSession
 from tickrig.host.rtc_canopen.serve import open_server
 
 LOOKS: Final = 5
@@ -39,10 +39,10 @@ def picture(examples: Path) -> str:
     bench.operator.set("16/ai1_v", 2.5)
     path = examples / "rtc_canopen" / "fig120.yaml"
     link = CanHost(bench.rig, wire.end())
-    return asyncio.run(_draw(Session(open_server(path), path, link), link))
+    return asyncio.run(_draw(EditorSession(open_server(path), path, link), link))
 
 
-async def _draw(session: Session, link: CanHost) -> str:
+async def _draw(session: EditorSession, link: CanHost) -> str:
     editor = SystemEditor(session, "can0")
     async with editor.run_test(size=(140, 32)) as pilot:
         _pass_time(editor, link)

@@ -9,23 +9,23 @@ from typing import Any, ClassVar, Final
 
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, InputBank
-from tickrig.device.rtc_lite.ports import InPort, OutPort, Port
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort, LitePort
 from tickrig.device.twin import Copyable
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_lite.codes import Status
+from tickrig.wire.rtc_lite.codes import LiteStatus
 from tickrig.wire.rtc_lite.values import LONG, encode_name
 
-ERROR: Final = Status.ERROR
+ERROR: Final = LiteStatus.ERROR
 """What a callback returns that failed."""
 
-Result = Status | None
+Result = LiteStatus | None
 """What a callback returns; nothing means that all went well."""
 
 MAX_PORTS: Final = 8
 """In-ports, and out-ports, that a small device has room for (RTno has as many)."""
 
 
-class Component(Copyable):
+class LiteComponent(Copyable):
     """A component on a small device; a subclass says what it is and does.
 
     Ports are declared as attributes of the class; each component has its own.
@@ -44,10 +44,10 @@ class Component(Copyable):
         ValueError: no type name, or what a PIC has no room for.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
-    >>> class Doubler(Component):
+    >>> class Doubler(LiteComponent):
     ...     type_name = "Doubler"
-    ...     number = InPort("number", LONG)
-    ...     double = OutPort("double", LONG)
+    ...     number = LiteInPort("number", LONG)
+    ...     double = LiteOutPort("double", LONG)
     ...
     ...     def on_execute(self) -> None:
     ...         self.double.write(2 * self.number.read())
@@ -58,14 +58,14 @@ class Component(Copyable):
 
     def __init__(self) -> None:
         self.inputs = InputBank(self.physical)
-        self.in_ports: dict[bytes, InPort[Any]] = {}
-        self.out_ports: dict[bytes, OutPort[Any]] = {}
+        self.in_ports: dict[bytes, LiteInPort[Any]] = {}
+        self.out_ports: dict[bytes, LiteOutPort[Any]] = {}
         kind = type(self).__name__
         try:
             encode_name(self.type_name)
         except FieldError as error:
             raise ValueError(f"{kind}: type_name: {error}") from None
-        own = {name: copy(port) for name, port in declared(type(self), Port)}
+        own = {name: copy(port) for name, port in declared(type(self), LitePort)}
         _check_ports(kind, own.values())
         for name, port in own.items():
             setattr(self, name, port)
@@ -103,7 +103,7 @@ class Component(Copyable):
         """Leave Error; after an error it stays there."""
 
 
-def _check_ports(kind: str, ports: Iterable[Port[Any]]) -> None:
+def _check_ports(kind: str, ports: Iterable[LitePort[Any]]) -> None:
     """Raise ValueError if ports have the same name, or are too many."""
     for word, wanted in (("in-port", True), ("out-port", False)):
         names = [port.name.decode() for port in ports if _is_in(port) is wanted]
@@ -114,16 +114,16 @@ def _check_ports(kind: str, ports: Iterable[Port[Any]]) -> None:
                 raise ValueError(f"{kind}: {count} {word}s are called {name!r}")
 
 
-def _is_in(port: Port[Any]) -> bool:
-    return isinstance(port, InPort)
+def _is_in(port: LitePort[Any]) -> bool:
+    return isinstance(port, LiteInPort)
 
 
-class Echo(Component):
+class LiteEcho(LiteComponent):
     """One in-port, one out-port, both TimedLong."""
 
     type_name = "Echo0"
-    inlet = InPort("in", LONG)
-    outlet = OutPort("out", LONG)
+    inlet = LiteInPort("in", LONG)
+    outlet = LiteOutPort("out", LONG)
 
     def on_execute(self) -> None:
         """Hand on what is new."""
@@ -131,13 +131,13 @@ class Echo(Component):
             self.outlet.write(self.inlet.read())
 
 
-class LiteA(Echo):
+class LiteA(LiteEcho):
     """The first RTC-Lite component of the paper's experiments (DECISION L16)."""
 
     type_name = "LiteA"
 
 
-class LiteB(Echo):
+class LiteB(LiteEcho):
     """The second one."""
 
     type_name = "LiteB"

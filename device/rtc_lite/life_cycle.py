@@ -7,42 +7,56 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from tickrig.device.rtc_lite.component import ERROR, Component, Result
-from tickrig.wire.rtc_lite.codes import Command, State, Status
+from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
 
 
-class Move(NamedTuple):
+class LiteTransition(NamedTuple):
     """What a command does: in which state, which callback, and where that leads."""
 
-    begin: State
+    begin: LiteState
     callback: str
-    good: State
-    bad: State
+    good: LiteState
+    bad: LiteState
 
 
-MOVES: Final[Mapping[Command, Move]] = MappingProxyType(
+TRANSITIONS: Final[Mapping[LiteCommand, LiteTransition]] = MappingProxyType(
     {
-        Command.INITIALIZE: Move(State.CREATED, "on_initialize", State.INACTIVE, State.CREATED),
-        Command.ACTIVATE: Move(State.INACTIVE, "on_activated", State.ACTIVE, State.ERROR),
-        Command.EXECUTE: Move(State.ACTIVE, "on_execute", State.ACTIVE, State.ERROR),
-        Command.DEACTIVATE: Move(State.ACTIVE, "on_deactivated", State.INACTIVE, State.ERROR),
-        Command.ERROR: Move(State.ERROR, "on_error", State.ERROR, State.ERROR),
-        Command.RESET: Move(State.ERROR, "on_reset", State.INACTIVE, State.ERROR),
-        Command.FINALIZE: Move(State.INACTIVE, "on_finalize", State.NONE, State.INACTIVE),
+        LiteCommand.INITIALIZE: LiteTransition(
+            LiteState.CREATED, "on_initialize", LiteState.INACTIVE, LiteState.CREATED
+        ),
+        LiteCommand.ACTIVATE: LiteTransition(
+            LiteState.INACTIVE, "on_activated", LiteState.ACTIVE, LiteState.ERROR
+        ),
+        LiteCommand.EXECUTE: LiteTransition(
+            LiteState.ACTIVE, "on_execute", LiteState.ACTIVE, LiteState.ERROR
+        ),
+        LiteCommand.DEACTIVATE: LiteTransition(
+            LiteState.ACTIVE, "on_deactivated", LiteState.INACTIVE, LiteState.ERROR
+        ),
+        LiteCommand.ERROR: LiteTransition(
+            LiteState.ERROR, "on_error", LiteState.ERROR, LiteState.ERROR
+        ),
+        LiteCommand.RESET: LiteTransition(
+            LiteState.ERROR, "on_reset", LiteState.INACTIVE, LiteState.ERROR
+        ),
+        LiteCommand.FINALIZE: LiteTransition(
+            LiteState.INACTIVE, "on_finalize", LiteState.NONE, LiteState.INACTIVE
+        ),
     }
 )
 
 CONTEXT_CALLBACKS: Final = {
-    Command.STARTUP: "on_startup",
-    Command.SHUTDOWN: "on_shutdown",
+    LiteCommand.STARTUP: "on_startup",
+    LiteCommand.SHUTDOWN: "on_shutdown",
 }
 """They change no state, and are optional: `!` from a component that does not define them."""
 
-NOT_ALIVE: Final = (State.CREATED, State.NONE)
+NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
 
 
 @dataclass(slots=True)
-class LifeCycle:
+class LiteLifeCycle:
     """Runs the callbacks of a component, and keeps its state.
 
     Attributes:
@@ -53,35 +67,35 @@ class LifeCycle:
         executed: how many of them were `on_execute`.
     """
 
-    component: Component
-    state: State = field(default=State.CREATED, init=False)
+    component: LiteComponent
+    state: LiteState = field(default=LiteState.CREATED, init=False)
     latest: str = field(default="", init=False)
     calls: int = field(default=0, init=False)
     executed: int = field(default=0, init=False)
 
-    def obey(self, command: Command) -> Status:
+    def obey(self, command: LiteCommand) -> LiteStatus:
         """Do what a command of the life cycle asks for."""
-        if command is Command.ABORT:
+        if command is LiteCommand.ABORT:
             return self._abort_at_once()
         if command in CONTEXT_CALLBACKS:
             return self._tell(CONTEXT_CALLBACKS[command])
-        move = MOVES[command]
+        move = TRANSITIONS[command]
         if self.state is not move.begin:
-            return Status.WRONG_STATE
+            return LiteStatus.WRONG_STATE
         if self._call(move.callback):
             self.state = move.good
-            return Status.OK
-        if move.bad is State.ERROR and move.begin is not State.ERROR:
+            return LiteStatus.OK
+        if move.bad is LiteState.ERROR and move.begin is not LiteState.ERROR:
             self._enter_error(left=move.callback == "on_deactivated")
         self.state = move.bad
         return ERROR
 
-    def _abort_at_once(self) -> Status:
-        if self.state is not State.ACTIVE:
-            return Status.WRONG_STATE
+    def _abort_at_once(self) -> LiteStatus:
+        if self.state is not LiteState.ACTIVE:
+            return LiteStatus.WRONG_STATE
         self._enter_error()
-        self.state = State.ERROR
-        return Status.OK
+        self.state = LiteState.ERROR
+        return LiteStatus.OK
 
     def _enter_error(self, *, left: bool = False) -> None:
         """Run the exit action of Active unless that is what failed, then `on_aborting`."""
@@ -89,12 +103,12 @@ class LifeCycle:
             self._call("on_deactivated")
         self._call("on_aborting")
 
-    def _tell(self, callback: str) -> Status:
-        if getattr(type(self.component), callback) is getattr(Component, callback):
-            return Status.UNSUPPORTED
+    def _tell(self, callback: str) -> LiteStatus:
+        if getattr(type(self.component), callback) is getattr(LiteComponent, callback):
+            return LiteStatus.UNSUPPORTED
         if self.state in NOT_ALIVE:
-            return Status.WRONG_STATE
-        return Status.OK if self._call(callback) else ERROR
+            return LiteStatus.WRONG_STATE
+        return LiteStatus.OK if self._call(callback) else ERROR
 
     def _call(self, callback: str) -> bool:
         """Run a callback; False if it failed."""
@@ -102,4 +116,4 @@ class LifeCycle:
         self.calls += 1
         self.executed += callback == "on_execute"
         result: Result = getattr(self.component, callback)()
-        return result in (None, Status.OK)
+        return result in (None, LiteStatus.OK)

@@ -7,24 +7,24 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from tickrig.device.physical import InputBank, Output
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.device.rtc_lite.life_cycle import LifeCycle
-from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, Receiver
-from tickrig.device.rtc_lite.server import Server
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
+from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, LiteReceiver
+from tickrig.device.rtc_lite.server import LiteServer
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
 from tickrig.device.timer import Timer
 from tickrig.device.twin import Copyable
-from tickrig.wire.rtc_lite.codes import Command, ContextType, LinkFault, State
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame, Framing, fault_frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteLinkFault, LiteState
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteFrame, LiteFraming, fault_frame
 from tickrig.wire.rtc_lite.layout import REQUESTS
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 
 TICK_US: Final = 1_000
 """How often the main loop of the device looks at the line; a choice, the paper names none."""
 
-TIMED: Final = (State.ACTIVE, State.ERROR)
+TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 """States in which the timer of the device runs."""
 
 
@@ -50,14 +50,14 @@ class RtcLiteNode(Copyable):
         ValueError: a component that a PIC has no room for.
     """
 
-    make: Callable[[], Component]
-    config: NodeConfig = field(default_factory=NodeConfig)
+    make: Callable[[], LiteComponent]
+    config: LiteConfig = field(default_factory=LiteConfig)
     inputs: InputBank = field(init=False)
     _on: bool = field(init=False)
-    _life: LifeCycle = field(init=False)
-    _receiver: Receiver = field(init=False)
+    _life: LiteLifeCycle = field(init=False)
+    _receiver: LiteReceiver = field(init=False)
     _timer: Timer = field(init=False)
-    _server: Server = field(init=False)
+    _server: LiteServer = field(init=False)
     _unsent: bytes = field(init=False)
     _free_us: int = field(init=False)  # when the processor is free again
 
@@ -81,7 +81,7 @@ class RtcLiteNode(Copyable):
         return min(self._receiver.due_us, self._timer.due_us)
 
     @property
-    def component(self) -> Component:
+    def component(self) -> LiteComponent:
         """The component as it is; a power cut makes a new one."""
         return self._life.component
 
@@ -94,12 +94,12 @@ class RtcLiteNode(Copyable):
         """Forget everything but configuration and physical inputs, as a power cut does."""
         component = self.make()
         component.inputs = self.inputs
-        rtno = self.config.framing is Framing.RTNO
-        self._life, self._timer = LifeCycle(component), Timer(self.config.rate_hz)
-        self._receiver = Receiver(
-            RtnoDecoder() if rtno else Decoder(REQUESTS, self.config.checksum)
+        rtno = self.config.framing is LiteFraming.RTNO
+        self._life, self._timer = LiteLifeCycle(component), Timer(self.config.rate_hz)
+        self._receiver = LiteReceiver(
+            RtnoDecoder() if rtno else LiteDecoder(REQUESTS, self.config.checksum)
         )
-        self._server = Server(self._life, self.config.context, self._timer)
+        self._server = LiteServer(self._life, self.config.context, self._timer)
         self._unsent, self._free_us, self._on = b"", 0, False
         self.inputs.changed = True
 
@@ -136,7 +136,7 @@ class RtcLiteNode(Copyable):
         self._free_us = 0
         sent = self._take()
         if self._receiver.expired(now_us):
-            self._send(now_us, [fault_frame(LinkFault.TIMEOUT)])
+            self._send(now_us, [fault_frame(LiteLinkFault.TIMEOUT)])
         return sent
 
     def _take(self) -> bytes:
@@ -146,14 +146,14 @@ class RtcLiteNode(Copyable):
     def _boot(self) -> None:
         """Begin with power; RTno initializes by itself, RTC-Lite is told to (DECISION L11)."""
         self._on = True
-        if self.config.framing is Framing.RTNO:
-            self._life.obey(Command.INITIALIZE)
+        if self.config.framing is LiteFraming.RTNO:
+            self._life.obey(LiteCommand.INITIALIZE)
 
     def _serve(self, now_us: int) -> None:
         """Answer what is in the buffer while the processor is free."""
         while not self._free_us and (found := self._receiver.pull()) is not None:
             calls = self._life.calls
-            if isinstance(found, LinkFault):
+            if isinstance(found, LiteLinkFault):
                 answer = [fault_frame(found)]
             else:
                 answer = self._server.answer(found)
@@ -168,14 +168,14 @@ class RtcLiteNode(Copyable):
 
     def _mind_timer(self, now_us: int) -> None:
         """Let the timer run in the states in which it has something to do."""
-        if self.config.context is ContextType.TIMER and self._life.state in TIMED:
+        if self.config.context is LiteContextType.TIMER and self._life.state in TIMED:
             self._timer.run(now_us)
         else:
             self._timer.stop()
 
-    def _send(self, now_us: int, frames: list[Frame], calls: int = 0) -> None:
+    def _send(self, now_us: int, frames: list[LiteFrame], calls: int = 0) -> None:
         """Send frames, once the processor has done what led to them."""
-        if self.config.framing is Framing.RTNO:
+        if self.config.framing is LiteFraming.RTNO:
             self._unsent += b"".join(map(encode_packet, frames))
         else:
             self._unsent += b"".join(frame.encode(self.config.checksum) for frame in frames)

@@ -3,7 +3,7 @@ r"""Data ports of a component on a small device: a buffer of one place each.
 A new value overwrites the one before; reading it makes it old (RTno's NullBuffer).
 
 >>> from tickrig.wire.rtc_lite.values import LONG
->>> inlet = InPort("in", LONG)
+>>> inlet = LiteInPort("in", LONG)
 >>> inlet.accept(b"\x2a\x00\x00\x00"), inlet.is_new, inlet.read(), inlet.is_new
 (True, True, 42, False)
 """
@@ -15,12 +15,12 @@ from typing import Generic, TypeVar
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
 from tickrig.wire.rtc_lite.messages import PORT_COUNTS_BYTES
-from tickrig.wire.rtc_lite.values import PortType, encode_name
+from tickrig.wire.rtc_lite.values import LitePortType, encode_name
 
 T = TypeVar("T")
 
 
-class Port(Generic[T]):
+class LitePort(Generic[T]):
     """What both kinds of ports have.
 
     Args:
@@ -37,7 +37,7 @@ class Port(Generic[T]):
         ValueError: the name or the largest value does not fit into a frame.
     """
 
-    def __init__(self, name: str, port_type: PortType[T], most: int | None = None) -> None:
+    def __init__(self, name: str, port_type: LitePortType[T], most: int | None = None) -> None:
         self.name, self.port_type = encode_name(name), port_type
         room = MAX_DATA_BYTES - PORT_COUNTS_BYTES - len(self.name)
         if not port_type.sequence:
@@ -60,7 +60,7 @@ class Port(Generic[T]):
         return len(data) <= self._most_bytes
 
 
-class InPort(Port[T]):
+class LiteInPort(LitePort[T]):
     """Where the proxy writes and the component reads."""
 
     def read(self) -> T:
@@ -76,7 +76,7 @@ class InPort(Port[T]):
         return True
 
 
-class OutPort(Port[T]):
+class LiteOutPort(LitePort[T]):
     """Where the component writes; what is new goes to the proxy."""
 
     def write(self, value: T) -> bool:

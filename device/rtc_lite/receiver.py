@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_lite.codes import LinkFault
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteLinkFault
+from tickrig.wire.rtc_lite.frame import LiteFrame
 
 BUFFER_BYTES: Final = 64
 GAP_US: Final = 100_000
@@ -16,7 +16,7 @@ SILENCE_US: Final = 20_000
 """Silence that a receiver needs after a frame whose length it does not know."""
 
 
-class FrameDecoder(Protocol):
+class RequestDecoder(Protocol):
     """`Decoder` or `RtnoDecoder`."""
 
     lost: bool
@@ -29,13 +29,13 @@ class FrameDecoder(Protocol):
     def clear(self) -> None:
         """Look for a header again."""
 
-    def push(self, data: bytes, /) -> list[Frame | LinkFault]:
+    def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
         """Take bytes in; give frames and faults out."""
         ...
 
 
 @dataclass(slots=True)
-class Receiver:
+class LiteReceiver:
     """What the line brought.
 
     Attributes:
@@ -43,7 +43,7 @@ class Receiver:
         dropped: bytes that found the buffer full.
     """
 
-    decoder: FrameDecoder
+    decoder: RequestDecoder
     dropped: int = field(default=0, init=False)
     _waiting: bytes = field(default=b"", init=False)
     _heard_us: int = field(default=0, init=False)  # when the latest byte came
@@ -72,7 +72,7 @@ class Receiver:
         self.decoder.clear()
         return True
 
-    def pull(self) -> Frame | LinkFault | None:
+    def pull(self) -> LiteFrame | LiteLinkFault | None:
         """Return the next frame or fault, and leave what follows it in the buffer."""
         for at in range(len(self._waiting)):
             for found in self.decoder.push(self._waiting[at : at + 1]):

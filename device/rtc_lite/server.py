@@ -6,26 +6,26 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from tickrig.device.rtc_lite.config import RATE_HZ
-from tickrig.device.rtc_lite.life_cycle import LifeCycle
-from tickrig.device.rtc_lite.ports import Port
+from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
+from tickrig.device.rtc_lite.ports import LitePort
 from tickrig.device.timer import Timer
-from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.layout import WITH_FIELDS
 from tickrig.wire.rtc_lite.messages import (
-    ComponentProfile,
-    PortData,
-    PortProfile,
-    Reply,
+    LiteComponentProfile,
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
     parse_port_data,
 )
 
-BY_CONTEXT: Final = (Command.EXECUTE, Command.ERROR)
+BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
 """What the device's own timer does, so that the proxy may not (type 22h)."""
 
 
 @dataclass(slots=True)
-class Server:
+class LiteServer:
     """Answers the requests of the proxy. It knows no time.
 
     Attributes:
@@ -34,90 +34,90 @@ class Server:
         timer: whose rate can be set.
     """
 
-    life: LifeCycle
-    context: ContextType
+    life: LiteLifeCycle
+    context: LiteContextType
     timer: Timer
 
-    def answer(self, request: Frame) -> list[Frame]:
+    def answer(self, request: LiteFrame) -> list[LiteFrame]:
         """Do what a request asks for, and return the frames to send."""
         match request.command:
-            case Command.PROFILE:
+            case LiteCommand.PROFILE:
                 return self._profile()
-            case Command.STATE:
-                reply = Reply(Status.OK, bytes([self.life.state]))
-            case Command.PING:
-                reply = Reply(Status.OK, request.data)
-            case Command.CONTEXT:
-                reply = Reply(Status.OK, bytes([self.context]))
-            case Command.RATE:
-                reply = Reply(self._set_rate(int.from_bytes(request.data, "little")))
-            case Command.WRITE:
-                reply = Reply(self._write(parse_port_data(request.data)))
-            case Command.POLL:
+            case LiteCommand.STATE:
+                reply = LiteReply(LiteStatus.OK, bytes([self.life.state]))
+            case LiteCommand.PING:
+                reply = LiteReply(LiteStatus.OK, request.data)
+            case LiteCommand.CONTEXT:
+                reply = LiteReply(LiteStatus.OK, bytes([self.context]))
+            case LiteCommand.RATE:
+                reply = LiteReply(self._set_rate(int.from_bytes(request.data, "little")))
+            case LiteCommand.WRITE:
+                reply = LiteReply(self._write(parse_port_data(request.data)))
+            case LiteCommand.POLL:
                 reply = self._poll(request.data[1:])
             case command:
                 return self._live(command)
-        return [Frame(request.command, reply.encode())]
+        return [LiteFrame(request.command, reply.encode())]
 
-    def execute(self) -> list[Frame]:
+    def execute(self) -> list[LiteFrame]:
         """Run one period of the timer, and return the data to push."""
-        active = self.life.state is State.ACTIVE
-        self.life.obey(Command.EXECUTE if active else Command.ERROR)
+        active = self.life.state is LiteState.ACTIVE
+        self.life.obey(LiteCommand.EXECUTE if active else LiteCommand.ERROR)
         return self._fresh_data()
 
-    def _live(self, command: Command) -> list[Frame]:
+    def _live(self, command: LiteCommand) -> list[LiteFrame]:
         """Let the life cycle go on; data go before the reply (DECISION L12)."""
-        if self.context is ContextType.TIMER and command in BY_CONTEXT:
-            status = Status.UNSUPPORTED
+        if self.context is LiteContextType.TIMER and command in BY_CONTEXT:
+            status = LiteStatus.UNSUPPORTED
         else:
             status = self.life.obey(command)
-        executed = command is Command.EXECUTE and status in (Status.OK, Status.ERROR)
+        executed = command is LiteCommand.EXECUTE and status in (LiteStatus.OK, LiteStatus.ERROR)
         fields = bytes([self.life.state]) if status in WITH_FIELDS else b""
-        reply = Frame(command, Reply(status, fields).encode())
+        reply = LiteFrame(command, LiteReply(status, fields).encode())
         return [*self._fresh_data(), reply] if executed else [reply]
 
-    def _fresh_data(self) -> list[Frame]:
+    def _fresh_data(self) -> list[LiteFrame]:
         """Take what is new out of the out-ports."""
         return [
-            Frame(Command.DATA, PortData(port.name, port.take()).encode())
+            LiteFrame(LiteCommand.DATA, LitePortData(port.name, port.take()).encode())
             for port in self.life.component.out_ports.values()
             if port.is_new
         ]
 
-    def _profile(self) -> list[Frame]:
+    def _profile(self) -> list[LiteFrame]:
         """Describe the ports, then the component."""
         component = self.life.component
         ins, outs = component.in_ports.values(), component.out_ports.values()
-        end = ComponentProfile(len(ins), len(outs), component.type_name.encode())
+        end = LiteComponentProfile(len(ins), len(outs), component.type_name.encode())
         return [
-            *(Frame(Command.IN_PROFILE, _profile_of(port)) for port in ins),
-            *(Frame(Command.OUT_PROFILE, _profile_of(port)) for port in outs),
-            Frame(Command.PROFILE, Reply(Status.OK, end.encode()).encode()),
+            *(LiteFrame(LiteCommand.IN_PROFILE, _profile_of(port)) for port in ins),
+            *(LiteFrame(LiteCommand.OUT_PROFILE, _profile_of(port)) for port in outs),
+            LiteFrame(LiteCommand.PROFILE, LiteReply(LiteStatus.OK, end.encode()).encode()),
         ]
 
-    def _set_rate(self, rate_hz: int) -> Status:
+    def _set_rate(self, rate_hz: int) -> LiteStatus:
         """Set the rate of the timer; it starts again with it."""
-        if self.context is not ContextType.TIMER or rate_hz not in RATE_HZ:
-            return Status.UNSUPPORTED
+        if self.context is not LiteContextType.TIMER or rate_hz not in RATE_HZ:
+            return LiteStatus.UNSUPPORTED
         self.timer.rate_hz = rate_hz
         self.timer.stop()
-        return Status.OK
+        return LiteStatus.OK
 
-    def _write(self, sent: PortData) -> Status:
+    def _write(self, sent: LitePortData) -> LiteStatus:
         port = self.life.component.in_ports.get(sent.name)
         if port is None:
-            return Status.NO_IN_PORT
-        return Status.OK if port.accept(sent.data) else Status.UNSUPPORTED
+            return LiteStatus.NO_IN_PORT
+        return LiteStatus.OK if port.accept(sent.data) else LiteStatus.UNSUPPORTED
 
-    def _poll(self, name: bytes) -> Reply:
+    def _poll(self, name: bytes) -> LiteReply:
         port = self.life.component.out_ports.get(name)
         if port is None:
-            return Reply(Status.NO_OUT_PORT)
+            return LiteReply(LiteStatus.NO_OUT_PORT)
         if not port.is_new:
-            return Reply(Status.EMPTY)
+            return LiteReply(LiteStatus.EMPTY)
         data = port.take()
-        return Reply(Status.OK, bytes([len(data)]) + data)
+        return LiteReply(LiteStatus.OK, bytes([len(data)]) + data)
 
 
-def _profile_of(port: Port[Any]) -> bytes:
-    return PortProfile(port.port_type.code, port.name).encode()
+def _profile_of(port: LitePort[Any]) -> bytes:
+    return LitePortProfile(port.port_type.code, port.name).encode()

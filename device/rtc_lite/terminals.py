@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from tickrig.device.physical import Input, InputBank, Output, SignalType
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.ports import Port
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.ports import LitePort
 
 INPUTS: Final = (
     Input("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
@@ -25,7 +25,7 @@ OUTPUTS: Final = (
 """Every node has these; each port adds its value."""
 
 
-def new_inputs(component: Component) -> InputBank:
+def new_inputs(component: LiteComponent) -> InputBank:
     """Return the inputs of a node at rest.
 
     Raises:
@@ -42,7 +42,7 @@ def new_inputs(component: Component) -> InputBank:
     return InputBank((*INPUTS, *component.physical))
 
 
-def output_table(component: Component) -> dict[str, Output]:
+def output_table(component: LiteComponent) -> dict[str, Output]:
     """Return the outputs of a node: its own, and the ports as `in.NAME` and `out.NAME`."""
     ports = [
         *(Output(f"in.{name.decode()}", "value of this in-port") for name in component.in_ports),
@@ -51,10 +51,10 @@ def output_table(component: Component) -> dict[str, Output]:
     return {output.name: output for output in (*OUTPUTS, *ports)}
 
 
-def port_text(component: Component, name: str) -> float | str:
+def port_text(component: LiteComponent, name: str) -> float | str:
     """Return the value of the port `in.NAME` or `out.NAME`; KeyError if there is none."""
     side, _, port = name.partition(".")
-    ports: dict[str, Mapping[bytes, Port[Any]]] = {
+    ports: dict[str, Mapping[bytes, LitePort[Any]]] = {
         "in": component.in_ports,
         "out": component.out_ports,
     }

@@ -9,7 +9,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.device.canopen.device_rtc.component import Echo
+from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import application_of, make_dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.emulators.canopen.eds.device_description import DeviceDescription
@@ -75,8 +75,8 @@ _MODELS: Final = (
         "rtc-echo",
         "DeviceRTC whose out-port says what its in-port heard, both Long",
         48,
-        partial(make_dictionary, Echo),
-        application_of(Echo),
+        partial(make_dictionary, CanopenEcho),
+        application_of(CanopenEcho),
     ),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import (
     application_of,
     make_device_rtc,
@@ -24,7 +24,7 @@ def describe_rtc(spec: str) -> DeviceDescription:
     Raises:
         ValueError: its file cannot be run, or it cannot be a DeviceRTC.
     """
-    kind: type[Component] = find_class(spec, Component)
+    kind: type[CanopenComponent] = find_class(spec, CanopenComponent)
     for item in kind.physical:
         if item.name in NODE_INPUTS:
             raise ValueError(f"{spec}: input {item.name!r} is one that every node has")

@@ -7,8 +7,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from tickrig.device.rtc_lite.component import Component, Echo, LiteA, LiteB
-from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, NodeConfig
+from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteComponent, LiteEcho
+from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.trace import Config
@@ -18,17 +18,23 @@ from tickrig.emulators.rtc_lite.line import LINE_FAULTS, verbs
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import refused_at
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
-from tickrig.wire.rtc_lite.codes import Command, ContextType
-from tickrig.wire.rtc_lite.frame import Checksum, Framing
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
 
 ROUTINE: Final = tuple(
     command.value
-    for command in (Command.PING, Command.EXECUTE, Command.ERROR, Command.WRITE, Command.DATA)
+    for command in (
+        LiteCommand.PING,
+        LiteCommand.EXECUTE,
+        LiteCommand.ERROR,
+        LiteCommand.WRITE,
+        LiteCommand.DATA,
+    )
 )
 """What -v leaves out: the traffic of each period."""
 
 
-def config_to_trace(node: str, config: NodeConfig) -> Config:
+def config_to_trace(node: str, config: LiteConfig) -> Config:
     """Return all settings, also those left alone: defaults may change one day."""
     return {
         "node": node,
@@ -46,14 +52,14 @@ def build_rtc_lite(config: Config) -> RtcLiteNode:
     Raises:
         ValueError: a setting that a node does not have, or a value that it cannot have.
     """
-    defaults = config_to_trace("echo", NodeConfig())
+    defaults = config_to_trace("echo", LiteConfig())
     check_config(config, defaults, "a node has no setting")
     settings: dict[str, Any] = {**defaults, **config}
     return RtcLiteNode(
         find_component(settings["node"]),
-        NodeConfig(
-            Framing(settings["framing"]),
-            Checksum(settings["checksum"]),
+        LiteConfig(
+            LiteFraming(settings["framing"]),
+            LiteChecksum(settings["checksum"]),
             _context(settings["context"]),
             settings["rate_hz"],
             settings["slow_answer_us"],
@@ -61,19 +67,19 @@ def build_rtc_lite(config: Config) -> RtcLiteNode:
     )
 
 
-def _context(name: str) -> ContextType:
+def _context(name: str) -> LiteContextType:
     try:
-        return ContextType[name.upper()]
+        return LiteContextType[name.upper()]
     except KeyError:
         raise ValueError(f"context is {name!r}, proxy or timer is possible") from None
 
 
-COMPONENTS: Final[Mapping[str, type[Component]]] = MappingProxyType(
-    {"echo": Echo, "lite-a": LiteA, "lite-b": LiteB}
+COMPONENTS: Final[Mapping[str, type[LiteComponent]]] = MappingProxyType(
+    {"echo": LiteEcho, "lite-a": LiteA, "lite-b": LiteB}
 )
 
 
-def find_component(spec: str) -> type[Component]:
+def find_component(spec: str) -> type[LiteComponent]:
     """Return the component that a name or `FILE.py:Class` stands for.
 
     Raises:
@@ -83,7 +89,7 @@ def find_component(spec: str) -> type[Component]:
         return COMPONENTS[spec]
     if f"{SUFFIX}:" not in spec:
         raise ValueError(f"no node {spec!r}; known: {', '.join(COMPONENTS)}, or FILE.py:Class")
-    kind: type[Component] = find_class(spec, Component)
+    kind: type[LiteComponent] = find_class(spec, LiteComponent)
     try:
         kind()
     except Exception as error:  # a user's constructor may raise anything
@@ -94,10 +100,10 @@ def find_component(spec: str) -> type[Component]:
 def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     node, timer_hz = options["node"], options["timer_hz"]
     with refused_at("--checksum"):
-        config = NodeConfig(
-            Framing(options["framing"]),
-            Checksum(options["checksum"]),
-            ContextType.TIMER if timer_hz else ContextType.PROXY,
+        config = LiteConfig(
+            LiteFraming(options["framing"]),
+            LiteChecksum(options["checksum"]),
+            LiteContextType.TIMER if timer_hz else LiteContextType.PROXY,
             timer_hz or DEFAULT_RATE_HZ,
         )
     with refused_at("--node"):

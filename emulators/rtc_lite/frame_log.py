@@ -9,34 +9,34 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, Receiver
+from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, LiteReceiver
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter
 from tickrig.host.links.link import Link
-from tickrig.wire.rtc_lite.codes import Command, LinkFault
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Framing
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteFraming
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
-from tickrig.wire.rtc_lite.rtno import PacketDecoder
+from tickrig.wire.rtc_lite.rtno import RtnoPacketDecoder
 
 SHOWN: Final = {
-    LinkFault.CHECKSUM: b"(wrong checksum)",
-    LinkFault.UNKNOWN: b"(unknown frame)",
-    LinkFault.TIMEOUT: b"(broken off)",
+    LiteLinkFault.CHECKSUM: b"(wrong checksum)",
+    LiteLinkFault.UNKNOWN: b"(unknown frame)",
+    LiteLinkFault.TIMEOUT: b"(broken off)",
 }
 """What is shown of bytes that are no frame."""
 
 
-def frame_splitter(config: NodeConfig) -> Callable[[Mark], Splitter]:
+def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
     """Return what makes the splitter of each direction."""
 
     def make(mark: Mark) -> Splitter:
-        if config.framing is Framing.RTNO:
+        if config.framing is LiteFraming.RTNO:
             return _PacketSplitter().split
         layouts = REQUESTS if mark is Mark.TO_DEVICE else REPLIES
-        receiver = Receiver(Decoder(layouts, config.checksum))
+        receiver = LiteReceiver(LiteDecoder(layouts, config.checksum))
         return lambda at_us, data: _split(receiver, at_us, data)
 
     return make
@@ -46,33 +46,33 @@ class _PacketSplitter:
     """Shows packets of RTno without header, length and sum."""
 
     def __init__(self) -> None:
-        self._decoder, self._heard_us = PacketDecoder(), 0
+        self._decoder, self._heard_us = RtnoPacketDecoder(), 0
 
     def split(self, at_us: int, data: bytes) -> list[bytes]:
         out, decoder = list[bytes](), self._decoder
         if at_us >= self._heard_us + (SILENCE_US if decoder.lost else GAP_US):
-            out += [SHOWN[LinkFault.TIMEOUT]] if decoder.begun else []
+            out += [SHOWN[LiteLinkFault.TIMEOUT]] if decoder.begun else []
             decoder.clear()
         self._heard_us = at_us
         for found in decoder.packets(data):
-            out.append(SHOWN[found] if isinstance(found, LinkFault) else b"".join(found))
+            out.append(SHOWN[found] if isinstance(found, LiteLinkFault) else b"".join(found))
         return out
 
 
-def _split(receiver: Receiver, at_us: int, data: bytes) -> list[bytes]:
+def _split(receiver: LiteReceiver, at_us: int, data: bytes) -> list[bytes]:
     """Listen as a node listens, with the same time-outs."""
-    out = [SHOWN[LinkFault.TIMEOUT]] if receiver.expired(at_us) else []
+    out = [SHOWN[LiteLinkFault.TIMEOUT]] if receiver.expired(at_us) else []
     for at in range(0, len(data), BUFFER_BYTES):
         receiver.push(at_us, data[at : at + BUFFER_BYTES])
         while (found := receiver.pull()) is not None:
-            out.append(SHOWN[found] if isinstance(found, LinkFault) else found.body)
+            out.append(SHOWN[found] if isinstance(found, LiteLinkFault) else found.body)
     return out
 
 
-_NAMES: Final = {command.value: command.name for command in Command}
+_NAMES: Final = {command.value: command.name for command in LiteCommand}
 
 
-class OverheardLink:
+class MonitoredLink:
     """A `Link[bytes]` that tells each frame that passes through another one.
 
     Args:
@@ -85,7 +85,7 @@ class OverheardLink:
 
     def __init__(self, link: Link[bytes], show: Callable[[str], None]) -> None:
         self._link, self._show, self.shown = link, show, False
-        make = frame_splitter(NodeConfig())
+        make = frame_splitter(LiteConfig())
         self._split = {mark: make(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
 
     @property

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.rig.faults import FaultType
@@ -17,15 +17,15 @@ from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import HEADER, Framing
-from tickrig.wire.rtc_lite.messages import PortData
-from tickrig.wire.rtc_lite.values import PortType
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import HEADER, LiteFraming
+from tickrig.wire.rtc_lite.messages import LitePortData
+from tickrig.wire.rtc_lite.values import LitePortType
 
 
-def verbs(component: Component, config: NodeConfig) -> Mapping[str, Sender]:
+def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
     """Return the verbs that send."""
-    lite = config.framing is Framing.LITE
+    lite = config.framing is LiteFraming.LITE
 
     def send(rest: str) -> Send:
         body = unescape(rest)
@@ -40,20 +40,20 @@ def verbs(component: Component, config: NodeConfig) -> Mapping[str, Sender]:
         if port is None:
             names = known(key.decode() for key in component.in_ports) or "none"
             raise ValueError(f"no in-port {name!r}; known: {names}")
-        data = PortData(port.name, _value(port.port_type, words)).encode()
-        return _packed((Command.WRITE.value if lite else b"S") + data, config)
+        data = LitePortData(port.name, _value(port.port_type, words)).encode()
+        return _packed((LiteCommand.WRITE.value if lite else b"S") + data, config)
 
     return {"send": send, "write": write, "raw": parse_raw}
 
 
-def _packed(body: bytes, config: NodeConfig) -> Send:
+def _packed(body: bytes, config: LiteConfig) -> Send:
     """Put a frame, or a packet of RTno, around a command and its data."""
-    if config.framing is Framing.LITE:
+    if config.framing is LiteFraming.LITE:
         return Send(HEADER + body + bytes([config.checksum.of(body)]), body)
     return Send(rtno.pack(body[:1], body[1:]), body)
 
 
-def _value(port_type: PortType[Any], words: list[str]) -> bytes:
+def _value(port_type: LitePortType[Any], words: list[str]) -> bytes:
     """Write the value that a person typed: a word, or one for each element."""
     if port_type.code in "cC":
         return port_type.encode(" ".join(words))
@@ -65,7 +65,7 @@ def _value(port_type: PortType[Any], words: list[str]) -> bytes:
     return port_type.encode(values[0])
 
 
-_PING_ANSWER: Final = re.compile(rb"\n" + Command.PING.value + rb"@..", re.DOTALL)
+_PING_ANSWER: Final = re.compile(rb"\n" + LiteCommand.PING.value + rb"@..", re.DOTALL)
 
 
 class _Noise(ByteFault):

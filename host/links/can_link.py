@@ -16,7 +16,7 @@ import can
 
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import Stamped, StampedLink
+from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import CONTROLLER_BYTE, ControllerFlag, ErrorClass, ErrorState
 
@@ -148,7 +148,7 @@ class CanLink:
         """Wait for a first frame, then return all that are there."""
         return tuple(frame for _, frame in self.hear(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for a first frame; return a time, and all that had arrived by then.
 
         The time is of before the last look: a process that is stopped behind it knows
@@ -176,7 +176,7 @@ class CanLink:
         except (can.CanError, OSError) as error:
             raise LinkClosed(f"cannot read from {self._name}: {error}") from error
 
-    def _take(self, message: can.Message) -> Stamped:
+    def _take(self, message: can.Message) -> StampedFrames:
         if message.is_error_frame:
             state = _error_state(message)
             if state is not None and self.on_error_state is not None:
@@ -247,7 +247,7 @@ class EchoFreeLink:
         """Return what others sent; nothing, maybe before its time, if it was all echo."""
         return tuple(frame for _, frame in self.hear(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Return a time, and what others sent by then."""
         now_us, heard = self._link.hear(timeout_us)
         while self._awaited and self._awaited[0][0] < now_us - ECHO_US:

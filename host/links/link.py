@@ -40,14 +40,14 @@ class Link(Protocol[W]):
         """Give the line back; closing twice is no error."""
 
 
-Stamped = tuple[tuple[int, CanFrame], ...]
+StampedFrames = tuple[tuple[int, CanFrame], ...]
 """Frames, each with the time at which it had ended on the bus, on the clock of its link."""
 
 
 class StampedLink(Link[Frames], Protocol):
     """A link to a CAN bus for who judges silence: late reading is no silence of the bus."""
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for a first frame; return a time, and all that had arrived by then.
 
         Raises:

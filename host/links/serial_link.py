@@ -47,7 +47,7 @@ class SerialLink:
                 exclusive=exclusive or None,
             )
         except (serial.SerialException, ValueError, OSError) as error:
-            raise LinkClosed(f"cannot open {url!r}: {trouble(url, error)}") from error
+            raise LinkClosed(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
 
     @property
     def now_us(self) -> int:
@@ -87,7 +87,7 @@ LOCKS: Final = Path("/proc/locks")
 COMMAND_SHOWN: Final = 100
 
 
-def trouble(url: str, error: Exception) -> str:
+def explain_open_error(url: str, error: Exception) -> str:
     """Say what is wrong with a port.
 
     Args:

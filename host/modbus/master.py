@@ -24,7 +24,7 @@ _CODES: Final = {code.value: code for code in ExceptionCode}
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ModbusAnswer:
     """What a slave answered.
 
     Attributes:
@@ -78,7 +78,7 @@ class ModbusMaster:
         self.pending, self._tries = request, 0
         self._send(request)
 
-    def poll(self) -> Answer | None:
+    def poll(self) -> ModbusAnswer | None:
         """Return the answer if it has come; make the request again if it is overdue.
 
         Raises:
@@ -115,7 +115,7 @@ class ModbusMaster:
             self.pending = None
             self.misses += 1
 
-    def _parse(self, request: Request) -> Answer | None:
+    def _parse(self, request: Request) -> ModbusAnswer | None:
         frame = self._received
         if len(frame) > len(self._sent) and frame.startswith(self._sent):
             frame = frame[len(self._sent) :]  # the adapter hears what it says
@@ -126,13 +126,13 @@ class ModbusMaster:
         if address != self._address or message[0] & ~ERROR_BIT != request.function:
             return None
         if message[0] & ERROR_BIT:
-            return Answer(request, refusal=_code(message[1]))
+            return ModbusAnswer(request, refusal=_code(message[1]))
         if request.read is None:
-            return Answer(request) if message == encode_response(request) else None
+            return ModbusAnswer(request) if message == encode_response(request) else None
         count = request.read[1]
         if len(message) != 2 + 2 * count:
             return None
-        return Answer(request, struct.unpack_from(f">{count}H", message, 2))
+        return ModbusAnswer(request, struct.unpack_from(f">{count}H", message, 2))
 
 
 def _code(number: int) -> ExceptionCode | int:

@@ -11,13 +11,13 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_canopen.definition.definition import PdoEntry, PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.errors import ServerRefused
-from tickrig.host.rtc_canopen.events import EventKind, Note
+from tickrig.host.rtc_canopen.events import Notify, ServerEventType
 from tickrig.host.rtc_canopen.node.boot import set_pdo
-from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.node.served_node import NodePhase, ServedNode
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 
 
-class Connections:
+class PortConnections:
     """Makes connectors as soon as both ports are there; keeps those of a component that goes.
 
     Args:
@@ -29,7 +29,7 @@ class Connections:
         wanted: those that have not been made.
     """
 
-    def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], note: Note) -> None:
+    def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], note: Notify) -> None:
         self._manager, self._note = manager, note
         self.wanted = list(wanted)
         self._refused = set[str]()
@@ -70,16 +70,16 @@ class Connections:
         """Tell once of a port that is not there; another boot of its device may bring it."""
         if text not in self._refused:
             self._refused.add(text)
-            self._note(EventKind.CONNECTION_REFUSED, 0, text)
+            self._note(ServerEventType.CONNECTION_REFUSED, 0, text)
 
     def _connect(self, entry: RtConnection) -> None:
         ends = f"{entry.source} to {entry.target}"
         try:
             self._manager.connect(entry.source, entry.target, entry.properties)
         except RtcRefused as error:
-            self._note(EventKind.CONNECTION_REFUSED, 0, str(error))
+            self._note(ServerEventType.CONNECTION_REFUSED, 0, str(error))
         else:
-            self._note(EventKind.CONNECTED, 0, ends)
+            self._note(ServerEventType.CONNECTED, 0, ends)
 
 
 def are_there(manager: Manager, entry: RtConnection) -> bool:
@@ -96,7 +96,7 @@ def _entry(profile: ConnectorProfile) -> RtConnection:
     return RtConnection(source, target, dict(profile.properties))
 
 
-class Links:
+class PdoLinks:
     """Makes PDO links when both nodes are ready: an RPDO receives the TPDO of another node.
 
     Args:
@@ -109,7 +109,7 @@ class Links:
     """
 
     def __init__(
-        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], note: Note
+        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], note: Notify
     ) -> None:
         self._nodes, self._note = nodes, note
         self.links = list(links)
@@ -143,7 +143,7 @@ class Links:
                 try:
                     self._check(link)
                 except ServerRefused as error:
-                    self._note(EventKind.LINK_REFUSED, link.target.node, str(error))
+                    self._note(ServerEventType.LINK_REFUSED, link.target.node, str(error))
                 else:
                     self._make(now_us, link)
 
@@ -154,7 +154,7 @@ class Links:
         return find_layout(name, self._nodes[name.node].layouts)
 
     def _ready(self, node_id: int) -> bool:
-        return self._nodes[node_id].phase is Phase.READY
+        return self._nodes[node_id].phase is NodePhase.READY
 
     def _check(self, link: PdoLink) -> None:
         check_lengths(link, self.layout(link.source), self.layout(link.target))
@@ -174,11 +174,11 @@ class Links:
                     sink.linked = linked
             if linked:
                 self._made[link] = cob_id
-            kind = EventKind.PDO_LINKED if linked else EventKind.PDO_UNLINKED
+            kind = ServerEventType.PDO_LINKED if linked else ServerEventType.PDO_UNLINKED
             self._note(kind, node.entry.id, f"{text}: {cob_id:03X}h")
 
         def failed(failure: Failure) -> None:
-            self._note(EventKind.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
+            self._note(ServerEventType.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
         node.run(now_us, QueuedScript("link", script, done, failed, moves=False))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from tickrig.host.rtc.states import ReturnCode
-from tickrig.host.rtc_canopen.events import EventKind, Note
+from tickrig.host.rtc_canopen.events import Notify, ServerEventType
 from tickrig.host.rtc_canopen.node.served_node import ServedNode
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
 from tickrig.wire.can import CanFrame
@@ -14,7 +14,7 @@ from tickrig.wire.rtc_types.idl import Struct
 Send = Callable[[int, bytes], None]
 
 
-class DataFlow:
+class PdoDataFlow:
     """Writes received PDOs to OutPorts, and sends what comes to InPorts.
 
     Data pass while the proxy is Active; for the device not before it is Operational.
@@ -25,7 +25,7 @@ class DataFlow:
         note: takes events.
     """
 
-    def __init__(self, nodes: Mapping[int, ServedNode], send: Send, note: Note) -> None:
+    def __init__(self, nodes: Mapping[int, ServedNode], send: Send, note: Notify) -> None:
         self._nodes, self._send, self._note = nodes, send, note
         self._sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
         self._connected: tuple[tuple[ServedNode, PdoSink], ...] = ()
@@ -57,7 +57,7 @@ class DataFlow:
         for node, source in routes:
             if len(frame.data) < source.layout.size:
                 text = f"{source.layout.name}: {len(frame.data)} of {source.layout.size} bytes"
-                self._note(EventKind.PDO_TOO_SHORT, node.entry.id, text)
+                self._note(ServerEventType.PDO_TOO_SHORT, node.entry.id, text)
             elif node.proxy is not None and node.proxy.passing:
                 source.receive(now_us, frame.data)
         return bool(routes)
@@ -68,7 +68,7 @@ class DataFlow:
             for port, value in sink.take():
                 if self._send_value(node, sink, port, value) is ReturnCode.BAD_PARAMETER:
                     text = f"{node.entry.name}.{port}: {value}"
-                    self._note(EventKind.VALUE_REFUSED, node.entry.id, text)
+                    self._note(ServerEventType.VALUE_REFUSED, node.entry.id, text)
 
     def put(self, name: str, value: Struct) -> ReturnCode:
         """Send a value past all connectors; see `Server.put`."""

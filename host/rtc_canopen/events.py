@@ -13,7 +13,7 @@ KEPT: Final = 10_000
 """Events that a log keeps; older ones are dropped."""
 
 
-class EventKind(StrEnum):
+class ServerEventType(StrEnum):
     """Names of events."""
 
     BOOT_UP = "BootUp"
@@ -48,7 +48,7 @@ class EventKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class ServerEvent:
     """Something that happened.
 
     Attributes:
@@ -58,7 +58,7 @@ class Event:
     """
 
     at_us: int
-    kind: EventKind
+    kind: ServerEventType
     node: int = 0
     text: str = ""
 
@@ -75,13 +75,13 @@ class Event:
         )
 
 
-Listener = Callable[[Event], None]
+EventListener = Callable[[ServerEvent], None]
 
 
-class Note(Protocol):
+class Notify(Protocol):
     """Takes an event, at the present time."""
 
-    def __call__(self, kind: EventKind, node: int, text: str = "", /) -> None:
+    def __call__(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take it; node 0 stands for none."""
 
 
@@ -93,17 +93,17 @@ class EventLog:
     """
 
     def __init__(self) -> None:
-        self._events: deque[Event] = deque(maxlen=KEPT)
-        self.listeners: list[Listener] = []
+        self._events: deque[ServerEvent] = deque(maxlen=KEPT)
+        self.listeners: list[EventListener] = []
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[ServerEvent, ...]:
         """Those that are kept."""
         return tuple(self._events)
 
-    def note(self, at_us: int, kind: EventKind, node: int = 0, text: str = "") -> None:
+    def note(self, at_us: int, kind: ServerEventType, node: int = 0, text: str = "") -> None:
         """Take an event."""
-        event = Event(at_us, kind, node, text)
+        event = ServerEvent(at_us, kind, node, text)
         self._events.append(event)
         for listener in self.listeners:
             listener(event)

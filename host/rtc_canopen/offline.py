@@ -17,7 +17,7 @@ from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.node.boot import boot
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
@@ -34,7 +34,7 @@ from tickrig.wire.canopen.sdo.sdo import (
 Layouts = tuple[PdoLayout, ...]
 
 
-def boot_on_paper(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> Layouts | None:
+def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> Layouts | None:
     """Return the PDOs that will be on, None where the EDS does not give the values."""
     values = dict(file.defaults)
     script = boot(entry, file, writes)
@@ -64,7 +64,7 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None
     return None
 
 
-def check_on_paper(server: Server) -> tuple[str, ...]:
+def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Return what will be refused on the bus, where devices are as their EDS says.
 
     A node whose EDS leaves values out is not judged, nor is a component that is not there.
@@ -74,7 +74,7 @@ def check_on_paper(server: Server) -> tuple[str, ...]:
     """
     layouts = dict[int, Layouts]()
     for node_id, node in server.nodes.items():
-        if (on := boot_on_paper(node.entry, node.file, node.writes)) is not None:
+        if (on := boot_offline(node.entry, node.file, node.writes)) is not None:
             layouts[node_id] = on
     return (
         *_proxies(server, layouts),
@@ -83,7 +83,7 @@ def check_on_paper(server: Server) -> tuple[str, ...]:
     )
 
 
-def _proxies(server: Server, layouts: dict[int, Layouts]) -> Iterator[str]:
+def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
     for node_id, on in layouts.items():
         try:
             server.manager.add(ProxyRtc(server.nodes[node_id].entry, on))
@@ -103,7 +103,7 @@ def _link(link: PdoLink, layouts: dict[int, Layouts]) -> Iterator[str]:
         yield f"pdo_links: {error}"
 
 
-def _connections(server: Server) -> Iterator[str]:
+def _connections(server: RtcCanopenServer) -> Iterator[str]:
     for entry in server.definition.rt_connections:
         try:
             if are_there(server.manager, entry):
@@ -112,13 +112,13 @@ def _connections(server: Server) -> Iterator[str]:
             yield f"rt_connections: {error}"
 
 
-def draw_on_paper(server: Server) -> str:
+def draw_graph(server: RtcCanopenServer) -> str:
     """Return the graph: connections through the PC, and PDO links dashed.
 
     Args:
-        server: it is of no other use any more, as after `check_on_paper`.
+        server: it is of no other use any more, as after `check_offline`.
     """
-    check_on_paper(server)
+    check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}
 
     def port(name: PdoName) -> str:

@@ -11,12 +11,12 @@ from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_reader import read_definition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile, read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.wire.instant import NEVER
 
 
 def serve(
-    server: Server,
+    server: RtcCanopenServer,
     link: StampedLink,
     until_us: int = NEVER,
     done: Callable[[], bool] = lambda: False,
@@ -46,7 +46,7 @@ class ServerRunner:
             at least; a control socket, say.
     """
 
-    def __init__(self, server: Server, link: StampedLink) -> None:
+    def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
         self._server, self._link = server, link
         self.running, self.late_ticks, self.worst_late_us = True, 0, 0
         self.after_tick: list[Callable[[int], None]] = []
@@ -74,7 +74,7 @@ class ServerRunner:
         self.running = False
 
 
-def _step(server: Server, link: StampedLink, until_us: int) -> int:
+def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
     """Wait for what is heard or due, tick the server, send; return how late that was, us."""
     due_us = min(server.due_us, until_us)
     now_us, heard = link.hear(max(0, due_us - link.now_us))
@@ -83,7 +83,7 @@ def _step(server: Server, link: StampedLink, until_us: int) -> int:
     return max(0, now_us - due_us) if due_us else 0
 
 
-def open_server(path: Path) -> Server:
+def open_server(path: Path) -> RtcCanopenServer:
     """Make a server of a System Definition and the EDS files beside it.
 
     Raises:
@@ -91,7 +91,7 @@ def open_server(path: Path) -> Server:
         DefinitionError: it or an EDS cannot be used; the line says where and why.
     """
     definition = read_definition(path)
-    return Server(definition, read_files(definition, path.parent))
+    return RtcCanopenServer(definition, read_files(definition, path.parent))
 
 
 def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:

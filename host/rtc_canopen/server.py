@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.links.link import Stamped
+from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_canopen.connections import Connections, Links
-from tickrig.host.rtc_canopen.data_flow import DataFlow
+from tickrig.host.rtc_canopen.connections import PdoLinks, PortConnections
+from tickrig.host.rtc_canopen.data_flow import PdoDataFlow
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
-from tickrig.host.rtc_canopen.events import EventKind, EventLog
-from tickrig.host.rtc_canopen.node.receiver import QUIET_US, SYNC_COB_ID, Receiver
-from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.events import EventLog, ServerEventType
+from tickrig.host.rtc_canopen.node.receiver import QUIET_US, SYNC_COB_ID, FrameDispatcher
+from tickrig.host.rtc_canopen.node.served_node import NodePhase, ServedNode
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -63,7 +63,7 @@ class PeriodicTimer:
         return True
 
 
-class Server:
+class RtcCanopenServer:
     """Runs the nodes of a System Definition; it has no clock and no bus, it is ticked.
 
     `tick` takes the time and what was heard, and returns what is to be sent, as
@@ -104,14 +104,14 @@ class Server:
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
-        self.links = Links(self.nodes, definition.pdo_links, self.note)
-        self.connections = Connections(self.manager, definition.rt_connections, self.note)
-        self._receiver = Receiver(self.nodes, definition, self)
-        self._data = DataFlow(self.nodes, self.send, self.note)
+        self.links = PdoLinks(self.nodes, definition.pdo_links, self.note)
+        self.connections = PortConnections(self.manager, definition.rt_connections, self.note)
+        self._receiver = FrameDispatcher(self.nodes, definition, self)
+        self._data = PdoDataFlow(self.nodes, self.send, self.note)
         self._start_order = tuple(self.nodes[node_id] for node_id in definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
-    def tick(self, now_us: int, rx: Stamped, /) -> Frames:
+    def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
         """Take all that was on the bus by now; do what is due; return what is to be sent."""
         late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
@@ -175,7 +175,7 @@ class Server:
         for node in self._start_order:
             node.to_start = True
 
-    def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
+    def note(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take an event."""
         self.log.note(self.now_us, kind, node, text)
 
@@ -194,7 +194,7 @@ class Server:
             self._make_proxy(node)
         except RtcRefused as error:  # its name, or that of a port, is there twice
             node.refuse(str(error))
-            self.note(EventKind.PROXY_REFUSED, node.entry.id, str(error))
+            self.note(ServerEventType.PROXY_REFUSED, node.entry.id, str(error))
             return
         node.to_start = node.to_start or self.definition.start.autoactivate
         self.links.make(self.now_us, node.entry.id)
@@ -209,7 +209,7 @@ class Server:
         self.manager.delete(proxy.instance_name)
         self._states.pop(node.entry.id, None)
         self._data.route()
-        self.note(EventKind.PROXY_REMOVED, node.entry.id, proxy.instance_name)
+        self.note(ServerEventType.PROXY_REMOVED, node.entry.id, proxy.instance_name)
 
     def _node(self, entry: NodeEntry, files: Mapping[str, DeviceFile]) -> ServedNode:
         writes = tuple(write for write in self.definition.sdo if write.node == entry.id)
@@ -233,7 +233,7 @@ class Server:
         for node in self.nodes.values():
             node.unseen(self.now_us, late_us)
         if self.now_us >= self._quiet_us:
-            self.note(EventKind.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
+            self.note(ServerEventType.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
             self._quiet_us, self._late_us = self.now_us + QUIET_US, 0
 
     def _make_proxy(self, node: ServedNode) -> None:
@@ -245,8 +245,8 @@ class Server:
             if layout.unknown:
                 mapped = ", ".join(f"{m.index:04X}h:{m.sub:02X}" for m in layout.unknown)
                 text = f"{layout.name}: no port has the type of {mapped}"
-                self.note(EventKind.PORT_REFUSED, node.entry.id, text)
-        self.note(EventKind.PROXY_MADE, node.entry.id, proxy.instance_name)
+                self.note(ServerEventType.PORT_REFUSED, node.entry.id, text)
+        self.note(ServerEventType.PROXY_MADE, node.entry.id, proxy.instance_name)
         self._data.watch(node)
 
     def _hear_bus(self) -> None:
@@ -254,11 +254,11 @@ class Server:
         states, self._bus_states = self._bus_states, []
         for state in states:
             if state is ErrorState.BUS_OFF:
-                self.note(EventKind.BUS_OFF, 0, "the server can neither hear nor send")
+                self.note(ServerEventType.BUS_OFF, 0, "the server can neither hear nor send")
                 for node in self.nodes.values():
                     node.operations.abort()
             elif state is ErrorState.ACTIVE:
-                self.note(EventKind.BUS_ON, 0)
+                self.note(ServerEventType.BUS_ON, 0)
 
     def _tick_nodes(self) -> None:
         self._nodes_due_us = NEVER
@@ -277,7 +277,7 @@ class Server:
         """Activate the next node of the start order, if it is to start and is ready."""
         for node in self._start_order:
             if node.proxy is None or not node.proxy.confirmed:
-                if node.to_start and node.phase is Phase.READY and node.proxy is not None:
+                if node.to_start and node.phase is NodePhase.READY and node.proxy is not None:
                     node.to_start = False
                     node.proxy.contexts[0].activate_component(node.proxy)
                 return
@@ -289,7 +289,7 @@ class Server:
         self._states[node.entry.id] = state
         if before is not None:
             text = f"{before.name} to {state.name}"
-            self.note(EventKind.STATE_CHANGED, node.entry.id, text)
+            self.note(ServerEventType.STATE_CHANGED, node.entry.id, text)
         if state is not LifeCycleState.ERROR:
             proxy.ready = False
 

@@ -19,11 +19,11 @@ from tickrig.host.rtc_canopen.definition.definition import (
     SystemDefinition,
 )
 from tickrig.host.rtc_canopen.errors import ServerRefused
-from tickrig.host.rtc_canopen.events import Event
-from tickrig.host.rtc_canopen.node.served_node import Phase, ServedNode
+from tickrig.host.rtc_canopen.events import ServerEvent
+from tickrig.host.rtc_canopen.node.served_node import NodePhase, ServedNode
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, proxy_index
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 
 NOT_HEARD: Final = -1
 
@@ -79,7 +79,7 @@ class NodeView:
     node_id: int
     name: str
     role: Role
-    phase: Phase
+    phase: NodePhase
     nmt_state: str
     heartbeat_age_us: int
     late: bool
@@ -114,7 +114,7 @@ class SystemView:
     waiting: tuple[RtConnection, ...]
 
 
-class Transfer:
+class PendingTransfer:
     """An SDO transfer that somebody waits for.
 
     Attributes:
@@ -148,7 +148,7 @@ class ServerView:
         server: the server.
     """
 
-    def __init__(self, server: Server) -> None:
+    def __init__(self, server: RtcCanopenServer) -> None:
         self._server = server
 
     @property
@@ -168,7 +168,7 @@ class ServerView:
         return tuple(_component(one) for one in components if not isinstance(one, ProxyRtc))
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[ServerEvent, ...]:
         """What happened, the latest last."""
         return self._server.log.events
 
@@ -232,11 +232,11 @@ class ServerView:
         """End such a link; ServerRefused if there is none."""
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
-    def read(self, node_id: int, index: int, sub: int) -> Transfer:
+    def read(self, node_id: int, index: int, sub: int) -> PendingTransfer:
         """Read an object of a device; ServerRefused if there is no such node."""
         return self._transfer(node_id, upload(index, sub))
 
-    def write(self, node_id: int, index: int, sub: int, data: bytes) -> Transfer:
+    def write(self, node_id: int, index: int, sub: int, data: bytes) -> PendingTransfer:
         """Write an object of a device; ServerRefused if there is no such node."""
         return self._transfer(node_id, download(index, sub, data))
 
@@ -254,8 +254,8 @@ class ServerView:
             raise ServerRefused(f"node {node_id} is none of: {known}")
         return node
 
-    def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> Transfer:
-        transfer = Transfer()
+    def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> PendingTransfer:
+        transfer = PendingTransfer()
         tell = transfer.succeed, transfer.fail, transfer.drop
         job = QueuedScript("transfer", script, *tell, moves=False)
         self._node(node_id).run(self._server.now_us, job)

@@ -9,15 +9,15 @@ from tickrig.host.links.link import Link
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_lite.conversation import POLL_US, Conversation
-from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
+from tickrig.host.rtc_lite.conversation import POLL_US, RequestChannel
+from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
-from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.rtc_lite.settings import ProxySettings
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_lite.codes import Command
+from tickrig.wire.rtc_lite.codes import LiteCommand
 
 
-class Lookout:
+class DeviceWatcher:
     """Asks for the state of a device each 100 ticks from now on, and waits for nothing.
 
     Args:
@@ -25,8 +25,8 @@ class Lookout:
         settings: how often, and how long an answer may take.
     """
 
-    def __init__(self, link: Link[bytes], settings: Settings) -> None:
-        self._talk, self._settings = Conversation(link, settings), settings
+    def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
+        self._talk, self._settings = RequestChannel(link, settings), settings
         self._ask_us = link.now_us + settings.look_period_us
         self._answer_us = link.now_us  # until then an answer may come
 
@@ -40,7 +40,7 @@ class Lookout:
         """Ask, if it is time to; return whether the device has answered."""
         self._talk.poll()
         if self._talk.state is None and self._talk.now_us >= self._ask_us:
-            self._talk.post(Command.STATE)
+            self._talk.post(LiteCommand.STATE)
             self._answer_us = self._ask_us + self._settings.reply_us
             self._ask_us += self._settings.look_period_us
         return self._talk.state is not None
@@ -76,12 +76,12 @@ class Attachment:
     manager: Manager
     link: Link[bytes]
     base_name: str
-    settings: Settings
-    listener: Listener | None = None
+    settings: ProxySettings
+    listener: ProxyListener | None = None
     context: ExecutionContext | None = None
     rate_hz: float = RATE_HZ
     proxy: RtcLiteProxy = field(init=False)
-    _lookout: Lookout | None = field(default=None, init=False)  # for a device that is away
+    _lookout: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
 
     def __post_init__(self) -> None:
         """Make the first proxy, and have the manager tick this."""
@@ -126,9 +126,9 @@ class Attachment:
         if not proxy.alive:
             return
         self.manager.delete(proxy.instance_name)
-        self._tell(EventKind.REMOVED, proxy)
+        self._tell(ProxyEventType.REMOVED, proxy)
         if self.settings.rediscover:
-            self._lookout = Lookout(self.link, self.settings)
+            self._lookout = DeviceWatcher(self.link, self.settings)
         else:
             self.manager.remove_item(self)
 
@@ -139,21 +139,21 @@ class Attachment:
             self.proxy, self._lookout = self._add_proxy(), None
         except RtcRefused as error:
             _LOG.info("%s answers, but: %s", self.base_name, error)
-            self._lookout = Lookout(self.link, self.settings)
+            self._lookout = DeviceWatcher(self.link, self.settings)
         else:
-            self._tell(EventKind.REDISCOVERED, self.proxy)
+            self._tell(ProxyEventType.REDISCOVERED, self.proxy)
 
-    def _tell(self, kind: EventKind, proxy: RtcLiteProxy) -> None:
-        tell(self.listener, ProxyEvent(self.link.now_us, kind, proxy.instance_name))
+    def _tell(self, kind: ProxyEventType, proxy: RtcLiteProxy) -> None:
+        notify(self.listener, ProxyEvent(self.link.now_us, kind, proxy.instance_name))
 
 
 def attach(  # noqa: PLR0913 - options, by keyword
     manager: Manager,
     link: Link[bytes],
     base_name: str,
-    settings: Settings | None = None,
+    settings: ProxySettings | None = None,
     *,
-    listener: Listener | None = None,
+    listener: ProxyListener | None = None,
     context: ExecutionContext | None = None,
     rate_hz: float = RATE_HZ,
 ) -> RtcLiteProxy:
@@ -172,5 +172,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
         RtcRefused: the device does not start up.
         ValueError: a rate that no execution context can have.
     """
-    place = Attachment(manager, link, base_name, settings or Settings(), listener, context, rate_hz)
+    place = Attachment(
+        manager, link, base_name, settings or ProxySettings(), listener, context, rate_hz
+    )
     return place.proxy

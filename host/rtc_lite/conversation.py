@@ -7,17 +7,23 @@ from typing import Final
 
 from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink, RtnoLink
-from tickrig.host.rtc_lite.settings import Settings
-from tickrig.host.rtc_lite.watch import Watch
+from tickrig.host.rtc_lite.settings import ProxySettings
+from tickrig.host.rtc_lite.watch import PingMonitor
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, State, Status
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame, Framing
+from tickrig.wire.rtc_lite.codes import (
+    FAULT_COMMANDS,
+    LiteCommand,
+    LiteLinkFault,
+    LiteState,
+    LiteStatus,
+)
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteFrame, LiteFraming
 from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
-    PortData,
-    PortProfile,
-    Reply,
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
     parse_port_data,
     parse_port_profile,
     parse_reply,
@@ -36,21 +42,21 @@ RETRIES: Final = 3
 """For requests that may be repeated (DECISION L13)."""
 
 _MEANINGS: Final[Mapping[int, str]] = {
-    Status.ERROR: "x: a callback failed",
-    Status.WRONG_STATE: "H: wrong state",
-    Status.NO_IN_PORT: "F: no such in-port",
-    Status.NO_OUT_PORT: "D: no such out-port",
-    Status.EMPTY: "I: nothing new",
-    Status.UNSUPPORTED: "!: not supported",
-    LinkFault.TIMEOUT: "FK: broken off",
-    LinkFault.CHECKSUM: "FH: wrong checksum",
-    LinkFault.UNKNOWN: "FU: unknown",
+    LiteStatus.ERROR: "x: a callback failed",
+    LiteStatus.WRONG_STATE: "H: wrong state",
+    LiteStatus.NO_IN_PORT: "F: no such in-port",
+    LiteStatus.NO_OUT_PORT: "D: no such out-port",
+    LiteStatus.EMPTY: "I: nothing new",
+    LiteStatus.UNSUPPORTED: "!: not supported",
+    LiteLinkFault.TIMEOUT: "FK: broken off",
+    LiteLinkFault.CHECKSUM: "FH: wrong checksum",
+    LiteLinkFault.UNKNOWN: "FU: unknown",
 }
 
 _LOG: Final = log_of(__name__)
 
 
-class Conversation:
+class RequestChannel:
     """What a proxy says and hears.
 
     `ask` waits for a reply, for `reply_us` at most. A reply that does not come
@@ -72,16 +78,18 @@ class Conversation:
         trouble: why the last request was not done, empty if it was.
     """
 
-    def __init__(self, link: Link[bytes], settings: Settings) -> None:
+    def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
         self._line, self._settings = _frames_over(link, settings), settings
-        self.watch = Watch(settings.ping_period_us, settings.reply_us, settings.pings, link.now_us)
-        self.state: State | None = None
-        self.pushed: list[tuple[int, PortData]] = []
-        self.in_ports: list[PortProfile] = []
-        self.out_ports: list[PortProfile] = []
+        self.watch = PingMonitor(
+            settings.ping_period_us, settings.reply_us, settings.pings, link.now_us
+        )
+        self.state: LiteState | None = None
+        self.pushed: list[tuple[int, LitePortData]] = []
+        self.in_ports: list[LitePortProfile] = []
+        self.out_ports: list[LitePortProfile] = []
         self.trouble = ""
-        self._reply: Reply | None = None
-        self._awaited: Command | None = None
+        self._reply: LiteReply | None = None
+        self._awaited: LiteCommand | None = None
         self._looked_us = self._deadline_us = link.now_us
 
     @property
@@ -111,7 +119,7 @@ class Conversation:
         if (number := self.watch.tick(now_us)) is not None:
             self._ping(number)
 
-    def ask(self, command: Command, data: bytes = b"") -> Reply | None:
+    def ask(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
         """Send a request and wait for its reply; None without one, or if nothing may be sent."""
         if not self._free():
             return None
@@ -122,7 +130,7 @@ class Conversation:
             self._ping(self.watch.doubt(self.now_us))
         return reply
 
-    def insist(self, command: Command) -> Reply | None:
+    def insist(self, command: LiteCommand) -> LiteReply | None:
         """Send a request until it is answered, 4 times at most; a missing reply has no effect.
 
         A fault is no answer: what was on the line before has spoilt the request.
@@ -136,9 +144,9 @@ class Conversation:
             reply = self._exchange(command)
         return reply
 
-    def post(self, command: Command, data: bytes = b"") -> None:
+    def post(self, command: LiteCommand, data: bytes = b"") -> None:
         """Send a request and wait for nothing."""
-        self._line.send(Frame(command, data))
+        self._line.send(LiteFrame(command, data))
 
     def poll(self) -> None:
         """Take what has arrived."""
@@ -160,7 +168,7 @@ class Conversation:
         watch.let_go()
         return not (watch.asked or watch.doubted or watch.lost)
 
-    def _exchange(self, command: Command, data: bytes = b"") -> Reply | None:
+    def _exchange(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
         """Send a request and wait for its reply."""
         self.poll()  # what nobody waits for any more
         self._awaited, self._reply = command, None
@@ -172,7 +180,7 @@ class Conversation:
         self._awaited = None
         return reply
 
-    def _await_reply(self) -> Reply | None:
+    def _await_reply(self) -> LiteReply | None:
         limit_us = self.now_us + PROFILE_US
         self._deadline_us = self.now_us + self._settings.reply_us
         while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
@@ -182,14 +190,14 @@ class Conversation:
             self._hear(0)  # it may have come while this process was stopped
         return self._reply
 
-    def _trouble(self, command: Command, reply: Reply | None) -> str:
+    def _trouble(self, command: LiteCommand, reply: LiteReply | None) -> str:
         name = command.value.decode()
         if reply is None:
             return f"no reply to {name} within {self._settings.reply_us // 1_000} ms"
         return "" if reply.ok else f"{name} was answered {_MEANINGS.get(reply.status, reply)}"
 
     def _ping(self, number: int) -> None:
-        self.post(Command.PING, bytes([number]))
+        self.post(LiteCommand.PING, bytes([number]))
 
     def _hear(self, timeout_us: int) -> bool:
         """Wait for bytes and take them; False if the line is gone."""
@@ -198,29 +206,29 @@ class Conversation:
             self._take(frame)
         return frames is not None
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: LiteFrame) -> None:
         """Note what a frame says."""
         self.watch.heard_us = self.now_us
         match frame.command:
-            case Command.DATA:
+            case LiteCommand.DATA:
                 self.pushed.append((self.now_us, parse_port_data(frame.data)))
-            case Command.IN_PROFILE | Command.OUT_PROFILE:
+            case LiteCommand.IN_PROFILE | LiteCommand.OUT_PROFILE:
                 self._take_profile(frame)
             case command if command in FAULT_COMMANDS.values():
                 if self._awaited is not None:
-                    self._reply = Reply(frame.data[0])  # no status, so nothing that is OK
+                    self._reply = LiteReply(frame.data[0])  # no status, so nothing that is OK
             case command:
                 self._take_reply(command, parse_reply(frame))
 
-    def _take_profile(self, frame: Frame) -> None:
-        if frame.data[0] and self._awaited is Command.PROFILE:
-            is_in = frame.command is Command.IN_PROFILE
+    def _take_profile(self, frame: LiteFrame) -> None:
+        if frame.data[0] and self._awaited is LiteCommand.PROFILE:
+            is_in = frame.command is LiteCommand.IN_PROFILE
             ports = self.in_ports if is_in else self.out_ports
             ports.append(parse_port_profile(frame.data))
             self._deadline_us = self.now_us + self._settings.reply_us
 
-    def _take_reply(self, command: Command, reply: Reply) -> None:
-        if command is Command.PING and reply.ok:
+    def _take_reply(self, command: LiteCommand, reply: LiteReply) -> None:
+        if command is LiteCommand.PING and reply.ok:
             self.watch.answered(reply.fields[0])
         if command in WITH_STATE and reply.fields:
             self.state = _state(reply.fields[0])
@@ -228,15 +236,15 @@ class Conversation:
             self._reply = reply
 
 
-def _frames_over(link: Link[bytes], settings: Settings) -> FrameLink:
-    if settings.framing is Framing.RTNO:
+def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
+    if settings.framing is LiteFraming.RTNO:
         return RtnoLink(link)
     checksum = settings.checksum
-    return FrameLink(link, lambda frame: frame.encode(checksum), Decoder(REPLIES, checksum))
+    return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
 
 
-def _state(code: int) -> State | None:
+def _state(code: int) -> LiteState | None:
     try:
-        return State(code)
+        return LiteState(code)
     except ValueError:
         return None

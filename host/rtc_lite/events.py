@@ -14,7 +14,7 @@ from tickrig.host.text.log import log_of
 _LOG: Final = log_of(__name__)
 
 
-class EventKind(StrEnum):
+class ProxyEventType(StrEnum):
     """What happened."""
 
     PASSIVE_ERROR = "PassiveError"  # the device reported an error, or one reply was lost
@@ -36,7 +36,7 @@ class ProxyEvent:
     """
 
     at_us: int
-    kind: EventKind
+    kind: ProxyEventType
     instance_name: str
     reason: str = ""
     frames: tuple[str, ...] = ()
@@ -48,11 +48,11 @@ class ProxyEvent:
         return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}{why}{frames}"
 
 
-Listener = Callable[[ProxyEvent], None]
+ProxyListener = Callable[[ProxyEvent], None]
 """Told of events; what it raises is logged, and nothing else comes of it."""
 
 
-def tell(listener: Listener | None, event: ProxyEvent) -> None:
+def notify(listener: ProxyListener | None, event: ProxyEvent) -> None:
     """Log an event, and tell whoever listens."""
     _LOG.info("%s", event)
 

@@ -9,8 +9,8 @@ from typing import Final, Protocol
 from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_lite.codes import Command, LinkFault, Status
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteStatus
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
 SILENCE_US: Final = 20_000
@@ -22,7 +22,7 @@ KEPT: Final = 8
 _LOG: Final = log_of(__name__)
 
 
-class FrameDecoder(Protocol):
+class ReplyDecoder(Protocol):
     """`Decoder` or `RtnoReplies`."""
 
     @property
@@ -33,13 +33,13 @@ class FrameDecoder(Protocol):
     def clear(self) -> None:
         """Look for a header again."""
 
-    def push(self, data: bytes, /) -> list[Frame | LinkFault]:
+    def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
         """Take bytes in; give frames and faults out."""
         ...
 
 
 class FrameLink:
-    """A `Link[Frame]`, one way requests, the other way replies.
+    """A `Link[LiteFrame]`, one way requests, the other way replies.
 
     A line that is gone is as silent as a device without power. What is no
     frame is left out; after an unknown command the next header is looked for
@@ -55,7 +55,7 @@ class FrameLink:
     """
 
     def __init__(
-        self, link: Link[bytes], encode: Callable[[Frame], bytes], decoder: FrameDecoder
+        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: ReplyDecoder
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
@@ -66,7 +66,7 @@ class FrameLink:
         """Time on the clock of the link."""
         return self._link.now_us
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiteFrame) -> None:
         """Send a frame; a broken one that came long before is not waited for any more."""
         if self.now_us - self._byte_us >= SILENCE_US:
             self._decoder.clear()
@@ -76,7 +76,7 @@ class FrameLink:
         except LinkError as error:
             _LOG.debug("not sent: %s", error)
 
-    def receive(self, timeout_us: int) -> list[Frame] | None:
+    def receive(self, timeout_us: int) -> list[LiteFrame] | None:
         """Wait for bytes, and return the frames that they complete; None if the line is gone."""
         try:
             data = self._link.receive(timeout_us)
@@ -87,12 +87,12 @@ class FrameLink:
             self._byte_us = self.now_us
         if self._decoder.lost:
             self._decoder.clear()
-        frames = [found for found in self._decoder.push(data) if isinstance(found, Frame)]
+        frames = [found for found in self._decoder.push(data) if isinstance(found, LiteFrame)]
         for frame in frames:
             self._note("<", frame)
         return frames
 
-    def _note(self, arrow: str, frame: Frame) -> None:
+    def _note(self, arrow: str, frame: LiteFrame) -> None:
         _LOG.debug("%s %s", arrow, frame.body)
         self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")
 
@@ -114,22 +114,22 @@ class RtnoLink(FrameLink):
         super().__init__(link, encode_request, RtnoReplies())
         self._ping = b""  # number of the PING that waits for its answer
         self._aborts = False
-        self._made_up: list[Frame] = []
+        self._made_up: list[LiteFrame] = []
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: LiteFrame) -> None:
         """Send a request, or what stands for it."""
-        self._aborts = frame.command is Command.ABORT
-        if frame.command is Command.PING:
+        self._aborts = frame.command is LiteCommand.ABORT
+        if frame.command is LiteCommand.PING:
             self._ping = frame.data
-            super().send(Frame(Command.STATE))
+            super().send(LiteFrame(LiteCommand.STATE))
         elif self._aborts:
-            super().send(Frame(Command.DEACTIVATE))
+            super().send(LiteFrame(LiteCommand.DEACTIVATE))
         elif frame.command in LETTERS:
             super().send(frame)
         else:
-            self._made_up.append(Frame(frame.command, bytes([Status.UNSUPPORTED])))
+            self._made_up.append(LiteFrame(frame.command, bytes([LiteStatus.UNSUPPORTED])))
 
-    def receive(self, timeout_us: int) -> list[Frame] | None:
+    def receive(self, timeout_us: int) -> list[LiteFrame] | None:
         """Wait for bytes, and return the frames that they complete; None if the line is gone."""
         made_up, self._made_up = self._made_up, []
         frames = super().receive(0 if made_up else timeout_us)
@@ -139,10 +139,10 @@ class RtnoLink(FrameLink):
             made_up += self._meant(frame)
         return made_up
 
-    def _meant(self, frame: Frame) -> list[Frame]:
-        if frame.command is Command.STATE and self._ping:
+    def _meant(self, frame: LiteFrame) -> list[LiteFrame]:
+        if frame.command is LiteCommand.STATE and self._ping:
             number, self._ping = self._ping, b""
-            return [frame, Frame(Command.PING, bytes([Status.OK]) + number)]
-        if frame.command is Command.DEACTIVATE and self._aborts:
-            return [Frame(Command.ABORT, frame.data)]
+            return [frame, LiteFrame(LiteCommand.PING, bytes([LiteStatus.OK]) + number)]
+        if frame.command is LiteCommand.DEACTIVATE and self._aborts:
+            return [LiteFrame(LiteCommand.ABORT, frame.data)]
         return [frame]

@@ -14,7 +14,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_lite.attachment import RATE_HZ, attach
 from tickrig.host.rtc_lite.events import ProxyEvent
-from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.rtc_lite.settings import ProxySettings
 
 BAUD: Final = 57_600
 
@@ -37,7 +37,7 @@ def attach_lite(
         Refused: no such word, no such line, or nobody answers there.
     """
     name, url, baud = parse_lite(word)
-    settings = Settings(boot_us=boot_us, rediscover=True)
+    settings = ProxySettings(boot_us=boot_us, rediscover=True)
     try:
         link = stack.enter_context(closing(ReopeningLink(lambda: SerialLink(url, baud))))
         attach(manager, link, name, settings, listener=_report, rate_hz=rate_hz or RATE_HZ)

@@ -10,15 +10,15 @@ from tickrig.host.links.link import Link
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
-from tickrig.host.rtc_lite.conversation import RETRIES, Conversation
-from tickrig.host.rtc_lite.events import EventKind, Listener, ProxyEvent, tell
-from tickrig.host.rtc_lite.relays import Relays
-from tickrig.host.rtc_lite.settings import Settings
+from tickrig.host.rtc_lite.conversation import RETRIES, RequestChannel
+from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
+from tickrig.host.rtc_lite.relays import PortBridges
+from tickrig.host.rtc_lite.settings import ProxySettings
 from tickrig.host.rtc_lite.start_up import DeviceProfile, start_up
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
-from tickrig.wire.rtc_lite.codes import Command, ContextType, State, Status
-from tickrig.wire.rtc_lite.messages import Reply
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
+from tickrig.wire.rtc_lite.messages import LiteReply
 
 MIRROR_US: Final = 100_000
 """How often the state of a device is asked that executes by its own timer: each 10th tick."""
@@ -27,18 +27,18 @@ MAX_RATE_HZ: Final = 0xFFFF
 
 _OK: Final = ReturnCode.RTC_OK
 _CODES: Final[dict[int, ReturnCode]] = {
-    Status.OK: ReturnCode.RTC_OK,
-    Status.WRONG_STATE: ReturnCode.PRECONDITION_NOT_MET,
-    Status.NO_IN_PORT: ReturnCode.BAD_PARAMETER,
-    Status.NO_OUT_PORT: ReturnCode.BAD_PARAMETER,
-    Status.UNSUPPORTED: ReturnCode.UNSUPPORTED,
+    LiteStatus.OK: ReturnCode.RTC_OK,
+    LiteStatus.WRONG_STATE: ReturnCode.PRECONDITION_NOT_MET,
+    LiteStatus.NO_IN_PORT: ReturnCode.BAD_PARAMETER,
+    LiteStatus.NO_OUT_PORT: ReturnCode.BAD_PARAMETER,
+    LiteStatus.UNSUPPORTED: ReturnCode.UNSUPPORTED,
 }
 """What a callback returns for a status; RTC_ERROR for any other, and without a reply."""
 
 _TO_INACTIVE: Final = {
-    State.CREATED: Command.INITIALIZE,
-    State.ACTIVE: Command.ABORT,
-    State.ERROR: Command.RESET,
+    LiteState.CREATED: LiteCommand.INITIALIZE,
+    LiteState.ACTIVE: LiteCommand.ABORT,
+    LiteState.ERROR: LiteCommand.RESET,
 }
 """What brings a device one step nearer to Inactive, on_reset of the proxy."""
 
@@ -75,14 +75,14 @@ class RtcLiteProxy(RtComponent):
         self,
         instance_name: str,
         link: Link[bytes],
-        settings: Settings | None = None,
-        listener: Listener | None = None,
+        settings: ProxySettings | None = None,
+        listener: ProxyListener | None = None,
     ) -> None:
         super().__init__(instance_name)
-        self._settings, self._listener = settings or Settings(), listener
-        self._link, self._talk = link, Conversation(link, self._settings)
+        self._settings, self._listener = settings or ProxySettings(), listener
+        self._link, self._talk = link, RequestChannel(link, self._settings)
         self.device: DeviceProfile | None = None
-        self.relays = Relays()
+        self.relays = PortBridges()
         self.fatal_us: int | None = None
         self._failed = False  # a callback failed, so that Error comes next
         self._untold = False  # an error of which nobody knows whether it is a fatal one
@@ -96,7 +96,7 @@ class RtcLiteProxy(RtComponent):
         return self._talk.due_us
 
     @property
-    def device_state(self) -> State | None:
+    def device_state(self) -> LiteState | None:
         """State of the device as it said last; None if nobody knows."""
         return self._talk.state
 
@@ -114,7 +114,7 @@ class RtcLiteProxy(RtComponent):
             before = f"{self._talk.trouble}, and " if self._talk.trouble else ""
             pings = f"none of {self._settings.pings} PINGs was answered"
             self._why = before + pings, self._talk.frames
-            self._tell(EventKind.FATAL_ERROR)
+            self._tell(ProxyEventType.FATAL_ERROR)
             for context in self.contexts:
                 context.abort_component(self)
 
@@ -122,10 +122,10 @@ class RtcLiteProxy(RtComponent):
         """Bring the device to Inactive, and make a port of each of its ports."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
-        self._talk = Conversation(self._link, self._settings)
+        self._talk = RequestChannel(self._link, self._settings)
         try:
             self.device = start_up(self._talk, self._settings.boot_us)
-            self.relays = Relays(self.device.in_ports, self.device.out_ports)
+            self.relays = PortBridges(self.device.in_ports, self.device.out_ports)
             for port in self.relays.ports:
                 self.add_port(port)
         except (LinkError, DeviceRefused, WireError, RtcRefused) as error:
@@ -135,32 +135,32 @@ class RtcLiteProxy(RtComponent):
 
     def on_finalize(self) -> ReturnCode:
         """Finalize the device."""
-        return self._command(Command.FINALIZE)
+        return self._command(LiteCommand.FINALIZE)
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
         """Tell a device that wants to know."""
-        return self._optional(Command.STARTUP)
+        return self._optional(LiteCommand.STARTUP)
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
         """Tell a device that wants to know."""
-        return self._optional(Command.SHUTDOWN)
+        return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
         """Give the nearest whole rate to a device that executes by its own timer."""
         if not self._by_timer:
             return _OK
         rate_hz = min(max(1, round(ec.rate_hz)), MAX_RATE_HZ)
-        return self._command(Command.RATE, rate_hz.to_bytes(2, "little"))
+        return self._command(LiteCommand.RATE, rate_hz.to_bytes(2, "little"))
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Activate the device."""
-        code, self._unanswered = self._command(Command.ACTIVATE), 0
+        code, self._unanswered = self._command(LiteCommand.ACTIVATE), 0
         self._failed = code is not _OK
         return code
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Deactivate the device, unless Error comes next: it is aborted then."""
-        code = _OK if self._failed else self._command(Command.DEACTIVATE)
+        code = _OK if self._failed else self._command(LiteCommand.DEACTIVATE)
         self._hand_out()
         return code
 
@@ -168,7 +168,7 @@ class RtcLiteProxy(RtComponent):
         """Hand data in, let the device execute, and hand data out."""
         code = _OK if self._mute else self._hand_in()
         if code is _OK:
-            code = self._mirror(ec.now_us) if self._by_timer else self._command(Command.EXECUTE)
+            code = self._mirror(ec.now_us) if self._by_timer else self._command(LiteCommand.EXECUTE)
         self._hand_out()
         self._failed = code is not _OK
         return code
@@ -185,8 +185,8 @@ class RtcLiteProxy(RtComponent):
         """Let the device run on_error; one whose reply was lost is made to follow first."""
         self._tell_passive()
         code = self._follow()
-        if self._talk.state is State.ERROR and not self._by_timer:
-            code = self._command(Command.ERROR)
+        if self._talk.state is LiteState.ERROR and not self._by_timer:
+            code = self._command(LiteCommand.ERROR)
         self._hand_out()
         return code
 
@@ -197,34 +197,34 @@ class RtcLiteProxy(RtComponent):
             step = None if state is None else _TO_INACTIVE.get(state)
             if step is None or self._command(step) is ReturnCode.RTC_ERROR:
                 break
-        return _OK if self._talk.state is State.INACTIVE else ReturnCode.RTC_ERROR
+        return _OK if self._talk.state is LiteState.INACTIVE else ReturnCode.RTC_ERROR
 
     @property
     def _by_timer(self) -> bool:
-        return self.device is not None and self.device.context is ContextType.TIMER
+        return self.device is not None and self.device.context is LiteContextType.TIMER
 
     @property
     def _mute(self) -> bool:
         """Whether a device that executes by itself is left alone until it answers a PING."""
         return self._by_timer and self._talk.watch.doubted
 
-    def _command(self, command: Command, data: bytes = b"") -> ReturnCode:
+    def _command(self, command: LiteCommand, data: bytes = b"") -> ReturnCode:
         return _code_of(self._talk.ask(command, data))
 
-    def _optional(self, command: Command) -> ReturnCode:
+    def _optional(self, command: LiteCommand) -> ReturnCode:
         """Ask for a callback that a device may leave out."""
         code = self._command(command)
         return _OK if code is ReturnCode.UNSUPPORTED else code
 
-    def _known_state(self) -> State | None:
+    def _known_state(self) -> LiteState | None:
         """Return the state of the device; ask for it if nobody knows."""
         if self._talk.state is None:
-            self._talk.ask(Command.STATE)
+            self._talk.ask(LiteCommand.STATE)
         return self._talk.state
 
     def _follow(self) -> ReturnCode:
-        if self._known_state() is State.ACTIVE:
-            return self._command(Command.ABORT)
+        if self._known_state() is LiteState.ACTIVE:
+            return self._command(LiteCommand.ABORT)
         return _OK
 
     def _mirror(self, now_us: int) -> ReturnCode:
@@ -233,12 +233,12 @@ class RtcLiteProxy(RtComponent):
             self._talk.poll()
             return _OK
         self._mirrored = now_us // MIRROR_US
-        reply = self._talk.ask(Command.STATE)
+        reply = self._talk.ask(LiteCommand.STATE)
         self._unanswered = 0 if reply else self._unanswered + 1
         if reply is None and self._unanswered <= RETRIES:
             return _OK
         code = _code_of(reply)
-        if code is _OK and self._talk.state is not State.ACTIVE:
+        if code is _OK and self._talk.state is not LiteState.ACTIVE:
             self._talk.trouble = "the device is no longer Active"
             return ReturnCode.RTC_ERROR
         return code
@@ -246,7 +246,7 @@ class RtcLiteProxy(RtComponent):
     def _hand_in(self) -> ReturnCode:
         """Write one new value to each in-port of the device that has one."""
         for data in self.relays.fresh():
-            if (code := self._command(Command.WRITE, data.encode())) is not _OK:
+            if (code := self._command(LiteCommand.WRITE, data.encode())) is not _OK:
                 return code
         return _OK
 
@@ -260,12 +260,12 @@ class RtcLiteProxy(RtComponent):
         """Tell of an error once it is known that the device is there."""
         if self._untold and not self._talk.watch.doubted:
             self._untold = False
-            self._tell(EventKind.PASSIVE_ERROR)
+            self._tell(ProxyEventType.PASSIVE_ERROR)
 
-    def _tell(self, kind: EventKind) -> None:
-        tell(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name, *self._why))
+    def _tell(self, kind: ProxyEventType) -> None:
+        notify(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name, *self._why))
 
 
-def _code_of(reply: Reply | None) -> ReturnCode:
+def _code_of(reply: LiteReply | None) -> ReturnCode:
     error = ReturnCode.RTC_ERROR
     return error if reply is None else _CODES.get(reply.status, error)

@@ -15,8 +15,8 @@ from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_lite.messages import PortData, PortProfile
-from tickrig.wire.rtc_lite.values import PORT_TYPES, PortType
+from tickrig.wire.rtc_lite.messages import LitePortData, LitePortProfile
+from tickrig.wire.rtc_lite.values import PORT_TYPES, LitePortType
 from tickrig.wire.rtc_types import basic
 from tickrig.wire.rtc_types.basic import Time
 
@@ -32,20 +32,20 @@ _KINDS: Final[dict[str, type[Any]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class InRelay:
+class InPortBridge:
     """An InPort of the proxy, and the in-port of the device behind it."""
 
     port: InPort[Any]
     name: bytes
-    port_type: PortType[Any]
+    port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: PortProfile) -> InRelay:
+    def of(cls, profile: LitePortProfile) -> InPortBridge:
         """Make the InPort of an in-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
 
-    def take(self) -> PortData | None:
+    def take(self) -> LitePortData | None:
         """Return the oldest value that was not read, if there is one.
 
         Raises:
@@ -59,18 +59,18 @@ class InRelay:
             bare = tuple(bare)
         elif self.port.data_type is basic.TimedCharSeq:
             bare = "".join(bare)
-        return PortData(self.name, self.port_type.encode(bare))
+        return LitePortData(self.name, self.port_type.encode(bare))
 
 
 @dataclass(frozen=True, slots=True)
-class OutRelay:
+class OutPortBridge:
     """An OutPort of the proxy, and the out-port of the device behind it."""
 
     port: OutPort[Any]
-    port_type: PortType[Any]
+    port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: PortProfile) -> OutRelay:
+    def of(cls, profile: LitePortProfile) -> OutPortBridge:
         """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(OutPort(name, _KINDS[port_type.name]), port_type)
@@ -86,7 +86,7 @@ class OutRelay:
         self.port.write(kind(Time.from_us(now_us), value))
 
 
-def _read(profile: PortProfile) -> tuple[str, PortType[Any]]:
+def _read(profile: LitePortProfile) -> tuple[str, LitePortType[Any]]:
     name = profile.name.decode("latin-1")
     if (port_type := PORT_TYPES.get(profile.code)) is None:
         known = " ".join(PORT_TYPES)
@@ -97,7 +97,7 @@ def _read(profile: PortProfile) -> tuple[str, PortType[Any]]:
 _LOG: Final = log_of(__name__)
 
 
-class Relays:
+class PortBridges:
     """The ports of a proxy, made from the profile of its device.
 
     A value that does not fit the device, and data that fit no port, are logged
@@ -114,9 +114,11 @@ class Relays:
         DeviceRefused: a port of a type that nobody knows.
     """
 
-    def __init__(self, ins: Iterable[PortProfile] = (), outs: Iterable[PortProfile] = ()) -> None:
-        self._ins = [InRelay.of(profile) for profile in ins]
-        self._outs = {profile.name: OutRelay.of(profile) for profile in outs}
+    def __init__(
+        self, ins: Iterable[LitePortProfile] = (), outs: Iterable[LitePortProfile] = ()
+    ) -> None:
+        self._ins = [InPortBridge.of(profile) for profile in ins]
+        self._outs = {profile.name: OutPortBridge.of(profile) for profile in outs}
         self.dropped = 0
 
     @property
@@ -124,7 +126,7 @@ class Relays:
         """The InPorts, then the OutPorts."""
         return chain((relay.port for relay in self._ins), (r.port for r in self._outs.values()))
 
-    def fresh(self) -> Iterator[PortData]:
+    def fresh(self) -> Iterator[LitePortData]:
         """Take one new value from each InPort that has one."""
         for relay in self._ins:
             try:
@@ -135,7 +137,7 @@ class Relays:
                 if data is not None:
                     yield data
 
-    def give(self, at_us: int, data: PortData) -> None:
+    def give(self, at_us: int, data: LitePortData) -> None:
         """Write to an OutPort what arrived from the device."""
         if (relay := self._outs.get(data.name)) is None:
             self._drop("an out-port that was not described", repr(data.name))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.wire.rtc_lite.frame import Checksum, Framing
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ProxySettings:
     """How a proxy talks to its device, and what becomes of it when the device is lost.
 
     Attributes:
@@ -26,8 +26,8 @@ class Settings:
         ValueError: a number that is too small, or another sum for packets of RTno.
     """
 
-    framing: Framing = Framing.LITE
-    checksum: Checksum = Checksum.SUM8
+    framing: LiteFraming = LiteFraming.LITE
+    checksum: LiteChecksum = LiteChecksum.SUM8
     boot_us: int = 0
     reply_us: int = 100_000
     ping_period_us: int = 1_000_000
@@ -38,7 +38,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
+        if self.framing is LiteFraming.RTNO and self.checksum is not LiteChecksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
         at_least = {"boot_us": 0, "linger_us": 0}
         for name in (

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tickrig.host.links.errors import DeviceRefused, LinkTimeout
-from tickrig.host.rtc_lite.conversation import Conversation
-from tickrig.wire.rtc_lite.codes import Command, ContextType, State
-from tickrig.wire.rtc_lite.messages import PortProfile, Reply, parse_component_profile
+from tickrig.host.rtc_lite.conversation import RequestChannel
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState
+from tickrig.wire.rtc_lite.messages import LitePortProfile, LiteReply, parse_component_profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class DeviceProfile:
     """
 
     type_name: str
-    in_ports: tuple[PortProfile, ...]
-    out_ports: tuple[PortProfile, ...]
-    context: ContextType
+    in_ports: tuple[LitePortProfile, ...]
+    out_ports: tuple[LitePortProfile, ...]
+    context: LiteContextType
 
     @property
     def properties(self) -> dict[str, str]:
@@ -35,7 +35,7 @@ class DeviceProfile:
         }
 
 
-def start_up(talk: Conversation, boot_us: int) -> DeviceProfile:
+def start_up(talk: RequestChannel, boot_us: int) -> DeviceProfile:
     """Bring a device to Inactive, and ask what it is.
 
     Raises:
@@ -44,23 +44,23 @@ def start_up(talk: Conversation, boot_us: int) -> DeviceProfile:
         WireError: a profile that cannot be read.
     """
     talk.listen(boot_us)
-    _demand(Command.STATE, talk.insist(Command.STATE))
-    if talk.state is State.ACTIVE:
-        _demand(Command.DEACTIVATE, talk.ask(Command.DEACTIVATE))
-    elif talk.state is State.ERROR:
-        _demand(Command.RESET, talk.ask(Command.RESET))
+    _demand(LiteCommand.STATE, talk.insist(LiteCommand.STATE))
+    if talk.state is LiteState.ACTIVE:
+        _demand(LiteCommand.DEACTIVATE, talk.ask(LiteCommand.DEACTIVATE))
+    elif talk.state is LiteState.ERROR:
+        _demand(LiteCommand.RESET, talk.ask(LiteCommand.RESET))
     profile = _ask_profile(talk)
-    if talk.state is State.CREATED:
-        _demand(Command.INITIALIZE, talk.ask(Command.INITIALIZE))
-    if talk.state is not State.INACTIVE:
+    if talk.state is LiteState.CREATED:
+        _demand(LiteCommand.INITIALIZE, talk.ask(LiteCommand.INITIALIZE))
+    if talk.state is not LiteState.INACTIVE:
         state = "unknown" if talk.state is None else talk.state.name
         raise DeviceRefused(f"the state of the device is {state}, not INACTIVE", state)
     talk.pushed.clear()
     return profile
 
 
-def _ask_profile(talk: Conversation) -> DeviceProfile:
-    reply = _demand(Command.PROFILE, talk.insist(Command.PROFILE))
+def _ask_profile(talk: RequestChannel) -> DeviceProfile:
+    reply = _demand(LiteCommand.PROFILE, talk.insist(LiteCommand.PROFILE))
     told = parse_component_profile(reply.fields)
     ins, outs = tuple(talk.in_ports), tuple(talk.out_ports)
     if (len(ins), len(outs)) != (told.in_ports, told.out_ports):
@@ -69,16 +69,16 @@ def _ask_profile(talk: Conversation) -> DeviceProfile:
     return DeviceProfile(told.type_name.decode("latin-1"), ins, outs, _ask_context(talk))
 
 
-def _ask_context(talk: Conversation) -> ContextType:
-    code = _demand(Command.CONTEXT, talk.insist(Command.CONTEXT)).fields[0]
+def _ask_context(talk: RequestChannel) -> LiteContextType:
+    code = _demand(LiteCommand.CONTEXT, talk.insist(LiteCommand.CONTEXT)).fields[0]
     try:
-        return ContextType(code)
+        return LiteContextType(code)
     except ValueError:
         text = f"execution context 0x{code:02X}, 0x21 and 0x22 are known"
         raise DeviceRefused(text, "BB") from None
 
 
-def _demand(command: Command, reply: Reply | None) -> Reply:
+def _demand(command: LiteCommand, reply: LiteReply | None) -> LiteReply:
     """Return a reply that is there and OK."""
     name = command.value.decode()
     if reply is None:

@@ -12,7 +12,7 @@ SEQUENCE: Final = range(1, 256)
 
 
 @dataclass(slots=True)
-class Watch:
+class PingMonitor:
     """Counts PINGs. It sends nothing, and is told the time.
 
     Args:

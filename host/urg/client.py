@@ -19,7 +19,7 @@ from tickrig.wire.scip.scip1 import SWITCH
 
 
 @dataclass(frozen=True, slots=True)
-class Scan:
+class UrgScan:
     """What a sensor measured in one turn.
 
     Attributes:
@@ -85,7 +85,7 @@ class UrgClient:
         """Replies and scans that were none."""
         return self._spoilt + self._splitter.garbled
 
-    def poll(self) -> list[Scan]:
+    def poll(self) -> list[UrgScan]:
         """Return the scans that have come.
 
         Raises:
@@ -115,7 +115,7 @@ class UrgClient:
         switch = SWITCH + b"\n"
         self._link.send(switch + b"".join(command.encode() for command in asked))
 
-    def _take(self, reply: Reply) -> list[Scan]:
+    def _take(self, reply: Reply) -> list[UrgScan]:
         command = Command.parse(reply.echo)
         if command.symbol == "PP" and reply.status == status.OK:
             self.kind = Specification.parse(reply.lines)
@@ -129,7 +129,7 @@ class UrgClient:
             return []
         time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
         self._heard_us = self._link.now_us
-        return [Scan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
+        return [UrgScan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
 
     def _measure(self, kind: Specification) -> None:
         steps = f"{kind.first:04}{kind.last:04}"

@@ -19,7 +19,7 @@ from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import Echo
+from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
@@ -31,8 +31,8 @@ from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.twin import Copyable, NonCopyable
@@ -44,7 +44,7 @@ from tickrig.wire.can import CanFrame
 WHEELS: Final = BodyParameters(kind="differential", wheel_radius_m=0.1, tread_m=0.4)
 
 
-class Blink(Component):
+class Blink(LiteComponent):
     type_name = "Blink"
 
 
@@ -77,7 +77,7 @@ REFUSED: Final[dict[str, Callable[[], object]]] = {
     "motor core unit": lambda: make_slave(
         motor_core_unit.dictionary(), 5, application=MotorCoreUnit
     ),
-    "DeviceRTC": lambda: make_device_rtc(Echo, 5),
+    "DeviceRTC": lambda: make_device_rtc(CanopenEcho, 5),
     "application": lambda: Application.of(slave()),
 }
 
@@ -144,7 +144,7 @@ def test_every_type_of_machine_is_copied_or_refuses() -> None:
 
 
 FROZEN: Final = (
-    *(RrcConfig(), NodeConfig(), UrgParameters(), BaseParameters(), WHEELS, OmniParameters()),
+    *(RrcConfig(), LiteConfig(), UrgParameters(), BaseParameters(), WHEELS, OmniParameters()),
     *(World(posts=(Post(1, 0, 0.2),)), room(4, 3), Pose(1, 2, 3), EPOS_WHEEL),
     *(Input("lamp", "lamp"), Output("state", "state"), CanFrame.parse("123#00")),
 )

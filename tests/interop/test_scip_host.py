@@ -18,7 +18,7 @@ from hokuyolx import HokuyoLX
 
 from tickrig.emulators.bench.child import running
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.urg.client import Scan, UrgClient
+from tickrig.host.urg.client import UrgClient, UrgScan
 
 pytestmark = pytest.mark.realtime
 
@@ -98,7 +98,7 @@ def test_a_foreign_host_reads_the_timer(laser: HokuyoLX) -> None:
 def test_our_host_measures_on_a_pty() -> None:
     with running("tickrig.emulators.urg.cli", *ROOM) as child:
         client, deadline_s = UrgClient(SerialLink(str(child.link))), time.monotonic() + 10.0
-        scans: list[Scan] = []
+        scans: list[UrgScan] = []
         while len(scans) < 3:
             assert time.monotonic() < deadline_s
             scans += client.poll()

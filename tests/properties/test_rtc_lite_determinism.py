@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.rtc_lite.reference_model import checked
-from tickrig.device.rtc_lite.component import Echo, LiteA, LiteB
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteEcho
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Framing
+from tickrig.wire.rtc_lite.codes import LiteContextType
+from tickrig.wire.rtc_lite.frame import LiteFraming
 from tickrig.wire.rtc_lite.values import LONG
 
 ROOT = Path(__file__).parents[2]
@@ -34,10 +34,10 @@ FRAMES = [
     *(checked("QG", b"\x03out"), b"\nZz\xd4", b"\nAA\x83", WRITE[:5], WRITE[5:], b"\n", b"x" * 70),
 ]
 CONFIGS = [
-    NodeConfig(),
-    NodeConfig(context=ContextType.TIMER, rate_hz=300),
-    NodeConfig(context=ContextType.TIMER, rate_hz=7),
-    NodeConfig(Framing.RTNO),
+    LiteConfig(),
+    LiteConfig(context=LiteContextType.TIMER, rate_hz=300),
+    LiteConfig(context=LiteContextType.TIMER, rate_hz=7),
+    LiteConfig(LiteFraming.RTNO),
 ]
 
 Act = tuple[int, bytes | tuple[str, int]]
@@ -57,9 +57,9 @@ AFTERWARDS_US = 450_000
 begun: list[Act] = [(5_000, frame) for frame in START]
 
 
-def play(session: list[Act], config: NodeConfig, *, dense: bool = False) -> list[object]:
+def play(session: list[Act], config: LiteConfig, *, dense: bool = False) -> list[object]:
     """Play a session on a rig and note everything that can be seen from outside."""
-    line, node = SerialLine(57_600), RtcLiteNode(Echo, config)
+    line, node = SerialLine(57_600), RtcLiteNode(LiteEcho, config)
     rig, log = Rig(Station(node, line.a), dense=dense), list[object]()
     for wait_us, act in [*session, (AFTERWARDS_US, b"")]:
         rig.run_for(wait_us)
@@ -73,7 +73,7 @@ def play(session: list[Act], config: NodeConfig, *, dense: bool = False) -> list
 
 @settings(max_examples=60)
 @given(acts, st.sampled_from(CONFIGS))
-def test_dense_and_sparse_runs_are_the_same(session: list[Act], config: NodeConfig) -> None:
+def test_dense_and_sparse_runs_are_the_same(session: list[Act], config: LiteConfig) -> None:
     session = begun + session
     assert play(session, config) == play(session, config, dense=True)
 
@@ -81,7 +81,7 @@ def test_dense_and_sparse_runs_are_the_same(session: list[Act], config: NodeConf
 @settings(max_examples=100)
 @given(st.lists(st.binary(max_size=90), max_size=12), st.sampled_from([1_000, 30_000]))
 def test_after_any_noise_and_a_pause_a_dialogue_works(chunks: list[bytes], wait_us: int) -> None:
-    line, node = SerialLine(57_600), RtcLiteNode(Echo)
+    line, node = SerialLine(57_600), RtcLiteNode(LiteEcho)
     rig = Rig(Station(node, line.a))
     for chunk in chunks:
         line.b.send(rig.now_us, chunk)
@@ -105,7 +105,7 @@ def test_after_any_noise_and_a_pause_a_dialogue_works(chunks: list[bytes], wait_
 @settings(max_examples=50)
 @given(st.data())
 def test_truncated_and_doubled_frames_never_stop_the_node(data: st.DataObject) -> None:
-    line, node = SerialLine(57_600), RtcLiteNode(Echo)
+    line, node = SerialLine(57_600), RtcLiteNode(LiteEcho)
     rig = Rig(Station(node, line.a))
     for frame in data.draw(st.lists(st.sampled_from(FRAMES), max_size=12)):
         cut = data.draw(st.integers(0, len(frame)))
@@ -120,7 +120,7 @@ def test_truncated_and_doubled_frames_never_stop_the_node(data: st.DataObject) -
 
 def chain(order: int) -> str:
     """Let a host carry what LiteA says to LiteB, under noise; return all that was on both lines."""
-    timer = NodeConfig(context=ContextType.TIMER, rate_hz=170)
+    timer = LiteConfig(context=LiteContextType.TIMER, rate_hz=170)
     nodes = RtcLiteNode(LiteA, timer), RtcLiteNode(LiteB, timer)
     lines = SerialLine(57_600), SerialLine(9_600)
     ports = [FaultyPort(line.a, LINE_FAULTS, seed) for seed, line in enumerate(lines)]

@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import RUNS, percentiles, rates, row
-from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import OutPort as DeviceOutPort
+from tickrig.device.canopen.device_rtc.ports import CanopenOutPort as DeviceOutPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.links.link import Stamped
+from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc import InPort, ModuleSpec, RtComponent
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role, SystemDefinition
 from tickrig.host.rtc_canopen.definition.device_file import read_device_file
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, lay_out
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
@@ -35,7 +35,7 @@ FRAMES = 20_000
 CALLS = 5_000
 
 
-class Counter(Component):
+class Counter(CanopenComponent):
     """Writes its port in each period."""
 
     type_name = "Counter"
@@ -92,14 +92,14 @@ def devices() -> None:
     rates(what, 1, "x real time", work)
 
 
-def ready(count: int) -> Server:
+def ready(count: int) -> RtcCanopenServer:
     """Return a server whose nodes are Operational, without a bus."""
     nodes = tuple(NodeEntry(n, f"N{n}", "eds", Role.DEVICE) for n in range(1, count + 1))
-    server = Server(SystemDefinition(nodes), {"eds": read_device_file(EDS)})
+    server = RtcCanopenServer(SystemDefinition(nodes), {"eds": read_device_file(EDS)})
     server.tick(0, ())
     for node in server.nodes.values():
         node.dialogue.clear()
-        node.layouts, node.phase = (layout(node.entry.id),), Phase.READY
+        node.layouts, node.phase = (layout(node.entry.id),), NodePhase.READY
         server.booted(node)
     for at_us in range(PERIOD_US, 50 * PERIOD_US, PERIOD_US):
         alive = at_us % (10 * PERIOD_US) == 0
@@ -117,12 +117,12 @@ def layout(node_id: int) -> PdoLayout:
     return lay_out(0x1801, 0x280 + node_id, mapping, types)
 
 
-def heartbeats(server: Server, state: NmtState) -> Frames:
+def heartbeats(server: RtcCanopenServer, state: NmtState) -> Frames:
     """Return a heartbeat of each node."""
     return tuple(CanFrame(0x700 + node_id, bytes((state,))) for node_id in server.nodes)
 
 
-def stamped(at_us: int, frames: Frames) -> Stamped:
+def stamped(at_us: int, frames: Frames) -> StampedFrames:
     """Return frames of one time."""
     return tuple((at_us, frame) for frame in frames)
 
@@ -144,7 +144,7 @@ def periods() -> None:
     row("proxies at 100 Hz that one core serves, a PDO and a port write each period", values, "")
 
 
-def sink_all(server: Server) -> None:
+def sink_all(server: RtcCanopenServer) -> None:
     """Connect the port of each proxy."""
     for node in server.nodes.values():
         sink = server.manager.add(Sink(f"S{node.entry.id}"), rate_hz=1.0)

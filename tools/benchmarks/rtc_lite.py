@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from benchmarks.table import percentiles, rates
-from tickrig.device.rtc_lite.component import Echo
+from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.rig.rig import Rig, Station
@@ -32,7 +32,7 @@ def run(seconds: float) -> None:
 
 def virtual() -> None:
     """Execute, with nothing to hand in and with a value, on a line of 57600 bit/s."""
-    line, node = SerialLine(BAUD), RtcLiteNode(Echo)
+    line, node = SerialLine(BAUD), RtcLiteNode(LiteEcho)
     proxy, out = active(SimLink(Rig(Station(node, line.a)), line.b))
     context = ExecutionContext()
 

@@ -16,7 +16,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
 )
 from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
 from tickrig.wire.canopen.eds.object_table import ROT, RWW, ObjectTable
-from tickrig.wire.rtc_canopen.profile import Direction, PlacedPort, RtcProfile
+from tickrig.wire.rtc_canopen.profile import PlacedPort, PortDirection, RtcProfile
 
 NO_PROFILE: Final = 0
 """Device type of a device without a standardised profile (CiA 301, object 1000h)."""
@@ -36,8 +36,8 @@ def object_table(profile: RtcProfile) -> ObjectTable:
         product_code=profile.code,
         revision=profile.revision,
         heartbeat_ms=HEARTBEAT_MS,
-        rpdos=_pdos(profile, Direction.IN),
-        tpdos=_pdos(profile, Direction.OUT),
+        rpdos=_pdos(profile, PortDirection.IN),
+        tpdos=_pdos(profile, PortDirection.OUT),
     )
     add_communication(table, communication)
     for port in profile.placed():
@@ -50,13 +50,13 @@ def device_info(profile: RtcProfile) -> DeviceInfo:
     return DeviceInfo(profile.vendor, profile.type_name, bit_rates=BIT_RATES)
 
 
-def _pdos(profile: RtcProfile, direction: Direction) -> list[Pdo]:
+def _pdos(profile: RtcProfile, direction: PortDirection) -> list[Pdo]:
     return [Pdo(port.cob_id, port.mapping) for port in profile.placed(direction)]
 
 
 def _add_port(table: ObjectTable, port: PlacedPort) -> None:
     kind, name = port.profile.port_type, port.profile.name
-    access = RWW if port.profile.direction is Direction.IN else ROT
+    access = RWW if port.profile.direction is PortDirection.IN else ROT
     if kind.length == 1:
         table.variable(port.index, name, kind.data_type, access)
     else:

@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class PortType(ABC, Generic[T]):
+class CanopenPortType(ABC, Generic[T]):
     """A data type of a port; each element of a value is an object of the dictionary.
 
     Attributes:
@@ -52,7 +52,7 @@ class PortType(ABC, Generic[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class Scalar(PortType[T]):
+class Scalar(CanopenPortType[T]):
     """A row of Table 4: one element."""
 
     kind: type[T]
@@ -77,7 +77,7 @@ class Scalar(PortType[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class SequenceType(PortType[tuple[T, ...]]):
+class SequenceType(CanopenPortType[tuple[T, ...]]):
     """Several elements of one type, always as many; a value is a tuple."""
 
     element: Scalar[T]

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any, Final
 
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
-from tickrig.wire.rtc_canopen.port_types import PortType
+from tickrig.wire.rtc_canopen.port_types import CanopenPortType
 
 FIRST_PORT: Final = 0x2100
 """Index of the first port; the others follow in order of declaration."""
@@ -24,7 +24,7 @@ _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 _VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
 
 
-class Direction(Enum):
+class PortDirection(Enum):
     """Way of the data, seen from the device."""
 
     IN = "in"
@@ -32,7 +32,7 @@ class Direction(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class PortProfile:
+class CanopenPortProfile:
     """A port as it is declared.
 
     Attributes:
@@ -42,8 +42,8 @@ class PortProfile:
     """
 
     name: str
-    direction: Direction
-    port_type: PortType[Any]
+    direction: PortDirection
+    port_type: CanopenPortType[Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +56,14 @@ class PlacedPort:
         number: of its RPDO or TPDO, 1..4.
     """
 
-    profile: PortProfile
+    profile: CanopenPortProfile
     index: int
     number: int
 
     @property
     def cob_id(self) -> int:
         """CAN-ID without the node-ID: of RPDO n for an in-port, of TPDO n for an out-port."""
-        first = 0x200 if self.profile.direction is Direction.IN else 0x180
+        first = 0x200 if self.profile.direction is PortDirection.IN else 0x180
         return first + 0x100 * (self.number - 1)
 
     @property
@@ -102,7 +102,7 @@ class RtcProfile:
     category: str = ""
     rate_hz: int = 100
     product_code: int = 0
-    ports: tuple[PortProfile, ...] = ()
+    ports: tuple[CanopenPortProfile, ...] = ()
 
     def __post_init__(self) -> None:
         """Check all of it (DECISION K17)."""
@@ -129,22 +129,22 @@ class RtcProfile:
         major, minor = self.version.split(".")[:2]
         return int(major) << 16 | int(minor)
 
-    def placed(self, direction: Direction | None = None) -> tuple[PlacedPort, ...]:
+    def placed(self, direction: PortDirection | None = None) -> tuple[PlacedPort, ...]:
         """Return the ports with their places; those of one direction, or all."""
         return tuple(port for port in self._place() if direction in (None, port.profile.direction))
 
     def _place(self) -> Iterator[PlacedPort]:
-        numbers = Counter[Direction]()
+        numbers = Counter[PortDirection]()
         for index, port in enumerate(self.ports, FIRST_PORT):
             numbers[port.direction] += 1
             yield PlacedPort(port, index, numbers[port.direction])
 
 
-def _check_ports(ports: tuple[PortProfile, ...]) -> None:
+def _check_ports(ports: tuple[CanopenPortProfile, ...]) -> None:
     for name, count in Counter(port.name for port in ports).items():
         if count > 1:
             raise ValueError(f"{count} ports are called {name!r}")
-    for direction in Direction:
+    for direction in PortDirection:
         count = sum(port.direction is direction for port in ports)
         if count > MOST_PORTS:
             raise ValueError(f"{count} {direction.value}-ports; {MOST_PORTS} have a COB-ID")
@@ -152,7 +152,7 @@ def _check_ports(ports: tuple[PortProfile, ...]) -> None:
         _check_port(port)
 
 
-def _check_port(port: PortProfile) -> None:
+def _check_port(port: CanopenPortProfile) -> None:
     _check_name("port", port.name)
     kind = port.port_type
     if not kind.bits:

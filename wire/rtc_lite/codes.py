@@ -11,7 +11,7 @@ from enum import Enum, IntEnum
 from typing import Final
 
 
-class Command(Enum):
+class LiteCommand(Enum):
     """Cmnd0 selects the RTC object, Cmnd1 what it does; request and reply carry the same two."""
 
     INITIALIZE = b"CI"
@@ -39,7 +39,7 @@ class Command(Enum):
     UNKNOWN_FAULT = b"FU"
 
 
-class LinkFault(IntEnum):
+class LiteLinkFault(IntEnum):
     """What a receiver says of bytes that are no request (DECISION L7)."""
 
     TIMEOUT = 1
@@ -48,14 +48,14 @@ class LinkFault(IntEnum):
 
 
 FAULT_COMMANDS: Final = {
-    LinkFault.TIMEOUT: Command.TIMEOUT_FAULT,
-    LinkFault.CHECKSUM: Command.CHECKSUM_FAULT,
-    LinkFault.UNKNOWN: Command.UNKNOWN_FAULT,
+    LiteLinkFault.TIMEOUT: LiteCommand.TIMEOUT_FAULT,
+    LiteLinkFault.CHECKSUM: LiteCommand.CHECKSUM_FAULT,
+    LiteLinkFault.UNKNOWN: LiteCommand.UNKNOWN_FAULT,
 }
 """The frame in which each fault is told."""
 
 
-class Status(IntEnum):
+class LiteStatus(IntEnum):
     """First byte of a reply."""
 
     OK = ord("@")
@@ -67,7 +67,7 @@ class Status(IntEnum):
     UNSUPPORTED = ord("!")
 
 
-class State(IntEnum):
+class LiteState(IntEnum):
     """Life-cycle state of the component on the device."""
 
     CREATED = ord("C")
@@ -77,7 +77,7 @@ class State(IntEnum):
     NONE = ord("N")  # finalized
 
 
-class ContextType(IntEnum):
+class LiteContextType(IntEnum):
     """Who makes the component execute."""
 
     PROXY = 0x21  # the proxy's execution context, one AE a period

@@ -1,11 +1,11 @@
 r"""Frames out of a byte stream, cut anywhere.
 
 >>> from tickrig.wire.rtc_lite.layout import REQUESTS
->>> decoder = Decoder(REQUESTS)
+>>> decoder = LiteDecoder(REQUESTS)
 >>> decoder.push(b"noise\n\x43"), decoder.begun
 ([], True)
 >>> decoder.push(b"\x58\x9b")
-[Frame(command=<Command.STATE: b'CX'>, data=b'')]
+[LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'')]
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.wire.rtc_lite.codes import Command, LinkFault
-from tickrig.wire.rtc_lite.frame import HEADER, Checksum, Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
+from tickrig.wire.rtc_lite.frame import HEADER, LiteChecksum, LiteFrame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, Layout
 
-_COMMANDS: Final = {command.value: command for command in Command}
+_COMMANDS: Final = {command.value: command for command in LiteCommand}
 
 
 @dataclass(slots=True)
-class Decoder:
+class LiteDecoder:
     """Reads the frames of one direction (DECISION L6, L7).
 
     It knows no time. Whoever owns it watches the line and calls `clear` after
@@ -38,8 +38,8 @@ class Decoder:
             the next frame begins, and all is thrown away until `clear`.
     """
 
-    layouts: Mapping[Command, Layout]
-    checksum: Checksum = Checksum.SUM8
+    layouts: Mapping[LiteCommand, Layout]
+    checksum: LiteChecksum = LiteChecksum.SUM8
     lost: bool = field(default=False, init=False)
     _frame: bytearray = field(default_factory=bytearray, init=False)  # header and what follows
 
@@ -53,7 +53,7 @@ class Decoder:
         self.lost = False
         self._frame.clear()
 
-    def push(self, data: bytes) -> list[Frame | LinkFault]:
+    def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
         """Take bytes in; give whole frames out, and what was wrong with others."""
         out = []
         for code in data:
@@ -62,10 +62,10 @@ class Decoder:
                 if (found := self._look()) is not None:
                     out.append(found)
                     self._frame.clear()
-                    self.lost = found is LinkFault.UNKNOWN
+                    self.lost = found is LiteLinkFault.UNKNOWN
         return out
 
-    def _look(self) -> Frame | LinkFault | None:
+    def _look(self) -> LiteFrame | LiteLinkFault | None:
         """Return what the latest byte completed."""
         frame = self._frame
         if len(frame) < 3:
@@ -73,12 +73,12 @@ class Decoder:
         command = _COMMANDS.get(bytes(frame[1:3]))
         layout = None if command is None else self.layouts.get(command)
         if command is None or layout is None:  # taken as having no data (DECISION L7)
-            return LinkFault.UNKNOWN if len(frame) == 4 else None
+            return LiteLinkFault.UNKNOWN if len(frame) == 4 else None
         size = layout(frame[3:])
         if size > MAX_DATA_BYTES:
-            return LinkFault.UNKNOWN
+            return LiteLinkFault.UNKNOWN
         if len(frame) < 4 + size:
             return None
         if frame[-1] != self.checksum.of(frame[1:-1]):
-            return LinkFault.CHECKSUM
-        return Frame(command, bytes(frame[3:-1]))
+            return LiteLinkFault.CHECKSUM
+        return LiteFrame(command, bytes(frame[3:-1]))

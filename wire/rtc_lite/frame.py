@@ -1,8 +1,8 @@
 """Frames of RTC-Lite: header, Cmnd0, Cmnd1, data, checksum (paper, Fig. 2).
 
->>> Frame(Command.STATE).encode().hex(" ")
+>>> LiteFrame(LiteCommand.STATE).encode().hex(" ")
 '0a 43 58 9b'
->>> Frame(Command.STATE, b"@C").encode(Checksum.XOR8).hex(" ")
+>>> LiteFrame(LiteCommand.STATE, b"@C").encode(LiteChecksum.XOR8).hex(" ")
 '0a 43 58 40 43 18'
 """
 
@@ -15,11 +15,11 @@ from operator import xor
 from typing import Final
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
 
 
-class Framing(StrEnum):
+class LiteFraming(StrEnum):
     """Frames, or the packets of a relative."""
 
     LITE = "lite"  # the frames of RTC-Lite
@@ -30,7 +30,7 @@ HEADER: Final = b"\n"
 """0x0A (DECISION L4). It may occur in data: only the parser's position tells."""
 
 
-class Checksum(StrEnum):
+class LiteChecksum(StrEnum):
     """How Cmnd0, Cmnd1 and data are summed up (DECISION L5)."""
 
     SUM8 = "sum8"  # the figure's word: Checksum
@@ -38,11 +38,11 @@ class Checksum(StrEnum):
 
     def of(self, body: bytes | bytearray) -> int:
         """Return the last byte of a frame from all between it and the header."""
-        return sum(body) & 0xFF if self is Checksum.SUM8 else reduce(xor, body, 0)
+        return sum(body) & 0xFF if self is LiteChecksum.SUM8 else reduce(xor, body, 0)
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class LiteFrame:
     """A frame, of either direction.
 
     Attributes:
@@ -50,7 +50,7 @@ class Frame:
         data: the marshalled arguments, at most 60 bytes.
     """
 
-    command: Command
+    command: LiteCommand
     data: bytes = b""
 
     def __post_init__(self) -> None:
@@ -63,11 +63,11 @@ class Frame:
         """What the checksum is made of."""
         return self.command.value + self.data
 
-    def encode(self, checksum: Checksum = Checksum.SUM8) -> bytes:
+    def encode(self, checksum: LiteChecksum = LiteChecksum.SUM8) -> bytes:
         """Write the frame with header and checksum."""
         return HEADER + self.body + bytes([checksum.of(self.body)])
 
 
-def fault_frame(fault: LinkFault) -> Frame:
+def fault_frame(fault: LiteLinkFault) -> LiteFrame:
     """Return the frame that tells of bytes that were no request."""
-    return Frame(FAULT_COMMANDS[fault], bytes([fault]))
+    return LiteFrame(FAULT_COMMANDS[fault], bytes([fault]))

@@ -4,9 +4,9 @@ There is no length byte: data delimits itself (DECISION L6). A layout says how
 many bytes the data has as far as the bytes read so far can tell; the data is
 whole when it has that many.
 
->>> REQUESTS[Command.WRITE](b""), REQUESTS[Command.WRITE](b"\x02\x04in")
+>>> REQUESTS[LiteCommand.WRITE](b""), REQUESTS[LiteCommand.WRITE](b"\x02\x04in")
 (2, 8)
->>> REPLIES[Command.WRITE](b"@"), REPLIES[Command.ACTIVATE](b"@")
+>>> REPLIES[LiteCommand.WRITE](b"@"), REPLIES[LiteCommand.ACTIVATE](b"@")
 (1, 2)
 """
 
@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final
 
-from tickrig.wire.rtc_lite.codes import Command, Status
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteStatus
 
 MAX_DATA_BYTES: Final = 60
 """The largest data; with header, commands and checksum it fills a buffer of 64 bytes."""
@@ -24,7 +24,7 @@ MAX_DATA_BYTES: Final = 60
 Layout = Callable[[bytes | bytearray], int]
 """Tells from the data so far how long it is, at least."""
 
-WITH_FIELDS: Final = (Status.OK, Status.ERROR, Status.WRONG_STATE)
+WITH_FIELDS: Final = (LiteStatus.OK, LiteStatus.ERROR, LiteStatus.WRONG_STATE)
 """After any other status the reply ends."""
 
 
@@ -52,39 +52,40 @@ def _component(data: bytes | bytearray) -> int:
 
 
 def _polled(data: bytes | bytearray) -> int:
-    if data and data[0] == Status.OK:
+    if data and data[0] == LiteStatus.OK:
         return 2 + data[1] if len(data) >= 2 else 2
     return 1
 
 
 WITH_STATE: Final = (
-    *(Command.INITIALIZE, Command.STATE, Command.FINALIZE),
-    *(Command.ACTIVATE, Command.DEACTIVATE, Command.EXECUTE, Command.ABORT),
-    *(Command.ERROR, Command.RESET, Command.STARTUP, Command.SHUTDOWN),
+    *(LiteCommand.INITIALIZE, LiteCommand.STATE, LiteCommand.FINALIZE),
+    *(LiteCommand.ACTIVATE, LiteCommand.DEACTIVATE, LiteCommand.EXECUTE, LiteCommand.ABORT),
+    *(LiteCommand.ERROR, LiteCommand.RESET, LiteCommand.STARTUP, LiteCommand.SHUTDOWN),
 )
 """Commands of the life cycle: no arguments, and the state in the reply."""
 
-FAULTS: Final = (Command.CHECKSUM_FAULT, Command.TIMEOUT_FAULT, Command.UNKNOWN_FAULT)
+FAULTS: Final = (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT)
 """What a device says of bytes that are no frame for it."""
 
-REQUESTS: Final[Mapping[Command, Layout]] = {
-    **dict.fromkeys((*WITH_STATE, Command.PROFILE, Command.CONTEXT), partial(_fixed, 0)),
-    Command.PING: partial(_fixed, 1),
-    Command.RATE: partial(_fixed, 2),
-    Command.WRITE: _port_data,
-    Command.POLL: _counted,
+REQUESTS: Final[Mapping[LiteCommand, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, LiteCommand.PROFILE, LiteCommand.CONTEXT), partial(_fixed, 0)),
+    LiteCommand.PING: partial(_fixed, 1),
+    LiteCommand.RATE: partial(_fixed, 2),
+    LiteCommand.WRITE: _port_data,
+    LiteCommand.POLL: _counted,
 }
 """What a proxy sends."""
 
-REPLIES: Final[Mapping[Command, Layout]] = {
-    **dict.fromkeys((*WITH_STATE, Command.PING, Command.CONTEXT), partial(_reply, 1)),
-    **dict.fromkeys((Command.RATE, Command.WRITE), partial(_fixed, 1)),
-    **dict.fromkeys((Command.IN_PROFILE, Command.OUT_PROFILE), _counted),
+REPLIES: Final[Mapping[LiteCommand, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, LiteCommand.PING, LiteCommand.CONTEXT), partial(_reply, 1)),
+    **dict.fromkeys((LiteCommand.RATE, LiteCommand.WRITE), partial(_fixed, 1)),
+    **dict.fromkeys((LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE), _counted),
     **dict.fromkeys(
-        (Command.CHECKSUM_FAULT, Command.TIMEOUT_FAULT, Command.UNKNOWN_FAULT), partial(_fixed, 1)
+        (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT),
+        partial(_fixed, 1),
     ),
-    Command.PROFILE: _component,
-    Command.DATA: _port_data,
-    Command.POLL: _polled,
+    LiteCommand.PROFILE: _component,
+    LiteCommand.DATA: _port_data,
+    LiteCommand.POLL: _polled,
 }
 """What a device sends."""

@@ -1,10 +1,10 @@
 r"""What the data of frames means, beside a single byte.
 
->>> PortData(b"in", b"\x2a\x00\x00\x00").encode().hex(" ")
+>>> LitePortData(b"in", b"\x2a\x00\x00\x00").encode().hex(" ")
 '02 04 69 6e 2a 00 00 00'
 >>> from tickrig.wire.rtc_lite.codes import Command
->>> parse_reply(Frame(Command.ACTIVATE, b"xE"))
-Reply(status=120, fields=b'E')
+>>> parse_reply(LiteFrame(Command.ACTIVATE, b"xE"))
+LiteReply(status=120, fields=b'E')
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.errors import FieldError, FramingError
-from tickrig.wire.rtc_lite.codes import Status
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteStatus
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES
 
 PORT_COUNTS_BYTES: Final = 2
@@ -22,7 +22,7 @@ PORT_COUNTS_BYTES: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class PortData:
+class LitePortData:
     """Data on its way to an in-port (PS) or from an out-port (QV).
 
     Attributes:
@@ -45,7 +45,7 @@ class PortData:
 
 
 @dataclass(frozen=True, slots=True)
-class PortProfile:
+class LitePortProfile:
     """A port as the device describes it (PP, QQ).
 
     Attributes:
@@ -62,7 +62,7 @@ class PortProfile:
 
 
 @dataclass(frozen=True, slots=True)
-class ComponentProfile:
+class LiteComponentProfile:
     """What follows the ports: how many there were, and the type of the component (CZ).
 
     Attributes:
@@ -81,11 +81,11 @@ class ComponentProfile:
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class LiteReply:
     """What a device answers.
 
     Attributes:
-        status: a `Status`, or a number that nobody knows.
+        status: a `LiteStatus`, or a number that nobody knows.
         fields: what follows it: state, sequence number, context type.
     """
 
@@ -95,37 +95,37 @@ class Reply:
     @property
     def ok(self) -> bool:
         """Whether the device did what it was asked for."""
-        return self.status == Status.OK
+        return self.status == LiteStatus.OK
 
     def encode(self) -> bytes:
         """Write the data of the frame."""
         return bytes([self.status]) + self.fields
 
 
-def parse_port_data(data: bytes) -> PortData:
+def parse_port_data(data: bytes) -> LitePortData:
     """Read the data of PS or QV; FramingError if its lengths do not fit."""
     size = 2 + data[0] + data[1] if len(data) >= PORT_COUNTS_BYTES else PORT_COUNTS_BYTES
     if len(data) != size:
         raise FramingError(f"{data.hex(' ')} has {len(data)} bytes, {size} were expected")
     end = PORT_COUNTS_BYTES + data[0]
-    return PortData(data[PORT_COUNTS_BYTES:end], data[end:])
+    return LitePortData(data[PORT_COUNTS_BYTES:end], data[end:])
 
 
-def parse_port_profile(data: bytes) -> PortProfile:
+def parse_port_profile(data: bytes) -> LitePortProfile:
     """Read the data of PP or QQ; FramingError if its length does not fit."""
     if not data or not 1 <= data[0] == len(data) - 1:
         raise FramingError(f"{data.hex(' ')} is not a length, a letter and a name")
-    return PortProfile(chr(data[1]), data[2:])
+    return LitePortProfile(chr(data[1]), data[2:])
 
 
-def parse_component_profile(fields: bytes) -> ComponentProfile:
+def parse_component_profile(fields: bytes) -> LiteComponentProfile:
     """Read the fields of the reply to CZ; FramingError if their length does not fit."""
     if len(fields) < 3 or len(fields) != 3 + fields[2]:
         raise FramingError(f"{fields.hex(' ')} is not two numbers, a length and a name")
-    return ComponentProfile(fields[0], fields[1], fields[3:])
+    return LiteComponentProfile(fields[0], fields[1], fields[3:])
 
 
-def parse_reply(frame: Frame) -> Reply:
+def parse_reply(frame: LiteFrame) -> LiteReply:
     """Read the data of a reply.
 
     Raises:
@@ -134,4 +134,4 @@ def parse_reply(frame: Frame) -> Reply:
     data, layout = frame.data, REPLIES[frame.command]
     if not data or layout(data) != len(data):
         raise FramingError(f"{frame.command.value.decode()} {data.hex(' ')} is not a reply")
-    return Reply(data[0], data[1:])
+    return LiteReply(data[0], data[1:])

@@ -5,10 +5,10 @@ packets carry one letter and a length; replies carry the status alone, or the
 state alone. What RTno has no letter for cannot be sent in bridge mode.
 
 >>> RtnoDecoder().push(bytes.fromhex("0a 0a 58 00 58"))
-[Frame(command=<Command.STATE: b'CX'>, data=b'')]
->>> encode_packet(Frame(Command.STATE, b"@I")).hex(" ")
+[LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'')]
+>>> encode_packet(LiteFrame(LiteCommand.STATE, b"@I")).hex(" ")
 '0a 0a 58 01 49 a2'
->>> encode_request(Frame(Command.STATE)).hex(" ")
+>>> encode_request(LiteFrame(LiteCommand.STATE)).hex(" ")
 '0a 0a 58 00 58'
 """
 
@@ -19,52 +19,52 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, Command, LinkFault, Status
-from tickrig.wire.rtc_lite.frame import Frame, fault_frame
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault, LiteStatus
+from tickrig.wire.rtc_lite.frame import LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES, REQUESTS, WITH_FIELDS
 
 HEADER: Final = b"\n\n"
 EMPTY_PACKET_BYTES: Final = 5
 
-LETTERS: Final[Mapping[Command, bytes]] = MappingProxyType(
+LETTERS: Final[Mapping[LiteCommand, bytes]] = MappingProxyType(
     {
-        **{Command.ACTIVATE: b"A", Command.DEACTIVATE: b"D", Command.EXECUTE: b"E"},
-        **{Command.ERROR: b"C", Command.RESET: b"R", Command.STATE: b"X"},
-        **{Command.PROFILE: b"Z", Command.CONTEXT: b"B", Command.WRITE: b"S"},
-        **{Command.DATA: b"V", Command.IN_PROFILE: b"P", Command.OUT_PROFILE: b"Q"},
+        **{LiteCommand.ACTIVATE: b"A", LiteCommand.DEACTIVATE: b"D", LiteCommand.EXECUTE: b"E"},
+        **{LiteCommand.ERROR: b"C", LiteCommand.RESET: b"R", LiteCommand.STATE: b"X"},
+        **{LiteCommand.PROFILE: b"Z", LiteCommand.CONTEXT: b"B", LiteCommand.WRITE: b"S"},
+        **{LiteCommand.DATA: b"V", LiteCommand.IN_PROFILE: b"P", LiteCommand.OUT_PROFILE: b"Q"},
         **dict.fromkeys(FAULT_COMMANDS.values(), b"F"),
     }
 )
 """RTno's letter of each command that it has."""
 
 _REQUESTS: Final = {LETTERS[command]: command for command in REQUESTS if command in LETTERS}
-_WITHOUT_STATUS: Final = (Command.STATE, Command.CONTEXT)
-_PROFILES: Final = (Command.IN_PROFILE, Command.OUT_PROFILE)
+_WITHOUT_STATUS: Final = (LiteCommand.STATE, LiteCommand.CONTEXT)
+_PROFILES: Final = (LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
 TYPE_NAME: Final = b"RTno"
 """Stands for the type of a component, which a device of RTno does not tell."""
 
-_FAULT: Final = LETTERS[Command.CHECKSUM_FAULT]
+_FAULT: Final = LETTERS[LiteCommand.CHECKSUM_FAULT]
 _COMMANDS: Final = {
     letter: command for command, letter in LETTERS.items() if command not in FAULT_COMMANDS.values()
 }
 _STATES: Final = {
-    Command.ACTIVATE: b"A",
-    Command.DEACTIVATE: b"I",
-    Command.EXECUTE: b"A",
-    Command.ERROR: b"E",
-    Command.RESET: b"I",
+    LiteCommand.ACTIVATE: b"A",
+    LiteCommand.DEACTIVATE: b"I",
+    LiteCommand.EXECUTE: b"A",
+    LiteCommand.ERROR: b"E",
+    LiteCommand.RESET: b"I",
 }
 """The state after a command that was obeyed."""
 
 
-def encode_request(frame: Frame) -> bytes:
+def encode_request(frame: LiteFrame) -> bytes:
     """Write a request as a packet; KeyError if RTno has no letter for it."""
     return pack(LETTERS[frame.command], frame.data)
 
 
-def encode_packet(frame: Frame) -> bytes:
+def encode_packet(frame: LiteFrame) -> bytes:
     """Write a frame of the device as RTno would; KeyError if RTno has no letter for it."""
     return pack(LETTERS[frame.command], _packet_data(frame))
 
@@ -75,16 +75,16 @@ def pack(letter: bytes, data: bytes) -> bytes:
     return HEADER + body + bytes([sum(body) & 0xFF])
 
 
-def _packet_data(frame: Frame) -> bytes:
+def _packet_data(frame: LiteFrame) -> bytes:
     """Return what RTno sends of the data."""
     if frame.command in _WITHOUT_STATUS or frame.command in _PROFILES:
         return frame.data[1:]
     if frame.command in FAULT_COMMANDS.values():
         return bytes([-frame.data[0] & 0xFF])
-    return frame.data if frame.command is Command.DATA else frame.data[:1]
+    return frame.data if frame.command is LiteCommand.DATA else frame.data[:1]
 
 
-class Packet(NamedTuple):
+class RtnoPacket(NamedTuple):
     """A packet of either direction."""
 
     letter: bytes
@@ -92,7 +92,7 @@ class Packet(NamedTuple):
 
 
 @dataclass(slots=True)
-class PacketDecoder:
+class RtnoPacketDecoder:
     """Reads packets of either direction out of a byte stream.
 
     Attributes:
@@ -112,7 +112,7 @@ class PacketDecoder:
         self.lost = False
         self._packet.clear()
 
-    def packets(self, data: bytes) -> list[Packet | LinkFault]:
+    def packets(self, data: bytes) -> list[RtnoPacket | LiteLinkFault]:
         """Take bytes in; give whole packets out, and what was wrong with others."""
         out = []
         for code in data:
@@ -124,52 +124,52 @@ class PacketDecoder:
             elif (found := self._look()) is not None:
                 out.append(found)
                 self._packet.clear()
-                self.lost = found is LinkFault.UNKNOWN
+                self.lost = found is LiteLinkFault.UNKNOWN
         return out
 
-    def _look(self) -> Packet | LinkFault | None:
+    def _look(self) -> RtnoPacket | LiteLinkFault | None:
         """Return what the latest byte completed."""
         packet = self._packet
         if len(packet) < EMPTY_PACKET_BYTES:
             return None
         size = packet[3]
         if size > MAX_DATA_BYTES:
-            return LinkFault.UNKNOWN
+            return LiteLinkFault.UNKNOWN
         if len(packet) < EMPTY_PACKET_BYTES + size:
             return None
         if packet[-1] != sum(packet[2:-1]) & 0xFF:
-            return LinkFault.CHECKSUM
-        return Packet(bytes(packet[2:3]), bytes(packet[4:-1]))
+            return LiteLinkFault.CHECKSUM
+        return RtnoPacket(bytes(packet[2:3]), bytes(packet[4:-1]))
 
 
 @dataclass(slots=True)
-class RtnoDecoder(PacketDecoder):
+class RtnoDecoder(RtnoPacketDecoder):
     """Reads the packets of a proxy as frames; used as `Decoder` is.
 
     An unknown letter has the same effect as more data than fit.
     """
 
-    def push(self, data: bytes) -> list[Frame | LinkFault]:
+    def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
         """Take bytes in; give whole packets out as frames, and what was wrong with others."""
         out = []
         for found in self.packets(data):
-            out.append(found if isinstance(found, LinkFault) else _frame_of(found))
-            if out[-1] is LinkFault.UNKNOWN:
+            out.append(found if isinstance(found, LiteLinkFault) else _frame_of(found))
+            if out[-1] is LiteLinkFault.UNKNOWN:
                 self.clear()
                 self.lost = True
                 break
         return out
 
 
-def _frame_of(packet: Packet) -> Frame | LinkFault:
+def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
     command = _REQUESTS.get(packet.letter)
     if command is None or REQUESTS[command](packet.data) != len(packet.data):
-        return LinkFault.UNKNOWN
-    return Frame(command, packet.data)
+        return LiteLinkFault.UNKNOWN
+    return LiteFrame(command, packet.data)
 
 
 @dataclass(slots=True)
-class RtnoReplies(PacketDecoder):
+class RtnoReplies(RtnoPacketDecoder):
     r"""Reads the packets of a device as frames; used as `Decoder(REPLIES)` is.
 
     RTno leaves out what a frame has: the status of a state, the state after a
@@ -177,54 +177,56 @@ class RtnoReplies(PacketDecoder):
     follow from the rest; the state after a refusal is `?`, which is none.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
-    [Frame(command=<Command.STATE: b'CX'>, data=b'@I')]
+    [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]
     """
 
-    _ports: dict[Command, int] = field(default_factory=dict, init=False)  # since the last profile
+    _ports: dict[LiteCommand, int] = field(
+        default_factory=dict, init=False
+    )  # since the last profile
 
-    def push(self, data: bytes) -> list[Frame | LinkFault]:
+    def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
         """Take bytes in; give whole packets out as frames, and what was wrong with others."""
         return [
-            found if isinstance(found, LinkFault) else self._frame_of(found)
+            found if isinstance(found, LiteLinkFault) else self._frame_of(found)
             for found in self.packets(data)
         ]
 
-    def _frame_of(self, packet: Packet) -> Frame | LinkFault:
+    def _frame_of(self, packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
         if packet.letter == _FAULT:
             return _fault_of(packet.data)
         command = _COMMANDS.get(packet.letter)
         if command is None:
-            return LinkFault.UNKNOWN
+            return LiteLinkFault.UNKNOWN
         data = self._complete(command, packet.data)
         if len(data) > MAX_DATA_BYTES or REPLIES[command](data) != len(data):
-            return LinkFault.UNKNOWN
-        return Frame(command, data)
+            return LiteLinkFault.UNKNOWN
+        return LiteFrame(command, data)
 
-    def _complete(self, command: Command, data: bytes) -> bytes:
+    def _complete(self, command: LiteCommand, data: bytes) -> bytes:
         """Put in what RTno leaves out."""
-        if command in {Command.STATE, Command.CONTEXT}:
-            return bytes([Status.OK]) + data
+        if command in {LiteCommand.STATE, LiteCommand.CONTEXT}:
+            return bytes([LiteStatus.OK]) + data
         if command in _PROFILES:
             self._ports[command] = self._ports.get(command, 0) + 1
             return bytes([len(data)]) + data
         if not data or data[0] not in WITH_FIELDS:
             return data
-        if command is Command.PROFILE:
+        if command is LiteCommand.PROFILE:
             counts = bytes(self._ports.pop(profile, 0) & 0xFF for profile in _PROFILES)
             return data + counts + bytes([len(TYPE_NAME)]) + TYPE_NAME
         if command in _STATES:
-            return data + (_STATES[command] if data[0] == Status.OK else _state_after(data[0]))
+            return data + (_STATES[command] if data[0] == LiteStatus.OK else _state_after(data[0]))
         return data
 
 
 def _state_after(status: int) -> bytes:
     """Return the state after a command that failed or was refused."""
-    return b"E" if status == Status.ERROR else b"?"
+    return b"E" if status == LiteStatus.ERROR else b"?"
 
 
-def _fault_of(data: bytes) -> Frame | LinkFault:
+def _fault_of(data: bytes) -> LiteFrame | LiteLinkFault:
     """Read a fault, which RTno tells with its code negated."""
     try:
-        return fault_frame(LinkFault(-data[0] & 0xFF))
+        return fault_frame(LiteLinkFault(-data[0] & 0xFF))
     except (IndexError, ValueError):
-        return LinkFault.UNKNOWN
+        return LiteLinkFault.UNKNOWN

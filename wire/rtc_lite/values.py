@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class PortType(ABC, Generic[T]):
+class LitePortType(ABC, Generic[T]):
     """A data type of a port.
 
     Attributes:
@@ -81,7 +81,7 @@ class PortType(ABC, Generic[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class _Scalar(PortType[T]):
+class _Scalar(LitePortType[T]):
     format: str
     zero: T
 
@@ -99,7 +99,7 @@ class _Scalar(PortType[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class _Sequence(PortType[tuple[T, ...]]):
+class _Sequence(LitePortType[tuple[T, ...]]):
     format: str
 
     @property
@@ -115,7 +115,7 @@ class _Sequence(PortType[tuple[T, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
-class _Text(PortType[str]):
+class _Text(LitePortType[str]):
     """Characters of Latin-1: one, or any number."""
 
     @property
@@ -135,7 +135,7 @@ class _Text(PortType[str]):
         return data.decode("latin-1")
 
 
-def _pack(port_type: PortType[Any], layout: str, values: tuple[object, ...]) -> bytes:
+def _pack(port_type: LitePortType[Any], layout: str, values: tuple[object, ...]) -> bytes:
     try:
         return struct.pack(f"<{layout}", *values)
     except (struct.error, OverflowError) as error:
@@ -149,15 +149,15 @@ SHORT: Final = _Scalar("s", "TimedShort", 2, "h", 0)
 LONG: Final = _Scalar("l", "TimedLong", 4, "i", 0)
 FLOAT: Final = _Scalar("f", "TimedFloat", 4, "f", 0.0)
 DOUBLE: Final = _Scalar("d", "TimedDouble", 4, "f", 0.0)
-BOOLEAN_SEQ: Final[PortType[tuple[bool, ...]]] = _Sequence("B", "TimedBooleanSeq", 1, "?")
+BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = _Sequence("B", "TimedBooleanSeq", 1, "?")
 CHAR_SEQ: Final = _Text("C", "TimedCharSeq", 1)
-OCTET_SEQ: Final[PortType[tuple[int, ...]]] = _Sequence("O", "TimedOctetSeq", 1, "B")
-SHORT_SEQ: Final[PortType[tuple[int, ...]]] = _Sequence("S", "TimedShortSeq", 2, "h")
-LONG_SEQ: Final[PortType[tuple[int, ...]]] = _Sequence("L", "TimedLongSeq", 4, "i")
-FLOAT_SEQ: Final[PortType[tuple[float, ...]]] = _Sequence("F", "TimedFloatSeq", 4, "f")
-DOUBLE_SEQ: Final[PortType[tuple[float, ...]]] = _Sequence("D", "TimedDoubleSeq", 4, "f")
+OCTET_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("O", "TimedOctetSeq", 1, "B")
+SHORT_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("S", "TimedShortSeq", 2, "h")
+LONG_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("L", "TimedLongSeq", 4, "i")
+FLOAT_SEQ: Final[LitePortType[tuple[float, ...]]] = _Sequence("F", "TimedFloatSeq", 4, "f")
+DOUBLE_SEQ: Final[LitePortType[tuple[float, ...]]] = _Sequence("D", "TimedDoubleSeq", 4, "f")
 
-PORT_TYPES: Final[Mapping[str, PortType[Any]]] = MappingProxyType(
+PORT_TYPES: Final[Mapping[str, LitePortType[Any]]] = MappingProxyType(
     {
         port_type.code: port_type
         for port_type in (

@@ -6,7 +6,7 @@ from copy import copy
 from enum import IntEnum
 from typing import Any, ClassVar, Final
 
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort, Port
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort, CanopenPort
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
 from tickrig.device.twin import NonCopyable
@@ -32,7 +32,7 @@ Result = ReturnCode | None
 """What a callback returns; nothing means that all went well."""
 
 
-class Component(NonCopyable):
+class CanopenComponent(NonCopyable):
     """A component on a CANopen device; a subclass says what it is and does.
 
     Ports are declared as attributes of the class; each component has its own, with
@@ -54,12 +54,12 @@ class Component(NonCopyable):
     Raises:
         ValueError: a profile or ports that cannot be.
 
-    >>> from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+    >>> from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
     >>> from tickrig.wire.rtc_canopen.port_types import LONG
-    >>> class Doubler(Component):
+    >>> class Doubler(CanopenComponent):
     ...     type_name = "Doubler"
-    ...     number = InPort("number", LONG)
-    ...     double = OutPort("double", LONG)
+    ...     number = CanopenInPort("number", LONG)
+    ...     double = CanopenOutPort("double", LONG)
     ...
     ...     def on_execute(self) -> None:
     ...         self.double.write(2 * self.number.read())
@@ -78,8 +78,8 @@ class Component(NonCopyable):
 
     def __init__(self) -> None:
         self.inputs = QuantityBank(self.physical)
-        self.ports: dict[str, Port[Any]] = {}
-        for name, port in declared(type(self), Port):
+        self.ports: dict[str, CanopenPort[Any]] = {}
+        for name, port in declared(type(self), CanopenPort):
             mine = self.ports[port.name] = copy(port)
             setattr(self, name, mine)
 
@@ -94,7 +94,7 @@ class Component(NonCopyable):
                 category=cls.category,
                 rate_hz=cls.rate_hz,
                 product_code=cls.product_code,
-                ports=tuple(port.profile for _, port in declared(cls, Port)),
+                ports=tuple(port.profile for _, port in declared(cls, CanopenPort)),
             )
         except ValueError as error:
             raise ValueError(f"{cls.__name__}: {error}") from None
@@ -127,14 +127,14 @@ class Component(NonCopyable):
         """Leave Error; after an error it stays there."""
 
 
-class Echo(Component):
+class CanopenEcho(CanopenComponent):
     """One in-port, one out-port, both Long."""
 
     type_name = "Echo"
     vendor = "tickrig"
     category = "example"
-    inlet = InPort("in", LONG)
-    outlet = OutPort("out", LONG)
+    inlet = CanopenInPort("in", LONG)
+    outlet = CanopenOutPort("out", LONG)
 
     def on_execute(self) -> None:
         """Hand on what is new."""

@@ -9,8 +9,8 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
+from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
 from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.device.canopen.stack import make_slave
@@ -39,11 +39,11 @@ class DeviceRtc(Application):
         ValueError: physical inputs that cannot be.
     """
 
-    def __init__(self, node: CanopenSlave, slot: int, kind: type[Component]) -> None:
+    def __init__(self, node: CanopenSlave, slot: int, kind: type[CanopenComponent]) -> None:
         super().__init__(node, slot)
         self._kind, self._places = kind, kind.profile().placed()
         self.has_inputs(inputs_of(kind))
-        self.life = LifeCycle(node, self._make)
+        self.life = CanopenLifeCycle(node, self._make)
         self.outputs = outputs_of(self.life.component)
         self._timer = Timer(kind.rate_hz)
         node.on_state.append(self._moved)
@@ -77,7 +77,7 @@ class DeviceRtc(Application):
         self.request()
         self.life.moved(old, new)
 
-    def _make(self) -> Component:
+    def _make(self) -> CanopenComponent:
         """Make a component and join it to the dictionary."""
         component = self._kind()
         component.inputs = self.inputs
@@ -90,19 +90,19 @@ class DeviceRtc(Application):
         PdoProducer.of(self.node).request_for(entry)
 
 
-def make_dictionary(kind: type[Component]) -> Dictionary:
+def make_dictionary(kind: type[CanopenComponent]) -> Dictionary:
     """Make the objects of a component; ValueError if its profile cannot be."""
     table = object_table(kind.profile())
     return Dictionary(table, table.objects)
 
 
-def application_of(kind: type[Component]) -> ServiceMaker:
+def application_of(kind: type[CanopenComponent]) -> ServiceMaker:
     """Return what makes the application of a component."""
     return partial(DeviceRtc, kind=kind)
 
 
 def make_device_rtc(
-    kind: type[Component], node_id: int, nonvolatile: Nonvolatile | None = None
+    kind: type[CanopenComponent], node_id: int, nonvolatile: Nonvolatile | None = None
 ) -> CanopenSlave:
     """Make a slave that is a DeviceRTC.
 

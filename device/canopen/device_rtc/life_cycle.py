@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import Component, Result, ReturnCode
+from tickrig.device.canopen.device_rtc.component import CanopenComponent, Result, ReturnCode
 from tickrig.device.canopen.device_rtc.transitions import (
     ACTIVITIES,
     ADMITTED,
@@ -18,7 +18,7 @@ from tickrig.device.canopen.device_rtc.transitions import (
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 
-class LifeCycle:
+class CanopenLifeCycle:
     """Runs the callbacks of a component when its node changes its NMT state, and before.
 
     The NMT state is the state of the component, once that is initialized. Whoever
@@ -35,7 +35,7 @@ class LifeCycle:
         executed: how often `on_execute` ran.
     """
 
-    def __init__(self, node: CanopenSlave, make: Callable[[], Component]) -> None:
+    def __init__(self, node: CanopenSlave, make: Callable[[], CanopenComponent]) -> None:
         self._node, self._make = node, make
         self.create()
 
@@ -56,7 +56,7 @@ class LifeCycle:
     def activity(self) -> str:
         """Callback that the state runs at the component's rate, empty if it has none."""
         name = ACTIVITIES.get(self.state, "")
-        own = name and getattr(type(self.component), name) is not getattr(Component, name)
+        own = name and getattr(type(self.component), name) is not getattr(CanopenComponent, name)
         return name if own else ""
 
     def boots(self) -> bool:

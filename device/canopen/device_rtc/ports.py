@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.wire.rtc_canopen.port_types import PortType
-from tickrig.wire.rtc_canopen.profile import Direction, PortProfile
+from tickrig.wire.rtc_canopen.port_types import CanopenPortType
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection
 
 T = TypeVar("T")
 
 
-class Port(Generic[T]):
+class CanopenPort(Generic[T]):
     """What both kinds of ports have.
 
     Args:
@@ -20,9 +20,9 @@ class Port(Generic[T]):
         port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
     """
 
-    direction: Direction
+    direction: PortDirection
 
-    def __init__(self, name: str, port_type: PortType[T]) -> None:
+    def __init__(self, name: str, port_type: CanopenPortType[T]) -> None:
         self.name, self.port_type = name, port_type
         self.entries: Sequence[Entry] = ()
 
@@ -31,9 +31,9 @@ class Port(Generic[T]):
         self.entries, self._event = entries, event
 
     @property
-    def profile(self) -> PortProfile:
+    def profile(self) -> CanopenPortProfile:
         """The port as the profile of its component has it."""
-        return PortProfile(self.name, self.direction, self.port_type)
+        return CanopenPortProfile(self.name, self.direction, self.port_type)
 
     @property
     def value(self) -> T:
@@ -41,14 +41,14 @@ class Port(Generic[T]):
         return self.port_type.decode([entry.data for entry in self.entries])
 
 
-class InPort(Port[T]):
+class CanopenInPort(CanopenPort[T]):
     """Where the bus writes, by RPDO or SDO, and the component reads.
 
     Attributes:
         is_new: whether the bus has written since it was read, also the same value.
     """
 
-    direction = Direction.IN
+    direction = PortDirection.IN
     is_new = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
@@ -66,10 +66,10 @@ class InPort(Port[T]):
         self.is_new = True
 
 
-class OutPort(Port[T]):
+class CanopenOutPort(CanopenPort[T]):
     """Where the component writes; its TPDO goes out once in a tick with a write."""
 
-    direction = Direction.OUT
+    direction = PortDirection.OUT
 
     def write(self, value: T) -> None:
         """Leave a value; it is sent in Active, also if it is the same as before.

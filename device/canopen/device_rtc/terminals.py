@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from tickrig.device.canopen.device_rtc.component import Component
-from tickrig.device.canopen.device_rtc.life_cycle import LifeCycle
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
+from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
 from tickrig.device.physical import Input, Output, SignalType
 
 SHUT_DOWN: Final = "shut_down"
@@ -28,7 +28,7 @@ OUTPUTS: Final = (
 """Every DeviceRTC has these; each port adds its value as in.NAME or out.NAME."""
 
 
-def inputs_of(kind: type[Component]) -> tuple[Input, ...]:
+def inputs_of(kind: type[CanopenComponent]) -> tuple[Input, ...]:
     """Return the physical inputs of a component; ValueError if two have the same name."""
     table = (*INPUTS, *kind.physical)
     name, count = Counter(item.name for item in table).most_common(1)[0]
@@ -37,7 +37,7 @@ def inputs_of(kind: type[Component]) -> tuple[Input, ...]:
     return table
 
 
-def outputs_of(component: Component) -> dict[str, Output]:
+def outputs_of(component: CanopenComponent) -> dict[str, Output]:
     """Return the physical outputs of a component."""
     ports = [
         Output(f"{port.direction.value}.{port.name}", f"value of this {port.direction.value}-port")
@@ -46,7 +46,7 @@ def outputs_of(component: Component) -> dict[str, Output]:
     return {output.name: output for output in (*OUTPUTS, *ports)}
 
 
-def text_of(life: LifeCycle, name: str) -> float | str:
+def text_of(life: CanopenLifeCycle, name: str) -> float | str:
     """Return the present value of an output; KeyError if there is none."""
     match name:
         case "rtc_state":

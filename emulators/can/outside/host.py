@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.errors import LinkClosed, LinkTimeout
-from tickrig.host.links.link import Stamped
+from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
@@ -77,7 +77,7 @@ class CanHost:
         """Let time pass until a frame has arrived; return all that are there then."""
         return tuple(frame for _, frame in self.hear(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Let time pass until a frame has arrived; return the time, and all that are there."""
         first = self.take(timeout_us)
         heard = () if first is None else (first, *self._inbox)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from tickrig.emulators.rtc_lite.demo.stage import CAST, Stage
-from tickrig.emulators.rtc_lite.frame_log import OverheardLink
+from tickrig.emulators.rtc_lite.demo.stage import NODES, DemoSetup
+from tickrig.emulators.rtc_lite.frame_log import MonitoredLink
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc_lite import EventKind, ProxyEvent, Settings, attach
+from tickrig.host.rtc_lite import ProxyEvent, ProxyEventType, ProxySettings, attach
 from tickrig.wire.rtc_types.basic import TimedLong
 
 Echo = Callable[[str], None]
@@ -25,26 +25,26 @@ JOINTS: Final = (
     ("LiteA0.out", "LiteB0.in"),
     ("LiteB0.out", "ConsoleOut0.in"),
 )
-SETTINGS: Final = Settings(rediscover=True)
+SETTINGS: Final = ProxySettings(rediscover=True)
 
 
-def run_demo(stage: Stage, echo: Echo) -> None:
+def run_demo(stage: DemoSetup, echo: Echo) -> None:
     """Play it; it takes six seconds of the stage's time.
 
     Raises:
         RuntimeError: something did not come in time.
         RtcRefused: a device does not start up.
     """
-    Play(stage, echo).run()
+    DemoRun(stage, echo).run()
 
 
-class Play:
+class DemoRun:
     """The system on a stage, and what it looks like."""
 
-    def __init__(self, stage: Stage, echo: Echo) -> None:
+    def __init__(self, stage: DemoSetup, echo: Echo) -> None:
         self._stage, self._echo, self._manager = stage, echo, stage.manager
         self._events: list[ProxyEvent] = []
-        self._links = {name: OverheardLink(link, self._say) for name, link in stage.links.items()}
+        self._links = {name: MonitoredLink(link, self._say) for name, link in stage.links.items()}
         self._start_us = self._zero_us = self._now_us
 
     def run(self) -> None:
@@ -80,7 +80,7 @@ class Play:
         manager, context = self._manager, ExecutionContext(RATE_HZ)
         self._context = context
         self._source = manager.add(ConsoleIn("ConsoleIn0"), context=context)
-        for name in CAST:
+        for name in NODES:
             attach(
                 *(manager, self._links[name], name, SETTINGS),
                 listener=self._heard,
@@ -102,18 +102,18 @@ class Play:
         self._links["LiteA"].shown = True
         self._zero_us = self._now_us
         self._stage.power("LiteA", on=False)
-        self._await(EventKind.FATAL_ERROR)
+        self._await(ProxyEventType.FATAL_ERROR)
         self._run_until(lambda: self._states()["LiteA0"] == "ERROR")
         self._show_system()
         self._links["LiteA"].shown = False
-        self._await(EventKind.REMOVED)
+        self._await(ProxyEventType.REMOVED)
         self._show_system()
 
     def _give_back(self) -> None:
         self._links["LiteA"].shown = True
         self._zero_us = self._now_us
         self._stage.power("LiteA", on=True)
-        self._await(EventKind.REDISCOVERED)
+        self._await(ProxyEventType.REDISCOVERED)
         self._links["LiteA"].shown = False
         self._show_system()
 
@@ -135,7 +135,7 @@ class Play:
                 raise RuntimeError(f"nothing came in {PATIENCE_US // 1_000_000} s")
             self._stage.step()
 
-    def _await(self, kind: EventKind) -> None:
+    def _await(self, kind: ProxyEventType) -> None:
         self._run_until(lambda: any(event.kind is kind for event in self._events))
 
     def _heard(self, event: ProxyEvent) -> None:

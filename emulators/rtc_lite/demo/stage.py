@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from typing import Final, Protocol
 
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.rig.rig import Rig, Station
@@ -20,7 +20,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.real_time import RealTime
 
-CAST: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
+NODES: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
 """Which node plays which part."""
 
 BAUD: Final = 57_600
@@ -28,7 +28,7 @@ EMULATOR: Final = "tickrig.emulators.rtc_lite.cli"
 POWER_CUT: Final = "power_cut"
 
 
-class Stage(Protocol):
+class DemoSetup(Protocol):
     """Two devices, and a system that is not yet there.
 
     Attributes:
@@ -48,20 +48,20 @@ class Stage(Protocol):
         """Cut a device's power, or give it back."""
 
 
-class VirtualStage:
+class VirtualSetup:
     """Serial lines in a rig; time passes as fast as it can be computed."""
 
     def __init__(self) -> None:
-        lines = {name: SerialLine(BAUD) for name in CAST}
+        lines = {name: SerialLine(BAUD) for name in NODES}
         self._nodes = {
-            name: RtcLiteNode(COMPONENTS[node], NodeConfig()) for name, node in CAST.items()
+            name: RtcLiteNode(COMPONENTS[node], LiteConfig()) for name, node in NODES.items()
         }
         self._rig = Rig(*(Station(self._nodes[name], line.a) for name, line in lines.items()))
         self.manager = Manager()
         self.links: Mapping[str, Link[bytes]] = {
             name: SimLink(self._rig, line.b) for name, line in lines.items()
         }
-        self.places: Mapping[str, str] = dict.fromkeys(CAST, "a serial line in virtual time")
+        self.places: Mapping[str, str] = dict.fromkeys(NODES, "a serial line in virtual time")
 
     def step(self) -> None:
         """Run the rig until the system is due, and tick it."""
@@ -73,7 +73,7 @@ class VirtualStage:
         self._nodes[name].inputs.set(POWER_CUT, 0 if on else 1)
 
 
-class PtyStage:
+class PtySetup:
     """Emulators in processes of their own, each on a pseudo-terminal, in real time."""
 
     def __init__(
@@ -98,7 +98,7 @@ class PtyStage:
 
 
 @contextmanager
-def pty_stage() -> Iterator[PtyStage]:
+def pty_setup() -> Iterator[PtySetup]:
     """Start both emulators, and open their terminals.
 
     Raises:
@@ -107,9 +107,9 @@ def pty_stage() -> Iterator[PtyStage]:
     """
     with ExitStack() as stack:
         links, hands, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
-        for name, node in CAST.items():
+        for name, node in NODES.items():
             child = stack.enter_context(running(EMULATOR, f"--node={node}", f"--baud={BAUD}"))
             hands[name] = stack.enter_context(ControlClient(child.control))
             links[name] = stack.enter_context(closing(SerialLink(str(child.link), BAUD)))
             places[name] = str(child.link.resolve())
-        yield PtyStage(links, hands, places)
+        yield PtySetup(links, hands, places)

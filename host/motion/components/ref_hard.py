@@ -10,7 +10,7 @@ from typing import ClassVar, Final, Protocol
 from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.modbus.master import Answer, ModbusMaster
+from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
 from tickrig.host.motion.components.base_texts import fault_text, refusal_text
 from tickrig.host.motion.dead_reckoning import wheel_speeds
 from tickrig.host.motion.geometry import Twist
@@ -217,7 +217,7 @@ class RefHardRh3(RtComponent):
             words += wide(round(speed * share * self._counts_per_rad * constant.value))
         return Request(READ_WRITE, REPORT, (Address.TARGET_SPEED_LEFT, tuple(words)))
 
-    def _take(self, ec: ExecutionContext, answer: Answer) -> ReturnCode:
+    def _take(self, ec: ExecutionContext, answer: ModbusAnswer) -> ReturnCode:
         if answer.refusal is not None:
             self._refused += 1  # noise may have made another request of it
             if self._refused >= MISSES:

@@ -10,7 +10,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.components.ref_hard import Opener
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
-from tickrig.host.urg.client import Scan, UrgClient
+from tickrig.host.urg.client import UrgClient, UrgScan
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
 
@@ -83,7 +83,7 @@ class LrfCaptureUrg(RtComponent):
             _LOG.warning("%s: %s", self.instance_name, error)
 
 
-def _range_data(now: Time, scan: Scan) -> RangeData:
+def _range_data(now: Time, scan: UrgScan) -> RangeData:
     kind, numbers = scan.kind, scan.distances_mm
     low, high = kind.nearest_mm, kind.farthest_mm
     config = RangerConfig(

@@ -15,7 +15,7 @@ from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.rtc_canopen.objects import device_info, object_table
-from tickrig.wire.rtc_canopen.profile import FIRST_PORT, Direction, PlacedPort, RtcProfile
+from tickrig.wire.rtc_canopen.profile import FIRST_PORT, PlacedPort, PortDirection, RtcProfile
 
 
 def build(project: Project) -> dict[str, str]:
@@ -49,7 +49,7 @@ def write_fragment(project: Project) -> str:
 
 def pdo_name(port: PlacedPort) -> str:
     """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`."""
-    kind = "rpdo" if port.profile.direction is Direction.IN else "tpdo"
+    kind = "rpdo" if port.profile.direction is PortDirection.IN else "tpdo"
     return f"{kind}{port.number}"
 
 

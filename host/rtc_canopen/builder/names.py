@@ -23,12 +23,12 @@ COMPONENT_NAMES: Final = frozenset(
         *("category", "error_check", "inputs", "on_aborting", "on_activated", "on_deactivated"),
         *("on_error", "on_execute", "on_finalize", "on_initialize", "on_reset", "physical"),
         *("ports", "product_code", "profile", "rate_hz", "strict_cia301", "type_name"),
-        *("vendor", "version"),
+        *("vendor", "version", "why_not_copied"),
     )
 )
 """What a component has beside its ports."""
 
-IMPORTED: Final = frozenset(("InPort", "OutPort", "integer"))
+IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "integer"))
 """What the skeleton uses while it declares ports, beside the types."""
 
 

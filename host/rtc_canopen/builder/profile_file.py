@@ -7,8 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from tickrig.wire.rtc_canopen.port_types import INTEGER, PORT_TYPES, PortType, Scalar, integer
-from tickrig.wire.rtc_canopen.profile import Direction, PortProfile, RtcProfile
+from tickrig.wire.rtc_canopen.port_types import (
+    INTEGER,
+    PORT_TYPES,
+    CanopenPortType,
+    Scalar,
+    integer,
+)
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
 
 Table = Mapping[str, Any]
 
@@ -97,23 +103,23 @@ def _tables(content: Table) -> list[Table]:
     return tables
 
 
-def _port(number: int, table: Table, word_bits: int) -> PortProfile:
+def _port(number: int, table: Table, word_bits: int) -> CanopenPortProfile:
     """Read a port; errors say which of them."""
     try:
         _check_keys(table, PORT_KEYS)
         direction = _take(table, "direction", str)
-        if direction not in (known := [item.value for item in Direction]):
+        if direction not in (known := [item.value for item in PortDirection]):
             raise ProfileError(f"direction {direction!r} is not one of {', '.join(known)}")
-        return PortProfile(
+        return CanopenPortProfile(
             _take(table, "name", str),
-            Direction(direction),
+            PortDirection(direction),
             _port_type(_take(table, "type", str), _take(table, "length", int, 1), word_bits),
         )
     except ValueError as error:
         raise ProfileError(f"port {number}: {error}") from None
 
 
-def _port_type(name: str, length: int, word_bits: int) -> PortType[Any]:
+def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:
     element: Scalar[Any] | None = integer(word_bits) if name == INTEGER else PORT_TYPES.get(name)
     if element is None:
         raise ProfileError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")

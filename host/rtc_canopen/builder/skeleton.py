@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from tickrig.host.rtc_canopen.builder.names import python_name, snake_name
 from tickrig.host.rtc_canopen.builder.profile_file import Project
-from tickrig.wire.rtc_canopen.port_types import INTEGER, PortType
-from tickrig.wire.rtc_canopen.profile import Direction, PortProfile, RtcProfile
+from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
 
 SKELETON_SUFFIX: Final = ".py"
 
@@ -40,11 +40,11 @@ def _head(project: Project) -> Iterator[str]:
     yield ""
     yield "from __future__ import annotations"
     yield ""
-    yield "from tickrig.device.canopen.device_rtc.component import Component, Result"
+    yield "from tickrig.device.canopen.device_rtc.component import CanopenComponent, Result"
     yield from _imports(profile)
     yield ""
     yield ""
-    yield f"class {profile.type_name}(Component):"
+    yield f"class {profile.type_name}(CanopenComponent):"
     yield '    """Returns ERROR from what failed; all else went well."""'
     yield ""
 
@@ -77,15 +77,15 @@ def _callbacks() -> Iterator[str]:
         yield f'        """{text}"""'
 
 
-def _port_class(port: PortProfile) -> str:
-    return "InPort" if port.direction is Direction.IN else "OutPort"
+def _port_class(port: CanopenPortProfile) -> str:
+    return "CanopenInPort" if port.direction is PortDirection.IN else "CanopenOutPort"
 
 
-def _constant(kind: PortType[Any]) -> str:
+def _constant(kind: CanopenPortType[Any]) -> str:
     return "integer" if kind.name == INTEGER else snake_name(kind.name).upper()
 
 
-def _type(kind: PortType[Any]) -> str:
+def _type(kind: CanopenPortType[Any]) -> str:
     element = _constant(kind)
     if kind.name == INTEGER:
         element = f"integer({kind.data_type.bits})"

@@ -18,9 +18,9 @@ from tickrig.host.links.errors import LinkClosed
 from tickrig.host.rtc_canopen.commands.opening import (
     STANDARD_OUTPUT,
     BusFailed,
+    add_components,
     bus_of,
     component_option,
-    furnish,
     log_listener,
     open_link,
     read_server,
@@ -54,7 +54,7 @@ def main(
             from tickrig.host.rtc_canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.rtc_canopen.editor.session import Session  # noqa: PLC0415
+    from tickrig.host.rtc_canopen.editor.session import EditorSession  # noqa: PLC0415
 
     if log == STANDARD_OUTPUT:
         raise Refused("--log -: the screen is on standard output; name a file")
@@ -69,7 +69,9 @@ def main(
             session.bus_state(state)
 
         link, name = open_link(bus, bus_state, stack)
-        session = Session(server, file, link, lambda other: furnish(other, components), listeners)
+        session = EditorSession(
+            server, file, link, lambda other: add_components(other, components), listeners
+        )
         if start:
             server.start()
         try:

@@ -22,8 +22,8 @@ from tickrig.host.text.user_file import explain_error, find_class
 if TYPE_CHECKING:
     from tickrig.host.links.can_link import CanLink
     from tickrig.host.rtc_canopen.definition.definition import BusEntry
-    from tickrig.host.rtc_canopen.events import Event, Listener
-    from tickrig.host.rtc_canopen.server import Server
+    from tickrig.host.rtc_canopen.events import EventListener, ServerEvent
+    from tickrig.host.rtc_canopen.server import RtcCanopenServer
     from tickrig.wire.can_error import ErrorState
 
 ECHOING: Final = ("udp_multicast",)
@@ -47,7 +47,7 @@ class BusFailed(click.ClickException):
     exit_code = 3
 
 
-def read_server(file: Path, components: Sequence[str]) -> Server:
+def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
     """Make the server of a System Definition, with components; Refused if one cannot be used.
 
     What is wrong in its EDS files, and not used, is told on standard error.
@@ -59,7 +59,7 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
         raise Refused(NEEDS_YAML) from None
     try:
         server = open_server(file)
-        furnish(server, components)
+        add_components(server, components)
     except OSError as error:
         refuse_path("file", error)
     except ValueError as error:
@@ -68,7 +68,7 @@ def read_server(file: Path, components: Sequence[str]) -> Server:
     return server
 
 
-def furnish(server: Server, words: Sequence[str]) -> None:
+def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
     """Put components of users' files beside the proxies.
 
     Args:
@@ -123,7 +123,7 @@ def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:
     )
 
 
-def log_listener(log: Path | None, stack: ExitStack) -> Iterator[Listener]:
+def log_listener(log: Path | None, stack: ExitStack) -> Iterator[EventListener]:
     """Yield what writes events to a file, if there is one."""
     if log == STANDARD_OUTPUT:
         yield lambda event: click.echo(event.to_json())
@@ -135,7 +135,7 @@ def log_listener(log: Path | None, stack: ExitStack) -> Iterator[Listener]:
         yield lambda event: _write(file, event)
 
 
-def _write(file: TextIO, event: Event) -> None:
+def _write(file: TextIO, event: ServerEvent) -> None:
     file.write(f"{event.to_json()}\n")
 
 

@@ -27,7 +27,7 @@ from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.host.rtc_canopen.server import Server
+    from tickrig.host.rtc_canopen.server import RtcCanopenServer
 
 
 @click.command(cls=BusCommand)
@@ -65,9 +65,9 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _check(file, server)
         return
     if options.pop("dot"):
-        from tickrig.host.rtc_canopen.offline import draw_on_paper  # noqa: PLC0415
+        from tickrig.host.rtc_canopen.offline import draw_graph  # noqa: PLC0415
 
-        click.echo(draw_on_paper(server))
+        click.echo(draw_graph(server))
         return
     names = "log", "quiet", "start", "control"
     log, quiet, start, control = (options.pop(name) for name in names)
@@ -83,15 +83,17 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         _run(server, link, span_us, control, name)
 
 
-def _check(file: Path, server: Server) -> None:
-    from tickrig.host.rtc_canopen.offline import check_on_paper  # noqa: PLC0415
+def _check(file: Path, server: RtcCanopenServer) -> None:
+    from tickrig.host.rtc_canopen.offline import check_offline  # noqa: PLC0415
 
-    if mistakes := check_on_paper(server):
+    if mistakes := check_offline(server):
         raise Refused("\n".join(f"{file}: {mistake}" for mistake in mistakes))
     click.echo(f"{file}: {len(server.nodes)} nodes, no mistake found")
 
 
-def _run(server: Server, link: StampedLink, span_us: int, control: Path | None, bus: str) -> None:
+def _run(
+    server: RtcCanopenServer, link: StampedLink, span_us: int, control: Path | None, bus: str
+) -> None:
     from tickrig.host.rtc_canopen.serve import ServerRunner  # noqa: PLC0415
 
     until_us = NEVER if span_us == NEVER else link.now_us + span_us

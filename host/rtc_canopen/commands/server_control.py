@@ -7,7 +7,7 @@ from typing import Final
 from tickrig.host.control.requests import Object, whole
 from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc_canopen.serve import ServerRunner
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.host.rtc_canopen.view import NOT_HEARD, NodeView, ServerView
 
 NOT_HERE: Final = ("create", "delete", "save")
@@ -23,7 +23,7 @@ class ServerControl(SystemControl):
         bus: how the bus is called.
     """
 
-    def __init__(self, server: Server, runner: ServerRunner, bus: str) -> None:
+    def __init__(self, server: RtcCanopenServer, runner: ServerRunner, bus: str) -> None:
         super().__init__(server.manager, runner)
         self._server, self._bus = server, bus
         self._verbs = {

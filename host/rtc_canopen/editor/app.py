@@ -14,10 +14,10 @@ from textual.containers import Container
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc_canopen.editor.objects_pane import ObjectsPane
-from tickrig.host.rtc_canopen.editor.session import Session
+from tickrig.host.rtc_canopen.editor.session import EditorSession
 from tickrig.host.rtc_canopen.editor.status import event_lines, status_line
 from tickrig.host.rtc_canopen.editor.system_pane import Item, SystemPane, connect, link, remove
-from tickrig.host.rtc_canopen.editor.widgets import CursorView, Question
+from tickrig.host.rtc_canopen.editor.widgets import CursorView, QuestionScreen
 from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.host.tui.framed_app import FramedApp
@@ -82,7 +82,7 @@ class SystemEditor(FramedApp):
         Binding("ctrl+o", "load", "load", key_display="^o"),
     ]
 
-    def __init__(self, session: Session, bus: str = "") -> None:
+    def __init__(self, session: EditorSession, bus: str = "") -> None:
         super().__init__()
         self.session, self._bus = session, bus
         self.system, self.objects = SystemPane(), ObjectsPane()
@@ -208,7 +208,7 @@ class SystemEditor(FramedApp):
             if words is not None:
                 self._command(lambda view: objects.write(view, row.item, words))
 
-        question = Question(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
+        question = QuestionScreen(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
         self.push_screen(question, write)
 
     def action_save(self) -> None:
@@ -229,7 +229,7 @@ class SystemEditor(FramedApp):
             if path and self._try(lambda: do(Path(path))):
                 self.notify(f"{text}: {path}", markup=False)
 
-        self.push_screen(Question(text, str(self.session.path)), answered)
+        self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
 
     def _command(self, command: Command) -> bool:
         """Give the server a command; if it is refused, say why."""

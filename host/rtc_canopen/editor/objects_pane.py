@@ -9,9 +9,9 @@ from typing import Final
 from tickrig.host.monitor.decode.node_memory import EdsObjects, Entry, read_eds_objects
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.rtc_canopen.editor.widgets import CursorView, Row
-from tickrig.host.rtc_canopen.node.served_node import Phase
-from tickrig.host.rtc_canopen.view import ServerView, Transfer
+from tickrig.host.rtc_canopen.editor.widgets import CursorRow, CursorView
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
+from tickrig.host.rtc_canopen.view import PendingTransfer, ServerView
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_finding import EdsError
 from tickrig.wire.canopen.eds.eds_value import parse_value
@@ -30,7 +30,7 @@ DIM: Final = "bright_black"
 ALARM: Final = "bold red"
 CHANGED: Final = "bold yellow"
 
-ObjectRow = Row[Entry]
+ObjectRow = CursorRow[Entry]
 
 
 class NodeObjects:
@@ -57,8 +57,8 @@ class NodeObjects:
         self._reads, self._ages = 0, dict[Entry, int]()
         self._wanted: list[Entry] = []
         self._rows: dict[Entry, tuple[object, ObjectRow]] = {}
-        self._reading: dict[Entry, Transfer] = {}
-        self._writing: list[tuple[Entry, Transfer]] = []
+        self._reading: dict[Entry, PendingTransfer] = {}
+        self._writing: list[tuple[Entry, PendingTransfer]] = []
 
     @property
     def rows(self) -> list[ObjectRow]:
@@ -125,7 +125,7 @@ class NodeObjects:
         ]
         return sorted(due, key=lambda entry: self._ages.get(entry, 0))
 
-    def _take(self, entry: Entry, transfer: Transfer) -> None:
+    def _take(self, entry: Entry, transfer: PendingTransfer) -> None:
         if transfer.problem:
             self._problems[entry] = _reason(entry, transfer)
             return
@@ -162,10 +162,10 @@ class NodeObjects:
         head = (f"{write_entry(entry)} ", DIM), (f"{_tail(text.name):<{NAME}} ", "")
         style = CHANGED if entry in self._changed else "bold"
         rest = ((problem, ALARM),) if problem else ((f"{kind:<14} ", DIM), (value, style))
-        return Row(write_entry(entry), (*head, *rest), entry)
+        return CursorRow(write_entry(entry), (*head, *rest), entry)
 
 
-def _reason(entry: Entry, transfer: Transfer) -> str:
+def _reason(entry: Entry, transfer: PendingTransfer) -> str:
     """Return why a transfer failed, in the columns that a row of 80 leaves."""
     return transfer.problem.removeprefix(f"{write_entry(entry)} ").removeprefix("aborted: ")
 
@@ -239,9 +239,9 @@ class ObjectsPane(CursorView[Entry]):
             self.title = "objects"
             return
         node = view.node(objects.node_id)
-        if node.phase is not Phase.READY:
+        if node.phase is not NodePhase.READY:
             objects.forget()
-        answers = node.phase is Phase.READY and node.nmt_state != "STOPPED"
+        answers = node.phase is NodePhase.READY and node.nmt_state != "STOPPED"
         objects.look(view, [row.item for row in self.in_view], answers=answers)
         live = ", live" if objects.live else ""
         self.title = f"objects of {node.node_id} {node.name}{live}"

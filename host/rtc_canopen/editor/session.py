@@ -10,9 +10,9 @@ from typing import Final
 
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.definition.definition_writer import save_definition
-from tickrig.host.rtc_canopen.events import Listener
+from tickrig.host.rtc_canopen.events import EventListener
 from tickrig.host.rtc_canopen.serve import open_server
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
@@ -20,11 +20,11 @@ from tickrig.wire.can_error import ErrorState
 LONGEST_US: Final = 10_000
 """So soon is done what was asked for."""
 
-Furnish = Callable[[Server], None]
+AddComponents = Callable[[RtcCanopenServer], None]
 """Puts components of others beside the proxies."""
 
 
-class Session:
+class EditorSession:
     """Runs the server of a System Definition; another definition is another server.
 
     Whoever looks at it or commands it holds `lock`.
@@ -44,11 +44,11 @@ class Session:
 
     def __init__(
         self,
-        server: Server,
+        server: RtcCanopenServer,
         path: Path,
         link: StampedLink,
-        furnish: Furnish = lambda server: None,
-        listeners: tuple[Listener, ...] = (),
+        furnish: AddComponents = lambda server: None,
+        listeners: tuple[EventListener, ...] = (),
     ) -> None:
         self.lock, self.path, self._folder = threading.RLock(), path, path.parent
         self._link, self._furnish, self._listeners = link, furnish, listeners

@@ -6,8 +6,8 @@ from itertools import chain, repeat
 from textwrap import wrap
 from typing import Final
 
-from tickrig.host.rtc_canopen.events import Event, EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEvent, ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.view import NodeView
 from tickrig.host.tui.line_view import Line
 
@@ -19,18 +19,18 @@ STAMP: Final = 12
 """Columns of a time."""
 
 GOOD: Final = (
-    EventKind.BOOT_UP,
-    EventKind.PROXY_MADE,
-    EventKind.STATE_CHANGED,
-    EventKind.CONNECTED,
-    EventKind.PDO_LINKED,
-    EventKind.PDO_UNLINKED,
-    EventKind.BUS_ON,
+    ServerEventType.BOOT_UP,
+    ServerEventType.PROXY_MADE,
+    ServerEventType.STATE_CHANGED,
+    ServerEventType.CONNECTED,
+    ServerEventType.PDO_LINKED,
+    ServerEventType.PDO_UNLINKED,
+    ServerEventType.BUS_ON,
 )
 """Events that are nothing to see to."""
 
 
-def event_lines(event: Event, width: int) -> list[Line]:
+def event_lines(event: ServerEvent, width: int) -> list[Line]:
     """Return an event as lines of so many columns, which cut no word."""
     at, _, rest = str(event).partition(" ")
     style = "" if event.kind in GOOD else ALARM
@@ -41,7 +41,7 @@ def event_lines(event: Event, width: int) -> list[Line]:
 
 def status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:
     """Return what is served, where, and what is to be connected."""
-    ready = sum(node.phase is Phase.READY for node in nodes)
+    ready = sum(node.phase is NodePhase.READY for node in nodes)
     active = sum(node.proxy_state == "ACTIVE" for node in nodes)
     return (
         (f" {file} ", "bold"),

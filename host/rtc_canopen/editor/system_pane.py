@@ -9,9 +9,9 @@ from typing import ClassVar, Final
 from textual.binding import Binding, BindingType
 
 from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, RtConnection
-from tickrig.host.rtc_canopen.editor.widgets import CursorView, Row
+from tickrig.host.rtc_canopen.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc_canopen.errors import ServerRefused
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.view import (
     NOT_HEARD,
     ComponentView,
@@ -24,7 +24,7 @@ from tickrig.host.rtc_canopen.view import (
 from tickrig.host.tui.line_view import Line
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
-SystemRow = Row[Item]
+SystemRow = CursorRow[Item]
 
 STATES: Final = {
     "ACTIVE": "bold green",
@@ -78,11 +78,11 @@ def _node(node: NodeView, folded: Collection[str]) -> SystemRow:
         (f"{age:>8}", ALARM if node.late else ""),
         _phase(node),
     )
-    return Row(key, line, node)
+    return CursorRow(key, line, node)
 
 
 def _phase(node: NodeView) -> tuple[str, str]:
-    if node.phase is Phase.READY:
+    if node.phase is NodePhase.READY:
         return "", ""
     problem = f": {node.problem}" if node.problem else ""
     return f"  {node.phase.value}{problem}", ALARM if problem else DIM
@@ -96,7 +96,7 @@ def _component(component: ComponentView, folded: Collection[str]) -> SystemRow:
         _state(component.state),
         (f" {component.type_name}", DIM),
     )
-    return Row(key, line, component)
+    return CursorRow(key, line, component)
 
 
 def _fold(key: str, folded: Collection[str]) -> str:
@@ -113,7 +113,7 @@ def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> SystemRow:
     linked = f" ← {source}" if source else ""
     text = f"{pdo.cob_id:03X}h {pdo.bits:>2} bits  {pdo.index:04X}h ↔ {pdo.proxy_index:04X}h"
     line: Line = ((f"      {pdo.name!s:<12} ", _style(key, marked)), (text, DIM), (linked, "green"))
-    return Row(key, line, pdo)
+    return CursorRow(key, line, pdo)
 
 
 @lru_cache(KEPT_ROWS)
@@ -126,7 +126,7 @@ def _port(port: PortView, marked: str) -> SystemRow:
         (port.data_type, DIM),
         (peers, "green"),
     )
-    return Row(key, line, port)
+    return CursorRow(key, line, port)
 
 
 def _style(key: str, marked: str) -> str:
@@ -136,11 +136,13 @@ def _style(key: str, marked: str) -> str:
 def _joints(system: SystemView) -> Iterator[SystemRow]:
     for link in system.links:
         text = f"{link.source} → {link.target}"
-        yield Row(f"link {text}", (("  PDO link   ", DIM), (text, "green")), link)
+        yield CursorRow(f"link {text}", (("  PDO link   ", DIM), (text, "green")), link)
     for entry in system.connections:
         text = f"{entry.source} → {entry.target}"
         waits = (("  waits for its ports", DIM),) if entry in system.waiting else ()
-        yield Row(f"connection {text}", (("  through PC ", DIM), (text, "green"), *waits), entry)
+        yield CursorRow(
+            f"connection {text}", (("  through PC ", DIM), (text, "green"), *waits), entry
+        )
 
 
 def connect(view: ServerView, first: Item, second: Item) -> None:

@@ -19,7 +19,7 @@ from tickrig.host.tui.line_view import Line, LineView, line_width
 T = TypeVar("T")
 
 
-class Row(NamedTuple, Generic[T]):
+class CursorRow(NamedTuple, Generic[T]):
     """A line, and what it stands for.
 
     Attributes:
@@ -76,21 +76,21 @@ class CursorView(LineView, Generic[T]):
 
     def __init__(self, id: str) -> None:  # noqa: A002 - Textual's name
         super().__init__(id)
-        self.rows_shown: list[Row[T]] = []
+        self.rows_shown: list[CursorRow[T]] = []
         self.cursor = 0
         self.title, self._framed = id, ("", "")
 
     @property
-    def row(self) -> Row[T] | None:
+    def row(self) -> CursorRow[T] | None:
         """The row under the cursor, None if there is none."""
         return self.rows_shown[self.cursor] if self.rows_shown else None
 
     @property
-    def in_view(self) -> Sequence[Row[T]]:
+    def in_view(self) -> Sequence[CursorRow[T]]:
         """The rows that are on the screen."""
         return self.rows_shown[self.top : self.top + max(1, self.rows)]
 
-    def offer(self, rows: Sequence[Row[T]]) -> None:
+    def offer(self, rows: Sequence[CursorRow[T]]) -> None:
         """Show rows."""
         before = self.row
         self.rows_shown = list(rows)
@@ -167,7 +167,7 @@ class CursorView(LineView, Generic[T]):
         return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)
 
 
-class Question(ModalScreen[str | None]):
+class QuestionScreen(ModalScreen[str | None]):
     """Asks for a line; None is no answer.
 
     Args:

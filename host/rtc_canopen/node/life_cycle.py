@@ -33,7 +33,7 @@ def confirm_us(entry: NodeEntry) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class LifeCycle:
+class LifeCycleScripts:
     """What is said to a node for each operation on its proxy."""
 
     activate: Callable[[NodeEntry], Script[None]]
@@ -89,10 +89,10 @@ def _control(entry: NodeEntry, words: tuple[tuple[int, int], ...]) -> Script[Non
             raise StateTimeout(f"statusword {statusword:04X}h after controlword {controlword:04X}h")
 
 
-_PLAIN: Final = LifeCycle(start, enter_pre_operational, reset_node)
+_PLAIN: Final = LifeCycleScripts(start, enter_pre_operational, reset_node)
 
-LIFE_CYCLES: Final[Mapping[Role, LifeCycle]] = {
+LIFE_CYCLES: Final[Mapping[Role, LifeCycleScripts]] = {
     Role.DEVICE_RTC: _PLAIN,
     Role.DEVICE: _PLAIN,
-    Role.DRIVE: LifeCycle(_enable, _disable, _reset_drive),
+    Role.DRIVE: LifeCycleScripts(_enable, _disable, _reset_drive),
 }

@@ -10,16 +10,16 @@ from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
 from tickrig.host.canopen.script import Command, Script
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
-from tickrig.host.rtc_canopen.events import EventKind, Note
+from tickrig.host.rtc_canopen.events import Notify, ServerEventType
 from tickrig.host.rtc_canopen.node.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES
-from tickrig.host.rtc_canopen.proxy.proxy import Asked, ProxyRtc
+from tickrig.host.rtc_canopen.proxy.proxy import ProxyRequest, ProxyRtc
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 WELL_US: Final = 60_000_000
 """A node that was well for so long has all its restarts again."""
 
 
-class Restart:
+class RestartCounter:
     """Counts the restarts of a node.
 
     Args:
@@ -75,7 +75,7 @@ STATES: Final = {
 """The state of a proxy by that of its device (NEDO report, table 3)."""
 
 
-class Operations:
+class NodeOperations:
     """Says on the bus what the RT side asks for, and follows what the device says.
 
     Args:
@@ -91,14 +91,14 @@ class Operations:
         restart: how often it is brought back by itself.
     """
 
-    def __init__(self, entry: NodeEntry, dialogue: Dialogue, note: Note) -> None:
+    def __init__(self, entry: NodeEntry, dialogue: Dialogue, note: Notify) -> None:
         self._entry, self._dialogue, self._note = entry, dialogue, note
         self._life = LIFE_CYCLES[entry.role]
         self.proxy: ProxyRtc | None = None
         self.nmt_state: NmtState | None = None
         self.now_us = 0
         self.resetting = self._stopping = False
-        self.restart = Restart(entry.restart)
+        self.restart = RestartCounter(entry.restart)
 
     @property
     def is_inactive(self) -> bool:
@@ -107,21 +107,21 @@ class Operations:
 
     def carry_out(self, *, lost: bool) -> None:
         """Say on the bus what was asked for, unless the device is there already."""
-        if self.proxy is None or (asked := self.proxy.take_asked()) is Asked.NOTHING:
+        if self.proxy is None or (asked := self.proxy.take_asked()) is ProxyRequest.NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
         match asked:
-            case Asked.ACTIVATE if state is NmtState.OPERATIONAL:
+            case ProxyRequest.ACTIVATE if state is NmtState.OPERATIONAL:
                 self._activated(None)
-            case Asked.ACTIVATE:
+            case ProxyRequest.ACTIVATE:
                 self._run("activate", self._life.activate(self._entry), self._activated)
-            case Asked.DEACTIVATE if state is not NmtState.PRE_OPERATIONAL:
+            case ProxyRequest.DEACTIVATE if state is not NmtState.PRE_OPERATIONAL:
                 self._dialogue.clear()
                 self._run("deactivate", self._life.deactivate(self._entry))
-            case Asked.ABORT if lost or state is not NmtState.STOPPED:
+            case ProxyRequest.ABORT if lost or state is not NmtState.STOPPED:
                 self._dialogue.clear()
                 self._stop()
-            case Asked.RESET if not self.resetting:
+            case ProxyRequest.RESET if not self.resetting:
                 self.resetting = True
                 self.restart.leave()
                 self._run("reset", self._life.reset(self._entry))
@@ -129,7 +129,7 @@ class Operations:
     def follow(self, state: NmtState, *, changed: bool) -> None:
         """Move the proxy to where the device says it is, unless that is about to change."""
         proxy = self.proxy
-        if proxy is None or self._dialogue.moves or proxy.asked is not Asked.NOTHING:
+        if proxy is None or self._dialogue.moves or proxy.asked is not ProxyRequest.NOTHING:
             return
         if self._stopping:
             self._stopping = state is not NmtState.STOPPED
@@ -138,7 +138,7 @@ class Operations:
         elif STATES[state] is not proxy.state and not proxy.ready:
             if changed:
                 text = f"{state.name} while the proxy is {proxy.state.name}"
-                self._note(EventKind.FOREIGN_TRANSITION, self._entry.id, text)
+                self._note(ServerEventType.FOREIGN_TRANSITION, self._entry.id, text)
             self._move(proxy, STATES[state])
 
     def say(self, command: NmtCommand) -> None:
@@ -170,7 +170,7 @@ class Operations:
     def go_on(self) -> None:
         """Reset a node that was lost and is heard again, if a restart is left."""
         proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
-        if proxy is None or busy or proxy.asked is not Asked.NOTHING:
+        if proxy is None or busy or proxy.asked is not ProxyRequest.NOTHING:
             return
         if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
             proxy.contexts[0].reset_component(proxy)
@@ -178,7 +178,7 @@ class Operations:
     def begin_restart(self) -> bool:
         """Take a restart, and tell; False if none is left."""
         which = self.restart.take(self.now_us)
-        kind = EventKind.RESTARTED if which else EventKind.NOT_RESTARTED
+        kind = ServerEventType.RESTARTED if which else ServerEventType.NOT_RESTARTED
         self._note(kind, self._entry.id, which or "no restart is left")
         return bool(which)
 
@@ -221,16 +221,16 @@ class Operations:
         self.say(NmtCommand.STOP)
 
 
-def kind_of(failure: Failure) -> EventKind:
+def kind_of(failure: Failure) -> ServerEventType:
     """Return the event that a failure is."""
     match failure:
         case WrongIdentity():
-            return EventKind.WRONG_IDENTITY
+            return ServerEventType.WRONG_IDENTITY
         case SdoAborted():
-            return EventKind.SDO_ABORTED
+            return ServerEventType.SDO_ABORTED
         case SdoTimeout():
-            return EventKind.SDO_TIMEOUT
-    return EventKind.NOT_CONFIRMED
+            return ServerEventType.SDO_TIMEOUT
+    return ServerEventType.NOT_CONFIRMED
 
 
 def _say(command: NmtCommand) -> Script[None]:

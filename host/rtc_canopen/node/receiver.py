@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import House, ServedNode
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodeServer, ServedNode
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import FLAG_30
 from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
@@ -38,7 +38,7 @@ MOST_MS: Final = 0xFFFF
 Table = Mapping[tuple[int, int], bytes]
 
 
-class OwnObjects:
+class ServerObjects:
     """Answers who reads the server's objects by SDO.
 
     | object | what |
@@ -119,7 +119,7 @@ QUIET_US: Final = 1_000_000
 """Another master that was not heard for so long is told of anew."""
 
 
-class Receiver:
+class FrameDispatcher:
     """Tells nodes what they sent, and the log what others did.
 
     Args:
@@ -129,11 +129,11 @@ class Receiver:
     """
 
     def __init__(
-        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, house: House
+        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, house: NodeServer
     ) -> None:
         self._nodes, self._master_id = nodes, definition.master.node
         self._note, self._send = house.note, house.send
-        self._objects = OwnObjects(definition)
+        self._objects = ServerObjects(definition)
         self._foreign_us: int | None = None
 
     def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
@@ -160,7 +160,7 @@ class Receiver:
         command, node_id = data
         known = command in tuple(NmtCommand)
         text = NmtCommand(command).name if known else f"{command:02X}h"
-        self._note(EventKind.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
+        self._note(ServerEventType.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
         for node in self._nodes.values():
             if node_id in (ALL_NODES, node.entry.id):
                 node.hear_foreign(at_us, command)
@@ -168,7 +168,7 @@ class Receiver:
     def _hear_master(self, at_us: int) -> None:
         if self._foreign_us is None or at_us - self._foreign_us >= QUIET_US:
             text = "another node has the node-ID of the server"
-            self._note(EventKind.FOREIGN_MASTER, self._master_id, text)
+            self._note(ServerEventType.FOREIGN_MASTER, self._master_id, text)
         self._foreign_us = at_us
 
     def _hear_question(self, data: bytes) -> None:
@@ -182,4 +182,6 @@ class Receiver:
             return
         text = f"{emcy.code:04X}h {describe(emcy.code)}, error register {emcy.register:02X}h"
         back = emcy.code == EmcyCode.BUS_OFF_RECOVERED
-        self._note(EventKind.BUS_OFF if back else EventKind.EMERGENCY, node.entry.id, text)
+        self._note(
+            ServerEventType.BUS_OFF if back else ServerEventType.EMERGENCY, node.entry.id, text
+        )

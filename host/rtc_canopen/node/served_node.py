@@ -10,10 +10,10 @@ from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.host.rtc_canopen.node.boot import boot, probe
-from tickrig.host.rtc_canopen.node.operations import Operations, kind_of
-from tickrig.host.rtc_canopen.node.twin_watch import TwinWatch
+from tickrig.host.rtc_canopen.node.operations import NodeOperations, kind_of
+from tickrig.host.rtc_canopen.node.twin_watch import DuplicateNodeDetector
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
@@ -25,7 +25,7 @@ FOREIGN_RESET_US: Final = 1_000_000
 RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 
 
-class Phase(Enum):
+class NodePhase(Enum):
     """How far a node has come."""
 
     ABSENT = "absent"
@@ -36,17 +36,17 @@ class Phase(Enum):
     DUPLICATE = "duplicate"
 
 
-WATCHED: Final = (Phase.READY, Phase.DUPLICATE)
+WATCHED: Final = (NodePhase.READY, NodePhase.DUPLICATE)
 """Phases in which heartbeats are awaited."""
 
-LIVING: Final = (Phase.LISTENING, Phase.BOOTING, Phase.READY)
+LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
 """Phases in which a twin is looked for."""
 
 
-class House(Protocol):
+class NodeServer(Protocol):
     """What a node needs of its server."""
 
-    def note(self, kind: EventKind, node: int, text: str = "", /) -> None:
+    def note(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take an event."""
 
     def send(self, can_id: int, data: bytes, /) -> None:
@@ -91,15 +91,15 @@ class ServedNode:
         file: DeviceFile,
         writes: tuple[SdoEntry, ...],
         remove_us: int,
-        house: House,
+        house: NodeServer,
     ) -> None:
         self.entry, self.file, self.writes, self._house = entry, file, writes, house
         self._remove_us, self._consumer_us = remove_us, 3_000 * entry.heartbeat_ms
         self.dialogue = Dialogue(entry.id, self._send)
-        self.operations = Operations(entry, self.dialogue, house.note)
-        self.phase, self.problem = Phase.ABSENT, ""
+        self.operations = NodeOperations(entry, self.dialogue, house.note)
+        self.phase, self.problem = NodePhase.ABSENT, ""
         self.layouts: tuple[PdoLayout, ...] = ()
-        self._twins = TwinWatch(1_000 * entry.heartbeat_ms)
+        self._twins = DuplicateNodeDetector(1_000 * entry.heartbeat_ms)
         self.heard_us, self.due_us = 0, NEVER
         self._looked_us = self._blind_us = 0
         self._foreign_reset_us: int | None = None
@@ -118,7 +118,7 @@ class ServedNode:
     def look(self, now_us: int) -> None:
         """Look for it on the bus."""
         self.operations.now_us = now_us
-        self.phase, self.lost = Phase.ABSENT, False
+        self.phase, self.lost = NodePhase.ABSENT, False
         self._twins.forget()
         job = QueuedScript("probe", probe(), lambda _: self._found(), self._not_booted)
         self.dialogue.start(now_us, job)
@@ -142,7 +142,7 @@ class ServedNode:
         if self.proxy is not None and self.proxy.state is not LifeCycleState.ERROR:
             was_active = self.proxy.state is LifeCycleState.ACTIVE
         self.to_start |= was_active
-        self._house.note(EventKind.RESTARTED, self.entry.id, "by hand")
+        self._house.note(ServerEventType.RESTARTED, self.entry.id, "by hand")
         self._house.gone(self)
         self.dialogue.clear()
         operations.begin()
@@ -151,7 +151,7 @@ class ServedNode:
 
     def refuse(self, problem: str) -> None:
         """Leave it as it is until it boots again."""
-        self.phase, self.problem = Phase.REFUSED, problem
+        self.phase, self.problem = NodePhase.REFUSED, problem
 
     def unseen(self, now_us: int, span_us: int) -> None:
         """Take note that nobody looked for so long: it may have spoken all the same."""
@@ -199,7 +199,7 @@ class ServedNode:
         """Do what is due."""
         self.operations.now_us = now_us
         self.dialogue.tick(now_us)
-        if self.phase is Phase.LISTENING and now_us >= self._twins.sure_us:
+        if self.phase is NodePhase.LISTENING and now_us >= self._twins.sure_us:
             self._boot()
         elif self._deadline_us <= now_us:
             self._lose(now_us)
@@ -210,7 +210,7 @@ class ServedNode:
         self.operations.now_us = now_us
         operations, restart = self.operations, self.operations.restart
         operations.carry_out(lost=self.lost)
-        if self.phase is Phase.READY and not self.lost:
+        if self.phase is NodePhase.READY and not self.lost:
             operations.go_on()
         if restart.to_activate and operations.is_inactive:
             restart.to_activate, self.to_start = False, True
@@ -231,7 +231,7 @@ class ServedNode:
 
     def _plan(self) -> None:
         due_us = min(self.dialogue.due_us, self._deadline_us)
-        if self.phase is Phase.LISTENING:
+        if self.phase is NodePhase.LISTENING:
             due_us = min(due_us, self._twins.sure_us)
         if due_us != self.due_us:
             self.due_us = due_us
@@ -239,24 +239,24 @@ class ServedNode:
 
     def _take(self, state: NmtState, *, changed: bool) -> None:
         """See to a state that was reported just now."""
-        self._twins.hear(self.heard_us, state, listening=self.phase is Phase.LISTENING)
+        self._twins.hear(self.heard_us, state, listening=self.phase is NodePhase.LISTENING)
         if self._judge():
             return
         if state is NmtState.INITIALISING:
             self._booted_up()
-        elif self.phase is Phase.ABSENT:
+        elif self.phase is NodePhase.ABSENT:
             self._found()
-        elif self.phase is Phase.READY:
+        elif self.phase is NodePhase.READY:
             self.lost = False
             self.operations.follow(state, changed=changed)
 
     def _booted_up(self) -> None:
-        self._house.note(EventKind.BOOT_UP, self.entry.id)
+        self._house.note(ServerEventType.BOOT_UP, self.entry.id)
         told_us = self._foreign_reset_us
         foreign = told_us is not None and self.heard_us - told_us < FOREIGN_RESET_US
         expected = self.lost or self.operations.resetting or foreign
-        if self.phase is Phase.READY and not expected:
-            self.phase = Phase.LISTENING
+        if self.phase is NodePhase.READY and not expected:
+            self.phase = NodePhase.LISTENING
             self.dialogue.clear()
             self.operations.lose()
         else:
@@ -273,7 +273,7 @@ class ServedNode:
     def _boot(self, first: NmtCommand | None = None) -> None:
         if not self.operations.resetting:
             self._house.gone(self)
-        self.phase, self.problem, self.lost = Phase.BOOTING, "", False
+        self.phase, self.problem, self.lost = NodePhase.BOOTING, "", False
         self.operations.begin()
         self._twins.forget()
         self.dialogue.clear()
@@ -284,7 +284,7 @@ class ServedNode:
         self.dialogue.start(self.operations.now_us, job)
 
     def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:
-        self.phase, self.layouts, self.heard_us = Phase.READY, layouts, self.operations.now_us
+        self.phase, self.layouts, self.heard_us = NodePhase.READY, layouts, self.operations.now_us
         self._twins.forget()
         self.operations.booted()
         self._house.booted(self)
@@ -298,7 +298,7 @@ class ServedNode:
             self._house.gone(self)
             self.look(self.operations.now_us)
         else:
-            self.phase = Phase.REFUSED
+            self.phase = NodePhase.REFUSED
 
     def _judge(self) -> bool:
         """See whether it has a twin: then both are stopped; a suspicion is told once."""
@@ -308,12 +308,12 @@ class ServedNode:
             return True
         if twins.suspicion and not self._suspected and self.phase in LIVING:
             self._suspected = True
-            self._house.note(EventKind.DUPLICATE_SUSPECTED, self.entry.id, twins.suspicion)
+            self._house.note(ServerEventType.DUPLICATE_SUSPECTED, self.entry.id, twins.suspicion)
         return False
 
     def _refuse_twin(self, sign: str) -> None:
-        self.phase, self.problem = Phase.DUPLICATE, f"two nodes have this node-ID: {sign}"
-        self._house.note(EventKind.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}")
+        self.phase, self.problem = NodePhase.DUPLICATE, f"two nodes have this node-ID: {sign}"
+        self._house.note(ServerEventType.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}")
         self.dialogue.clear()
         self.operations.say(NmtCommand.STOP)
         self.operations.abort()
@@ -329,6 +329,6 @@ class ServedNode:
         text = f"silent for {(now_us - self.heard_us) // 1_000} ms"
         if self._blind_us:
             text += f"; for {self._blind_us // 1_000} ms of them the server did not look"
-        self._house.note(EventKind.HEARTBEAT_LOST, self.entry.id, text)
+        self._house.note(ServerEventType.HEARTBEAT_LOST, self.entry.id, text)
         self.dialogue.clear()
         self.operations.abort()

@@ -36,7 +36,7 @@ COMMANDED: Final[Mapping[int, NmtState]] = {
 }
 
 
-class TwinWatch:
+class DuplicateNodeDetector:
     """Listens to what comes from a node-ID, by the time stamps of the bus.
 
     Two nodes show by what one alone cannot say:
@@ -76,7 +76,7 @@ class TwinWatch:
         self.sign = self.suspicion = ""
         self._strangers, self._doubt_us = 0, -NEVER
         self._identity: dict[tuple[int, int], bytes | None] = {}
-        self._crowd = _Crowd(self._period_us)
+        self._crowd = _DoubleHeartbeats(self._period_us)
 
     def command(self, command: int) -> None:
         """Hear an NMT command of anybody to the node."""
@@ -149,7 +149,7 @@ class TwinWatch:
         return min(over_us, self._period_us - over_us)
 
 
-class _Crowd:
+class _DoubleHeartbeats:
     """Says when two heartbeats came in each of many producer times on end."""
 
     def __init__(self, period_us: int) -> None:

@@ -4,7 +4,7 @@ A PDO has room for one 64-bit value: those have no sequence. INTEGER8, which RTC
 has not, is a short. The canopen library reads A0h, VISIBLE_CHAR, as DOMAIN; no
 other DOMAIN has 8 bits.
 
->>> PORT_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
+>>> PDO_FIELD_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
 -2
 """
 
@@ -24,7 +24,7 @@ from tickrig.wire.rtc_types.long_long import TimedLongLong, TimedULongLong
 
 
 @dataclass(frozen=True, slots=True)
-class PortType:
+class PdoFieldType:
     """How objects of a data type are seen at ports.
 
     Attributes:
@@ -63,10 +63,15 @@ _KINDS: Final = (
     (table_4.LONG_LONG, TimedLongLong, None),
 )
 
-PORT_TYPES: Final[Mapping[tuple[int, int], PortType]] = {
-    **{(row.data_type, row.bits): PortType(row, one, many, row.bits) for row, one, many in _KINDS},
-    (DataType.BOOLEAN, 1): PortType(table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 1),
-    (DataType.DOMAIN, 8): PortType(table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq, 8),
+PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], PdoFieldType]] = {
+    **{
+        (row.data_type, row.bits): PdoFieldType(row, one, many, row.bits)
+        for row, one, many in _KINDS
+    },
+    (DataType.BOOLEAN, 1): PdoFieldType(
+        table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 1
+    ),
+    (DataType.DOMAIN, 8): PdoFieldType(table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq, 8),
 }
 """By data type and bits in the PDO; strings are not among them."""
 
@@ -98,7 +103,7 @@ class PdoField:
 
     mapped: MappedObject
     shift: int
-    type: PortType
+    type: PdoFieldType
 
 
 @dataclass(frozen=True)
@@ -161,7 +166,7 @@ def lay_out(
     fields, unknown, shift = list[PdoField](), list[MappedObject](), 0
     for mapped in mapping:
         data_type = data_types.get((mapped.index, mapped.sub), 0)
-        if (kind := PORT_TYPES.get((data_type, mapped.bits))) is not None:
+        if (kind := PDO_FIELD_TYPES.get((data_type, mapped.bits))) is not None:
             fields.append(PdoField(mapped, shift, kind))
         elif mapped.index >= 0x20:
             unknown.append(mapped)

@@ -15,7 +15,7 @@ from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
 OK: Final = ReturnCode.RTC_OK
 
 
-class Asked(Enum):
+class ProxyRequest(Enum):
     """What the RT side asked for and the bus has not been told yet."""
 
     NOTHING = auto()
@@ -51,7 +51,7 @@ class ProxyRtc(RtComponent):
 
     def __init__(self, entry: NodeEntry, layouts: tuple[PdoLayout, ...]) -> None:
         super().__init__(entry.name)
-        self.asked, self.ready = Asked.NOTHING, False
+        self.asked, self.ready = ProxyRequest.NOTHING, False
         self.passing = self.confirmed = False
         named = [(layout, entry.ports.get(layout.name, layout.name)) for layout in layouts]
         fit = [(layout, name) for layout, name in named if layout.fields and not layout.unknown]
@@ -69,31 +69,31 @@ class ProxyRtc(RtComponent):
         """Its state in its execution context; Created if it has none."""
         return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
 
-    def take_asked(self) -> Asked:
+    def take_asked(self) -> ProxyRequest:
         """Take what was asked for."""
-        asked, self.asked = self.asked, Asked.NOTHING
+        asked, self.asked = self.asked, ProxyRequest.NOTHING
         return asked
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Let data pass; ask for Operational."""
-        self.asked, self.passing, self.confirmed = Asked.ACTIVATE, True, False
+        self.asked, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
         for sink in self.sinks:
             sink.clear()
         return OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Let no data pass; ask for Pre-operational."""
-        self.asked, self.passing, self.confirmed = Asked.DEACTIVATE, False, False
+        self.asked, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
         return OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for Stopped, which takes the place of what on_deactivated asked for."""
-        self.asked, self.ready = Asked.ABORT, False
+        self.asked, self.ready = ProxyRequest.ABORT, False
         return OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for a reset of the device; RTC_OK once it has booted."""
         if self.ready:
             return OK
-        self.asked = Asked.RESET
+        self.asked = ProxyRequest.RESET
         return ReturnCode.RTC_ERROR

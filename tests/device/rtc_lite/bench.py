@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.rtc_lite.component import ERROR, Component, Result
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
-from tickrig.device.rtc_lite.ports import InPort, OutPort
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.layout import REPLIES
 from tickrig.wire.rtc_lite.values import LONG
 
 
-class Recorder(Component):
+class Recorder(LiteComponent):
     """An echo with all callbacks.
 
     Attributes:
@@ -25,8 +25,8 @@ class Recorder(Component):
     """
 
     type_name = "Echo0"
-    inlet = InPort("in", LONG)
-    outlet = OutPort("out", LONG)
+    inlet = LiteInPort("in", LONG)
+    outlet = LiteOutPort("out", LONG)
 
     def __init__(self) -> None:
         super().__init__()
@@ -80,9 +80,9 @@ class NodeBench:
     """
 
     def __init__(
-        self, make: Callable[[], Component] = Recorder, config: NodeConfig | None = None
+        self, make: Callable[[], LiteComponent] = Recorder, config: LiteConfig | None = None
     ) -> None:
-        self.node = RtcLiteNode(make, config or NodeConfig())
+        self.node = RtcLiteNode(make, config or LiteConfig())
         self.now_us = 0
 
     @property
@@ -110,8 +110,12 @@ class NodeBench:
         The answer is written in the same way, frames with a space between them.
         """
         data = request.encode("latin-1")
-        found = Decoder(REPLIES).push(self.push(Frame(Command(data[:2]), data[2:]).encode()))
-        return " ".join(frame.body.decode("latin-1") for frame in found if isinstance(frame, Frame))
+        found = LiteDecoder(REPLIES).push(
+            self.push(LiteFrame(LiteCommand(data[:2]), data[2:]).encode())
+        )
+        return " ".join(
+            frame.body.decode("latin-1") for frame in found if isinstance(frame, LiteFrame)
+        )
 
     def run(self, duration_us: int) -> bytes:
         """Run ticks without input."""

@@ -12,8 +12,8 @@ import pytest
 
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.device.rtc_lite.reference_model import NO_ARGUMENTS, ReferenceNode, checked
-from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.wire.rtc_lite.codes import ContextType
+from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.wire.rtc_lite.codes import LiteContextType
 
 CALLBACKS = (
     *("on_initialize", "on_finalize", "on_startup", "on_shutdown", "on_activated"),
@@ -79,8 +79,8 @@ def play(seed: int, length: int = 60) -> int:
     """Play a session on both; return how many bytes they said."""
     chance = random.Random(seed)
     timer_hz = chance.choice([0, 0, 3, 10, 400, 1000])
-    context = ContextType.TIMER if timer_hz else ContextType.PROXY
-    bench = NodeBench(Recorder, NodeConfig(context=context, rate_hz=timer_hz or 10))
+    context = LiteContextType.TIMER if timer_hz else LiteContextType.PROXY
+    bench = NodeBench(Recorder, LiteConfig(context=context, rate_hz=timer_hz or 10))
     model, said = ReferenceNode(timer_hz), 0
     for number, (ticks, data, failing) in enumerate(session(chance, length)):
         for tick in range(ticks):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rtc_lite.bench import NodeBench
-from tickrig.device.rtc_lite.component import Echo
+from tickrig.device.rtc_lite.component import LiteEcho
 
 STATES = ("Created", "Inactive", "Active", "Error", "None")
 COMMANDS = ("CI", "CF", "AA", "AD", "AE", "AB", "AC", "AR", "AS", "AH", "CX")
@@ -67,13 +67,13 @@ def test_a_failing_on_aborting_changes_nothing() -> None:
 
 @pytest.mark.parametrize("command", ["AS", "AH"])
 def test_what_a_component_does_not_define_is_not_supported(command: str) -> None:
-    bench = NodeBench(Echo)
+    bench = NodeBench(LiteEcho)
     bench.ask("CI")
     assert bench.ask(command) == f"{command}!"
 
 
 def test_callbacks_of_an_empty_component_all_go_well() -> None:
-    bench = NodeBench(Echo)
+    bench = NodeBench(LiteEcho)
     for request, reply in (
         *(("CI", "CI@I"), ("AA", "AA@A"), ("AE", "AE@A"), ("AB", "AB@E"), ("AC", "AC@E")),
         *(("AR", "AR@I"), ("AA", "AA@A"), ("AD", "AD@I"), ("CF", "CF@N"), ("CI", "CIHN")),

@@ -9,21 +9,21 @@ import pytest
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.physical import Input
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.rtc_lite.ports import InPort, OutPort
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Checksum, Framing
+from tickrig.wire.rtc_lite.codes import LiteContextType
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
 from tickrig.wire.rtc_lite.values import BOOLEAN, LONG, LONG_SEQ, OCTET_SEQ
 
 WRITE_42 = "PS\x02\x04in*\0\0\0"
 DATA_42 = "QV\x03\x04out*\0\0\0"
-TIMER = NodeConfig(context=ContextType.TIMER, rate_hz=100)
+TIMER = LiteConfig(context=LiteContextType.TIMER, rate_hz=100)
 
 
-def timed(config: NodeConfig = TIMER) -> NodeBench:
+def timed(config: LiteConfig = TIMER) -> NodeBench:
     bench = NodeBench(config=config)
     bench.ask("CI")
     bench.recorder.called.clear()
@@ -80,14 +80,14 @@ def test_data_wait_while_nothing_is_executed() -> None:
 
 
 def test_a_value_that_a_sequence_has_no_room_for_is_not_written() -> None:
-    port = OutPort("out", OCTET_SEQ, 3)
+    port = LiteOutPort("out", OCTET_SEQ, 3)
     assert port.write((1, 2, 3))
     assert not port.write((1, 2, 3, 4))
     assert port.value == (1, 2, 3)
 
 
 def test_a_sequence_takes_as_much_as_fits_into_a_frame() -> None:
-    port = InPort("in", OCTET_SEQ)
+    port = LiteInPort("in", OCTET_SEQ)
     assert port.accept(bytes(56))
     assert not port.accept(bytes(57))
 
@@ -132,7 +132,7 @@ def test_the_type_of_the_execution_context_is_told() -> None:
 
 @pytest.mark.parametrize(("rate_hz", "executions"), [(1, 1), (3, 3), (300, 300), (1_000, 1_000)])
 def test_a_rate_holds_over_a_second(rate_hz: int, executions: int) -> None:
-    bench = timed(NodeConfig(context=ContextType.TIMER))
+    bench = timed(LiteConfig(context=LiteContextType.TIMER))
     assert bench.ask(f"BW{chr(rate_hz & 0xFF)}{chr(rate_hz >> 8)}") == "BW@"
     bench.ask("AA")
     bench.run(1_000_000)
@@ -305,7 +305,7 @@ def test_a_power_cut_makes_a_new_component() -> None:
 
 
 def test_a_node_of_rtno_initializes_at_power_up_and_speaks_packets() -> None:
-    bench = NodeBench(config=NodeConfig(Framing.RTNO))
+    bench = NodeBench(config=LiteConfig(LiteFraming.RTNO))
     assert bench.say("0A 0A 58 00 58") == "0A 0A 58 01 49 A2"
     assert bench.recorder.called == ["on_initialize"]
     assert bench.say("0A 0A 41 00 41") == "0A 0A 41 01 40 82"
@@ -316,17 +316,17 @@ def test_a_node_of_rtno_initializes_at_power_up_and_speaks_packets() -> None:
 
 
 def test_parity_instead_of_a_sum() -> None:
-    bench = NodeBench(config=NodeConfig(checksum=Checksum.XOR8))
+    bench = NodeBench(config=LiteConfig(checksum=LiteChecksum.XOR8))
     assert bench.say("0A 43 58 1B") == "0A 43 58 40 43 18"
     assert bench.say("0A 43 58 9B") == "0A 46 48 03 0D"
 
 
-class Thermometer(Component):
+class Thermometer(LiteComponent):
     type_name = "Thermo"
     physical = (Input("temperature_dc", "temperature", low=-400, high=1_250),)
-    temperature = OutPort("t", LONG)
-    warm = OutPort("warm", BOOLEAN)
-    history = OutPort("history", LONG_SEQ, 4)
+    temperature = LiteOutPort("t", LONG)
+    warm = LiteOutPort("warm", BOOLEAN)
+    history = LiteOutPort("history", LONG_SEQ, 4)
 
     def on_execute(self) -> None:
         now_dc = self.inputs["temperature_dc"]
@@ -349,8 +349,8 @@ def test_a_component_reads_the_physical_inputs_that_it_declares() -> None:
 # What a PIC has no room for.
 
 
-def component(**attributes: Any) -> type[Component]:
-    return type("Mine", (Component,), {"type_name": "Mine", **attributes})
+def component(**attributes: Any) -> type[LiteComponent]:
+    return type("Mine", (LiteComponent,), {"type_name": "Mine", **attributes})
 
 
 @pytest.mark.parametrize(
@@ -359,11 +359,11 @@ def component(**attributes: Any) -> type[Component]:
         ({"type_name": ""}, "Mine: type_name: name '' has 0 characters, 1..15 fit"),
         ({"type_name": "x" * 16}, "Mine: type_name: name 'x*' has 16 characters, 1..15 fit"),
         (
-            {"a": InPort("in", LONG), "b": InPort("in", LONG)},
+            {"a": LiteInPort("in", LONG), "b": LiteInPort("in", LONG)},
             "Mine: 2 in-ports are called 'in'",
         ),
         (
-            {f"p{n}": OutPort(f"p{n}", LONG) for n in range(9)},
+            {f"p{n}": LiteOutPort(f"p{n}", LONG) for n in range(9)},
             "Mine: 9 out-ports, at most 8 fit",
         ),
         (
@@ -386,7 +386,7 @@ def test_a_component_that_does_not_fit_is_refused(attributes: dict[str, Any], er
 
 
 def test_an_in_port_and_an_out_port_may_share_a_name() -> None:
-    assert component(a=InPort("x", LONG), b=OutPort("x", LONG))().in_ports.keys() == {b"x"}
+    assert component(a=LiteInPort("x", LONG), b=LiteOutPort("x", LONG))().in_ports.keys() == {b"x"}
 
 
 @pytest.mark.parametrize(
@@ -399,7 +399,7 @@ def test_an_in_port_and_an_out_port_may_share_a_name() -> None:
 )
 def test_a_port_that_does_not_fit_is_refused(name: str, most: int | None, error: str) -> None:
     with pytest.raises(ValueError, match=error):
-        InPort(name, LONG_SEQ, most)
+        LiteInPort(name, LONG_SEQ, most)
 
 
 @pytest.mark.parametrize(
@@ -409,11 +409,11 @@ def test_a_port_that_does_not_fit_is_refused(name: str, most: int | None, error:
         ({"rate_hz": 1_001}, "rate_hz is 1001"),
         ({"slow_answer_us": 0}, "slow_answer_us is 0, at least 1 is needed"),
         (
-            {"framing": Framing.RTNO, "checksum": Checksum.XOR8},
+            {"framing": LiteFraming.RTNO, "checksum": LiteChecksum.XOR8},
             "checksum is xor8, packets of RTno have sum8",
         ),
     ],
 )
 def test_a_configuration_that_no_node_has_is_refused(settings: dict[str, Any], error: str) -> None:
     with pytest.raises(ValueError, match=error):
-        NodeConfig(**settings)
+        LiteConfig(**settings)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.emulators.can.can_bench import frames
 from tickrig.host.links.can_link import EchoFreeLink
-from tickrig.host.links.link import Stamped
+from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import Frames
 
 
@@ -22,7 +22,7 @@ class EchoingLink:
     def receive(self, timeout_us: int, /) -> Frames:
         return tuple(frame for _, frame in self.hear(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         received, self.frames = self.frames, ()
         return self.now_us, tuple((self.now_us, frame) for frame in received)
 

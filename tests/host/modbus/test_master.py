@@ -12,7 +12,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.modbus.master import Answer, ModbusMaster
+from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
 from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.requests import (
     READ,
@@ -61,7 +61,7 @@ class Bench:
         self.link = SimLink(self.rig, line.b)
         self.master = ModbusMaster(self.link)
 
-    def answers(self, request: Request, periods: int = 20) -> list[Answer]:
+    def answers(self, request: Request, periods: int = 20) -> list[ModbusAnswer]:
         """Begin a request, and poll each 5 ms."""
         self.master.begin(request)
         out = []
@@ -102,7 +102,7 @@ class Script:
 def test_each_function_is_answered(
     request_: Request, values: tuple[int, ...], *, echo: bool
 ) -> None:
-    assert Bench(echo=echo).answers(request_) == [Answer(request_, values)]
+    assert Bench(echo=echo).answers(request_) == [ModbusAnswer(request_, values)]
 
 
 def test_an_echo_is_no_answer() -> None:
@@ -121,7 +121,7 @@ def test_an_echo_is_no_answer() -> None:
 def test_a_refusal_is_an_answer() -> None:
     request = Request(READ, (9, 1))
     refusal = ExceptionCode.ILLEGAL_DATA_ADDRESS
-    assert Bench().answers(request) == [Answer(request, refusal=refusal)]
+    assert Bench().answers(request) == [ModbusAnswer(request, refusal=refusal)]
 
 
 def test_a_code_that_nobody_knows_stays_a_number() -> None:
@@ -129,7 +129,7 @@ def test_a_code_that_nobody_knows_stays_a_number() -> None:
     master = ModbusMaster(link)
     master.begin(READ_TWO)
     link.waiting = encode_frame(1, b"\x83\x63")
-    assert master.poll() == Answer(READ_TWO, refusal=0x63)
+    assert master.poll() == ModbusAnswer(READ_TWO, refusal=0x63)
 
 
 @pytest.mark.parametrize("retries", [0, 1, 3])
@@ -193,7 +193,7 @@ def test_an_answer_may_come_in_pieces() -> None:
     for place in range(len(frame)):
         link.waiting = frame[place : place + 1]
         answer = master.poll()
-    assert answer == Answer(READ_TWO, (7, 8))
+    assert answer == ModbusAnswer(READ_TWO, (7, 8))
 
 
 def test_what_comes_without_a_request_is_dropped() -> None:
@@ -205,14 +205,14 @@ def test_what_comes_without_a_request_is_dropped() -> None:
     master.begin(READ_TWO)
     assert master.poll() is None
     link.waiting = encode_frame(1, b"\x03\x04\x00\x07\x00\x08")
-    assert master.poll() == Answer(READ_TWO, (7, 8))
+    assert master.poll() == ModbusAnswer(READ_TWO, (7, 8))
 
 
 @given(st.integers(0, 10_000))
 def test_noise_gives_the_right_answer_or_none(seed: int) -> None:
     bench = Bench(seed)
     bench.port.arm("flip", 0.01)
-    assert bench.answers(READ_TWO) in ([], [Answer(READ_TWO, (7, 8))])
+    assert bench.answers(READ_TWO) in ([], [ModbusAnswer(READ_TWO, (7, 8))])
 
 
 def test_a_line_that_is_gone_is_told() -> None:

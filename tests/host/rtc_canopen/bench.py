@@ -14,10 +14,10 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.events import Event, EventKind
+from tickrig.host.rtc_canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.serve import read_files, serve
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 EDS = EXAMPLES / "eds"
@@ -57,7 +57,7 @@ class Bench:
         self.devices = {n: node(self.wire, n % 1000, model) for n, model in cast.items()}
         self.rig = Rig(*(Station(device, device.port) for device in self.devices.values()))
         self.definition: SystemDefinition = parse_definition(text)
-        self.server = Server(self.definition, read_files(self.definition, folder))
+        self.server = RtcCanopenServer(self.definition, read_files(self.definition, folder))
         self.end = self.wire.end()
         self.link = CanHost(self.rig, self.end)
         self.other = CanHost(self.rig, self.wire.end())
@@ -70,11 +70,13 @@ class Bench:
     def run_ms(self, duration_ms: float) -> None:
         serve(self.server, self.link, self.now_us + round(1_000 * duration_ms))
 
-    def run_until(self, kind: EventKind, node_id: int = 0, within_ms: int = 5_000) -> Event:
+    def run_until(
+        self, kind: ServerEventType, node_id: int = 0, within_ms: int = 5_000
+    ) -> ServerEvent:
         """Run until an event happens, and return it."""
-        found: list[Event] = []
+        found: list[ServerEvent] = []
 
-        def hear(event: Event) -> None:
+        def hear(event: ServerEvent) -> None:
             if event.kind is kind and event.node in (node_id or event.node, 0):
                 found.append(event)
 
@@ -87,7 +89,7 @@ class Bench:
     def boot(self) -> None:
         for node_id in self.server.nodes:
             if self.proxy(node_id) is None:
-                self.run_until(EventKind.PROXY_MADE, node_id)
+                self.run_until(ServerEventType.PROXY_MADE, node_id)
 
     def activate(self, *node_ids: int) -> None:
         for node_id in node_ids or tuple(self.server.nodes):
@@ -101,7 +103,7 @@ class Bench:
         proxy = self.proxy(node_id)
         return proxy.state if proxy else None
 
-    def events(self, *kinds: EventKind) -> list[str]:
+    def events(self, *kinds: ServerEventType) -> list[str]:
         return [
             f"{event.kind} {event.node} {event.text}".strip()
             for event in self.server.log.events

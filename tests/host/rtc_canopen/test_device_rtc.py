@@ -11,7 +11,7 @@ from tests.host.rtc_canopen.bench import Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
@@ -73,7 +73,7 @@ def test_in_error_a_start_of_another_master_changes_nothing(bench: Bench) -> Non
     bench.other.send(frames("000#0130"))
     bench.run_ms(300)
     assert (bench.state(48), rtc_state(bench)) == (ERROR, "Error")
-    assert bench.events(EventKind.FOREIGN_TRANSITION) == []
+    assert bench.events(ServerEventType.FOREIGN_TRANSITION) == []
 
 
 def test_a_drive_that_cannot_reset_its_fault_is_reset_all_the_same(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from tests.host.rtc_canopen.bench import SYSTEMS, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
@@ -95,7 +95,7 @@ def test_a_drive_that_does_not_enable_is_in_error() -> None:
     bench.server.manager.activate("Left")
     bench.run_ms(800)
     assert bench.state(1) is ERROR
-    (event,) = bench.events(EventKind.NOT_CONFIRMED)
+    (event,) = bench.events(ServerEventType.NOT_CONFIRMED)
     assert "after controlword 0006h" in event
 
 

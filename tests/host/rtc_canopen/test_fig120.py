@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, SYSTEMS, Bench
 from tickrig.host.rtc import ReturnCode
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.wire.rtc_types.basic import Time, TimedShort
 
 BY_LINK = (SYSTEMS / "fig120.yaml").read_text("utf-8")
@@ -64,7 +64,7 @@ def test_fig_120_by_ports_takes_two_frames_of_bus_time() -> None:
 def test_a_link_of_different_lengths_is_refused() -> None:
     bench = Bench(PALETTE_AND_MOTOR + "pdo_links: [{from: 16.tpdo1, to: 32.rpdo2}]\n")
     bench.boot()
-    assert bench.events(EventKind.LINK_REFUSED) == [
+    assert bench.events(ServerEventType.LINK_REFUSED) == [
         "LinkRefused 32 16.tpdo1 has 8 bits, 32.rpdo2 has 64"
     ]
 
@@ -72,4 +72,6 @@ def test_a_link_of_different_lengths_is_refused() -> None:
 def test_a_link_to_a_pdo_that_is_off_is_refused() -> None:
     bench = Bench(PALETTE_AND_MOTOR + "pdo_links: [{from: 16.tpdo1, to: 32.rpdo1}]\n")
     bench.boot()
-    assert bench.events(EventKind.LINK_REFUSED) == ["LinkRefused 32 32.rpdo1 is off, or not there"]
+    assert bench.events(ServerEventType.LINK_REFUSED) == [
+        "LinkRefused 32 32.rpdo1 is off, or not there"
+    ]

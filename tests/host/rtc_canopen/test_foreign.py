@@ -7,8 +7,8 @@ import pytest
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 
@@ -32,12 +32,12 @@ def test_another_master_is_told_of_once_while_it_is_heard() -> None:
     bench = running()
     for _ in range(5):
         foreign(bench, "77F#05", 100)
-    assert bench.events(EventKind.FOREIGN_MASTER) == [
+    assert bench.events(ServerEventType.FOREIGN_MASTER) == [
         "ForeignMaster 127 another node has the node-ID of the server"
     ]
     bench.run_ms(1_500)
     foreign(bench, "77F#05")
-    assert len(bench.events(EventKind.FOREIGN_MASTER)) == 2
+    assert len(bench.events(ServerEventType.FOREIGN_MASTER)) == 2
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_the_proxy_follows_a_command_of_another_master(
         bench.activate(16)
     sent = sum(str(heard).startswith("000#") for _, heard in bench.log.heard)
     foreign(bench, f"000#{command}")
-    assert bench.events(EventKind.FOREIGN_TRANSITION) == [f"ForeignTransition 16 {text}"]
+    assert bench.events(ServerEventType.FOREIGN_TRANSITION) == [f"ForeignTransition 16 {text}"]
     assert bench.state(16) is then
     assert sum(str(heard).startswith("000#") for _, heard in bench.log.heard) == sent + 1
 
@@ -67,7 +67,7 @@ def test_an_off_the_shelf_device_that_leaves_stopped_is_followed_out_of_error() 
     foreign(bench, "000#0210")
     foreign(bench, "000#0110", 500)
     assert bench.state(16) is ACTIVE
-    assert bench.events(EventKind.FOREIGN_TRANSITION)[1:] == [
+    assert bench.events(ServerEventType.FOREIGN_TRANSITION)[1:] == [
         "ForeignTransition 16 OPERATIONAL while the proxy is ERROR"
     ]
 
@@ -75,7 +75,7 @@ def test_an_off_the_shelf_device_that_leaves_stopped_is_followed_out_of_error() 
 def test_a_command_of_another_master_is_told_of() -> None:
     bench = running()
     foreign(bench, "000#0110 000#0200 000#7710 000#01")
-    assert bench.events(EventKind.FOREIGN_COMMAND) == [
+    assert bench.events(ServerEventType.FOREIGN_COMMAND) == [
         "ForeignCommand 16 START",
         "ForeignCommand 0 STOP to all",
         "ForeignCommand 16 77h",
@@ -87,7 +87,7 @@ def test_after_a_reset_by_another_master_the_node_is_set_up_again_at_once() -> N
     bench.activate(16)
     bench.other.send(frames("000#8110"))
     before_us = bench.now_us
-    event = bench.run_until(EventKind.PROXY_MADE)
+    event = bench.run_until(ServerEventType.PROXY_MADE)
     assert event.at_us - before_us < 40_000
     assert bench.state(32) is INACTIVE
 
@@ -99,11 +99,11 @@ def test_a_second_node_of_the_same_node_id_is_found_and_both_are_stopped(active:
         bench.activate(16)
     bench.run_ms(20 if active else 157)
     bench.devices[1016].physical["power_off"].write(0)
-    event = bench.run_until(EventKind.DUPLICATE_NODE, within_ms=300)
+    event = bench.run_until(ServerEventType.DUPLICATE_NODE, within_ms=300)
     reason = "a boot-up, and heartbeats at the times of before"
     assert (event.node, event.text) == (16, f"both are stopped: {reason}")
     bench.run_ms(100)
-    assert bench.server.nodes[16].phase is Phase.DUPLICATE
+    assert bench.server.nodes[16].phase is NodePhase.DUPLICATE
     assert bench.state(16) is ERROR
     assert [bench.devices[n].read("state") for n in (16, 1016)] == ["Stopped", "Stopped"]
 
@@ -115,7 +115,7 @@ def test_heartbeats_that_come_twice_as_often_are_a_suspicion_and_stop_nothing() 
     for _ in range(30):
         bench.other.send(frames("710#05"))
         bench.run_ms(100)
-    assert bench.events(EventKind.DUPLICATE_SUSPECTED, EventKind.DUPLICATE_NODE) == [
+    assert bench.events(ServerEventType.DUPLICATE_SUSPECTED, ServerEventType.DUPLICATE_NODE) == [
         "DuplicateSuspected 16 two heartbeats in each 100 ms"
     ]
     assert bench.state(16) is ACTIVE
@@ -133,7 +133,7 @@ def test_heartbeats_that_a_device_sends_at_once_when_it_goes_on_show_no_second_n
     bench.devices[16].physical["unplugged"].write(0)
     bench.other.send(frames("710#05 " * (busy_ms // 100)))
     bench.run_ms(2_000)
-    assert bench.events(EventKind.DUPLICATE_NODE, EventKind.DUPLICATE_SUSPECTED) == []
+    assert bench.events(ServerEventType.DUPLICATE_NODE, ServerEventType.DUPLICATE_SUSPECTED) == []
 
 
 def test_states_that_nobody_commanded_in_turn_show_a_second_node() -> None:
@@ -144,7 +144,7 @@ def test_states_that_nobody_commanded_in_turn_show_a_second_node() -> None:
         bench.other.send(frames(f"710#{state}"))
         bench.rig.run_for(2_000)
     bench.run_ms(50)
-    (event,) = bench.events(EventKind.DUPLICATE_NODE)
+    (event,) = bench.events(ServerEventType.DUPLICATE_NODE)
     assert event.endswith("OPERATIONAL in turn with PRE_OPERATIONAL, uncommanded")
     assert bench.state(16) is ERROR
 
@@ -164,7 +164,7 @@ def test_two_answers_for_its_identity_show_a_second_node(answer: str, found: lis
     assert "590#4318100401000000" in bench.log.text
     foreign(bench, f"590#{answer}")
     both = "DuplicateNode 16 both are stopped: "
-    assert bench.events(EventKind.DUPLICATE_NODE) == [both + reason for reason in found]
+    assert bench.events(ServerEventType.DUPLICATE_NODE) == [both + reason for reason in found]
     assert (bench.devices[16].read("state") == "Stopped") is bool(found)
 
 
@@ -172,11 +172,11 @@ def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:
     bench = running({16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
     bench.activate(16)
     bench.devices[1016].physical["power_off"].write(0)
-    bench.run_until(EventKind.DUPLICATE_NODE)
+    bench.run_until(ServerEventType.DUPLICATE_NODE)
     for number in (16, 1016):
         bench.devices[number].physical["power_off"].write(1)
     bench.run_ms(1_500)
-    assert bench.server.nodes[16].phase is Phase.ABSENT
+    assert bench.server.nodes[16].phase is NodePhase.ABSENT
     bench.devices[16].physical["power_off"].write(0)
     bench.boot()
 
@@ -185,7 +185,7 @@ def test_twins_that_boot_together_and_differ_in_their_serial_number_alone_are_fo
     bench = Bench(cast={16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
     bench.devices[1016].slave.dictionary[0x1018, 4].value = 2
     bench.run_ms(500)
-    assert bench.events(EventKind.DUPLICATE_NODE) == [
+    assert bench.events(ServerEventType.DUPLICATE_NODE) == [
         "DuplicateNode 16 both are stopped: 1018h:04 is 00000001h and 00000002h"
     ]
     assert [bench.devices[n].read("state") for n in (16, 1016)] == ["Stopped", "Stopped"]
@@ -197,7 +197,7 @@ def test_an_emergency_is_told_of_and_noise_is_not() -> None:
     foreign(
         bench, "090#3081110000000000 090#4081110000000000 090#00 710# 710#55 590#FF 7A1#05 7A0#01"
     )
-    assert bench.events(EventKind.EMERGENCY, EventKind.BUS_OFF) == [
+    assert bench.events(ServerEventType.EMERGENCY, ServerEventType.BUS_OFF) == [
         "Emergency 16 8130h life guard error or heartbeat error, error register 11h",
         "BusOff 16 8140h recovered from bus off, error register 11h",
     ]

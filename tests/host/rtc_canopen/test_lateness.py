@@ -6,18 +6,22 @@ import pytest
 
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.host.links.link import Stamped
+from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
-BLAMED = (EventKind.HEARTBEAT_LOST, EventKind.DUPLICATE_NODE, EventKind.DUPLICATE_SUSPECTED)
+BLAMED = (
+    ServerEventType.HEARTBEAT_LOST,
+    ServerEventType.DUPLICATE_NODE,
+    ServerEventType.DUPLICATE_SUSPECTED,
+)
 
 
 class Unstamped(CanHost):
     """A driver without time stamps: a frame is of when it is read."""
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         now_us, heard = super().hear(timeout_us)
         return now_us, tuple((now_us, frame) for _, frame in heard)
 
@@ -27,7 +31,7 @@ class StoppedInBetween(CanHost):
 
     stop_us = 0
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         now_us, heard = super().hear(timeout_us)
         self._rig.run_for(self.stop_us)
         return now_us, heard
@@ -55,7 +59,7 @@ def test_a_server_that_was_stopped_says_so_and_blames_nobody(stamped: bool) -> N
         bench.run_ms(1_100)
     assert bench.events(*BLAMED) == []
     assert (bench.state(16), bench.state(32)) == (ACTIVE, ACTIVE)
-    late = bench.events(EventKind.SERVER_LATE)
+    late = bench.events(ServerEventType.SERVER_LATE)
     assert [int(event.split()[3]) // 10 for event in late] == [14, 24, 28, 79, 119, 1999]
 
 
@@ -64,7 +68,7 @@ def test_a_server_that_is_late_all_the_time_says_so_once_a_second() -> None:
     for busy_ms in (150, 400) * 5:
         stop_server(bench, busy_ms)
         bench.run_ms(1)
-    late = bench.events(EventKind.SERVER_LATE)
+    late = bench.events(ServerEventType.SERVER_LATE)
     assert len(late) == 3
     assert late[1].endswith("late")
     assert int(late[1].split()[3]) > 380
@@ -92,12 +96,12 @@ def test_a_silent_node_is_told_from_a_server_that_did_not_look() -> None:
     bench.run_ms(50)
     stop_server(bench, 20)
     bench.devices[16].physical["unplugged"].write(1)
-    event = bench.run_until(EventKind.HEARTBEAT_LOST)
+    event = bench.run_until(ServerEventType.HEARTBEAT_LOST)
     assert (event.node, event.text) == (16, "silent for 300 ms")
     bench.devices[32].physical["unplugged"].write(1)
     stop_server(bench, 1_200)
     back_us = bench.now_us
-    event = bench.run_until(EventKind.HEARTBEAT_LOST)
+    event = bench.run_until(ServerEventType.HEARTBEAT_LOST)
     assert event.node == 32
     assert event.at_us == back_us + 300_000
     silent_ms, blind_ms = (int(word) for word in event.text.split() if word.isdecimal())
@@ -113,7 +117,7 @@ def test_an_answer_that_waits_while_the_server_is_stopped_is_in_time() -> None:
         stop_server(bench, 2_000)
         bench.run_ms(1)
     bench.boot()
-    assert bench.events(EventKind.SDO_TIMEOUT) == []
+    assert bench.events(ServerEventType.SDO_TIMEOUT) == []
 
 
 def test_a_heartbeat_counts_from_when_it_was_on_the_bus() -> None:

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.serve import read_files, serve
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.host.rtc_canopen.view import ServerView
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
@@ -36,7 +36,7 @@ steps = st.tuples(st.sampled_from((0, 1, 1_000, 10_000, 100_000, 600_000)), st.l
 def test_noise_is_survived(
     noise: list[tuple[int, list[CanFrame]]], states: list[ErrorState]
 ) -> None:
-    server, now_us = Server(DEFINITION, FILES), 0
+    server, now_us = RtcCanopenServer(DEFINITION, FILES), 0
     for state in states:
         server.bus_state(state)
     for wait_us, heard in noise:
@@ -59,11 +59,11 @@ def test_after_noise_the_nodes_can_be_set_up_again(noise: list[tuple[int, list[C
         bench.run_ms(wait_ms)
     bench.run_ms(1_500)  # a boot-up that nobody sent is taken for a twin's
     for node_id, node in bench.server.nodes.items():
-        if node.phase is not Phase.READY:
+        if node.phase is not NodePhase.READY:
             ServerView(bench.server).boot(node_id)
     serve(bench.server, bench.link, bench.now_us + 4_000_000, lambda: ready(bench))
     assert ready(bench)
 
 
 def ready(bench: Bench) -> bool:
-    return all(node.phase is Phase.READY for node in bench.server.nodes.values())
+    return all(node.phase is NodePhase.READY for node in bench.server.nodes.values())

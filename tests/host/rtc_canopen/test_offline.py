@@ -11,10 +11,10 @@ from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, SYSTEMS, Bench
 from tests.host.rtc_canopen.components import add_logger
 from tickrig.host.rtc_canopen.commands.server import main
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.offline import boot_on_paper, check_on_paper
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.offline import boot_offline, check_offline
 from tickrig.host.rtc_canopen.serve import open_server, read_files
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 KNOWN = "known: tpdo1, tpdo2, tpdo3, rpdo1"
@@ -22,7 +22,7 @@ KNOWN = "known: tpdo1, tpdo2, tpdo3, rpdo1"
 
 def found(text: str, folder: Path = EDS) -> tuple[str, ...]:
     definition = parse_definition(PALETTE_AND_MOTOR + text)
-    return check_on_paper(Server(definition, read_files(definition, folder)))
+    return check_offline(RtcCanopenServer(definition, read_files(definition, folder)))
 
 
 @pytest.mark.parametrize(
@@ -64,20 +64,20 @@ def test_a_pdo_that_the_definition_puts_on_is_on() -> None:
         "unit.eds,", "unit.eds, pdos: {rpdo1: {mapping: [0x64110110]}},"
     )
     checked = parse_definition(definition + "pdo_links: [{from: 16.tpdo1, to: 32.rpdo1}]")
-    server = Server(checked, read_files(checked, EDS))
-    assert check_on_paper(server) == ("pdo_links: 16.tpdo1 has 8 bits, 32.rpdo1 has 16",)
+    server = RtcCanopenServer(checked, read_files(checked, EDS))
+    assert check_offline(server) == ("pdo_links: 16.tpdo1 has 8 bits, 32.rpdo1 has 16",)
 
 
 @pytest.mark.parametrize("name", ["fig120", "beego", "fourx", "followers"])
 def test_the_examples_have_no_mistake(name: str) -> None:
-    assert check_on_paper(open_server(SYSTEMS / f"{name}.yaml")) == ()
+    assert check_offline(open_server(SYSTEMS / f"{name}.yaml")) == ()
 
 
 def test_the_pdos_on_paper_are_those_of_the_device() -> None:
     bench = Bench()
     bench.boot()
     for node in bench.server.nodes.values():
-        on = boot_on_paper(node.entry, node.file, node.writes)
+        on = boot_offline(node.entry, node.file, node.writes)
         assert on is not None
         assert [(pdo.name, pdo.fields, pdo.bits) for pdo in on] == [
             (pdo.name, pdo.fields, pdo.bits) for pdo in node.layouts
@@ -113,12 +113,12 @@ def test_a_port_that_is_not_there_is_told_of_once() -> None:
     bench = Bench(PALETTE_AND_MOTOR + "rt_connections: [{from: Palette0.ai, to: Logger0.in}]\n")
     bench.boot()
     bench.run_ms(100)
-    assert bench.events(EventKind.CONNECTION_REFUSED) == [
+    assert bench.events(ServerEventType.CONNECTION_REFUSED) == [
         f"ConnectionRefused 0 Palette0 has no port 'ai'; {KNOWN}"
     ]
     add_logger(bench.server.manager, TimedOctet)
     bench.run_ms(100)
-    assert len(bench.events(EventKind.CONNECTION_REFUSED)) == 1
+    assert len(bench.events(ServerEventType.CONNECTION_REFUSED)) == 1
     assert [entry.source for entry in bench.server.connections.wanted] == ["Palette0.ai"]
 
 

@@ -7,7 +7,7 @@ import pytest
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.node.receiver import OwnObjects
+from tickrig.host.rtc_canopen.node.receiver import ServerObjects
 
 DEFINITION = parse_definition(
     "nodes:\n- {id: 16, name: A, eds: a}\n- {id: 32, name: B, eds: a, heartbeat_ms: 30000}\n"
@@ -40,7 +40,7 @@ DEFINITION = parse_definition(
 def test_an_object_of_the_server_is_read_and_nothing_is_written(
     request_: str, answer: str | None
 ) -> None:
-    said = OwnObjects(DEFINITION).answer(bytes.fromhex(request_))
+    said = ServerObjects(DEFINITION).answer(bytes.fromhex(request_))
     assert (said and said.hex().upper()) == answer
 
 
@@ -55,7 +55,7 @@ def test_the_server_answers_on_the_bus_by_its_node_id() -> None:
 def test_the_objects_say_that_the_server_sends_sync() -> None:
     definition = parse_definition("master: {sync_ms: 20}\nnodes: [{id: 16, name: A, eds: a}]\n")
     said = [
-        OwnObjects(definition).answer(bytes.fromhex(request)) or b""
+        ServerObjects(definition).answer(bytes.fromhex(request)) or b""
         for request in ("4005100000000000", "4006100000000000")
     ]
     assert [data.hex().upper() for data in said] == ["4305100080000040", "43061000204E0000"]

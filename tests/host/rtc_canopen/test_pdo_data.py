@@ -9,7 +9,7 @@ from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import ReturnCode
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.wire.rtc_types.basic import Time, TimedOctet, TimedShortSeq
 
 
@@ -49,7 +49,7 @@ def test_a_sequence_of_the_wrong_length_is_refused_and_nothing_is_sent() -> None
     knob.out.write(TimedShortSeq(Time(), (1, 2)))
     bench.run_ms(20)
     assert "320#" not in bench.log.text
-    assert len(bench.events(EventKind.VALUE_REFUSED)) == 1
+    assert len(bench.events(ServerEventType.VALUE_REFUSED)) == 1
     put = bench.server.put
     assert put("Motor0.rpdo2", TimedShortSeq(Time(), (1, 2))) is ReturnCode.BAD_PARAMETER
     assert put("Motor0.rpdo2", TimedShortSeq(Time(), (1, 2, 3, 4))) is ReturnCode.RTC_OK
@@ -81,7 +81,7 @@ def test_a_pdo_that_is_too_short_is_dropped() -> None:
     bench = running()
     bench.other.send(frames("290#00"))
     bench.run_ms(5)
-    assert bench.events(EventKind.PDO_TOO_SHORT) == ["PdoTooShort 16 tpdo2: 1 of 8 bytes"]
+    assert bench.events(ServerEventType.PDO_TOO_SHORT) == ["PdoTooShort 16 tpdo2: 1 of 8 bytes"]
 
 
 def test_ports_that_do_not_fit_are_not_connected() -> None:
@@ -93,7 +93,7 @@ def test_ports_that_do_not_fit_are_not_connected() -> None:
     bench = Bench(PALETTE_AND_MOTOR + text)
     bench.boot()
     bench.run_ms(50)
-    (event,) = bench.events(EventKind.CONNECTION_REFUSED)
+    (event,) = bench.events(ServerEventType.CONNECTION_REFUSED)
     assert "carries IDL:RTC/TimedOctet:1.0" in event
 
 
@@ -104,7 +104,7 @@ def test_a_pdo_with_an_object_that_no_port_has_gets_no_port(tmp_path: Path) -> N
     text = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"
     bench = Bench(text, {16: "f-palette"}, tmp_path)
     bench.boot()
-    assert bench.events(EventKind.PORT_REFUSED) == [
+    assert bench.events(ServerEventType.PORT_REFUSED) == [
         "PortRefused 16 tpdo1: no port has the type of 6000h:01"
     ]
     proxy = bench.proxy(16)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_logger
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
@@ -35,9 +35,9 @@ def unplug(bench: Bench, node_id: int = 16) -> int:
 def test_an_unplugged_device_is_in_error_within_its_consumer_time() -> None:
     bench = running()
     last_us = unplug(bench)
-    event = bench.run_until(EventKind.HEARTBEAT_LOST)
+    event = bench.run_until(ServerEventType.HEARTBEAT_LOST)
     assert (event.node, event.at_us - last_us) == (16, 300_000)
-    event = bench.run_until(EventKind.STATE_CHANGED)
+    event = bench.run_until(ServerEventType.STATE_CHANGED)
     assert event.text == "ACTIVE to ERROR"
     assert event.at_us - last_us <= 310_000
     assert bench.state(32) is ACTIVE
@@ -46,21 +46,21 @@ def test_an_unplugged_device_is_in_error_within_its_consumer_time() -> None:
 def test_its_proxy_is_removed_one_second_later_and_nothing_else_stops() -> None:
     bench = running()
     last_us = unplug(bench)
-    event = bench.run_until(EventKind.PROXY_REMOVED)
+    event = bench.run_until(ServerEventType.PROXY_REMOVED)
     assert (event.node, event.at_us - last_us) == (16, 1_300_000)
     names = [component.instance_name for component in bench.server.manager.components]
     assert names == ["Logger0", "Motor0"]
     assert bench.state(32) is ACTIVE
-    assert bench.server.nodes[16].phase is Phase.ABSENT
+    assert bench.server.nodes[16].phase is NodePhase.ABSENT
 
 
 def test_with_its_plug_it_is_back_with_ports_and_connections() -> None:
     bench = running()
     unplug(bench)
-    bench.run_until(EventKind.PROXY_REMOVED)
+    bench.run_until(ServerEventType.PROXY_REMOVED)
     bench.devices[16].physical["unplugged"].write(0)
     plugged_us = bench.now_us
-    event = bench.run_until(EventKind.PROXY_MADE)
+    event = bench.run_until(ServerEventType.PROXY_MADE)
     assert event.at_us - plugged_us < 130_000  # a heartbeat or a probe, then 25 ms of boot
     bench.run_ms(20)
     assert bench.state(16) is INACTIVE
@@ -72,9 +72,9 @@ def test_with_its_plug_it_is_back_with_ports_and_connections() -> None:
 def test_without_reconnect_it_comes_back_without_connections() -> None:
     bench = running(CONNECTED + "master: {reconnect: false}\n")
     unplug(bench)
-    bench.run_until(EventKind.PROXY_REMOVED)
+    bench.run_until(ServerEventType.PROXY_REMOVED)
     bench.devices[16].physical["unplugged"].write(0)
-    bench.run_until(EventKind.PROXY_MADE)
+    bench.run_until(ServerEventType.PROXY_MADE)
     bench.run_ms(20)
     assert bench.server.manager.connectors == ()
 
@@ -83,7 +83,7 @@ def test_with_autoactivate_it_comes_back_active() -> None:
     bench = Bench(PALETTE_AND_MOTOR + "start: {autoactivate: true}\n")
     bench.run_ms(500)
     unplug(bench)
-    bench.run_until(EventKind.PROXY_REMOVED)
+    bench.run_until(ServerEventType.PROXY_REMOVED)
     bench.devices[16].physical["unplugged"].write(0)
     bench.run_ms(500)
     assert bench.state(16) is ACTIVE
@@ -92,7 +92,7 @@ def test_with_autoactivate_it_comes_back_active() -> None:
 def test_a_device_that_was_away_for_a_moment_is_stopped_and_can_be_reset() -> None:
     bench = running()
     unplug(bench)
-    bench.run_until(EventKind.HEARTBEAT_LOST)
+    bench.run_until(ServerEventType.HEARTBEAT_LOST)
     bench.run_ms(100)
     bench.devices[16].physical["unplugged"].write(0)
     bench.run_ms(300)
@@ -101,7 +101,7 @@ def test_a_device_that_was_away_for_a_moment_is_stopped_and_can_be_reset() -> No
     bench.server.manager.reset("Palette0")
     bench.run_ms(200)
     assert bench.state(16) is INACTIVE
-    assert bench.events(EventKind.PROXY_REMOVED) == []
+    assert bench.events(ServerEventType.PROXY_REMOVED) == []
 
 
 def test_a_device_that_lost_power_for_a_moment_is_set_up_anew() -> None:
@@ -110,11 +110,11 @@ def test_a_device_that_lost_power_for_a_moment_is_set_up_anew() -> None:
     bench.run_ms(50)
     bench.devices[16].physical["power_off"].write(0)
     back_us = bench.now_us
-    event = bench.run_until(EventKind.PROXY_MADE)
+    event = bench.run_until(ServerEventType.PROXY_MADE)
     assert 125_000 < event.at_us - back_us < 155_000  # it is listened for a twin first
     bench.run_ms(20)
     assert bench.state(16) is INACTIVE
-    assert bench.events(EventKind.DUPLICATE_NODE) == []
+    assert bench.events(ServerEventType.DUPLICATE_NODE) == []
 
 
 def test_bus_off_of_the_server_leaves_all_in_error_until_they_are_reset() -> None:
@@ -130,7 +130,7 @@ def test_bus_off_of_the_server_leaves_all_in_error_until_they_are_reset() -> Non
     assert "BusOff 0 the server can neither hear nor send" in bench.events()
     assert (bench.state(16), bench.state(32)) == (ERROR, ERROR)
     bench.end.recover(bench.now_us)
-    bench.run_until(EventKind.BUS_ON)
+    bench.run_until(ServerEventType.BUS_ON)
     bench.run_ms(500)
     assert [bench.devices[n].read("state") for n in (16, 32)] == ["Stopped", "Stopped"]
     bench.server.manager.reset("Palette0", "Motor0")
@@ -142,8 +142,8 @@ def test_a_link_is_made_again_when_its_target_comes_back_and_kept_when_its_sourc
     bench = running(CONNECTED + "pdo_links: [{from: 16.tpdo2, to: 32.rpdo2}]\n")
     for node_id, links in ((16, 1), (32, 2)):
         unplug(bench, node_id)
-        bench.run_until(EventKind.PROXY_REMOVED, node_id)
+        bench.run_until(ServerEventType.PROXY_REMOVED, node_id)
         bench.devices[node_id].physical["unplugged"].write(0)
-        bench.run_until(EventKind.PROXY_MADE, node_id)
+        bench.run_until(ServerEventType.PROXY_MADE, node_id)
         bench.run_ms(50)
-        assert len(bench.events(EventKind.PDO_LINKED)) == links
+        assert len(bench.events(ServerEventType.PDO_LINKED)) == links

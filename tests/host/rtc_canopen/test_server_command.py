@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.rtc_canopen.bench import EDS, SYSTEMS
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.commands.opening import furnish
+from tickrig.host.rtc_canopen.commands.opening import add_components
 from tickrig.host.rtc_canopen.commands.server import main
 from tickrig.host.rtc_canopen.serve import open_server
 
@@ -117,12 +117,12 @@ def test_components_of_a_file_run_beside_the_proxies(tmp_path: Path) -> None:
     parts = tmp_path / "parts.py"
     parts.write_text(PARTS, "utf-8")
     server = open_server(SYSTEMS / "fig120.yaml")
-    furnish(server, [f"Stick0={parts}:Stick", f"Stick1={parts}:Stick"])
+    add_components(server, [f"Stick0={parts}:Stick", f"Stick1={parts}:Stick"])
     server.tick(20_000, ())
     server.tick(40_000, ())
     states = [server.manager.state_of(name) for name in ("Stick0", "Stick1")]
     assert states == [LifeCycleState.ACTIVE] * 2
     with pytest.raises(ValueError, match="--component Stick0: a component 'Stick0' is there"):
-        furnish(server, [f"Stick0={parts}:Stick"])
+        add_components(server, [f"Stick0={parts}:Stick"])
     with pytest.raises(ValueError, match="--component Stick2: on_initialize of Stick2 returned"):
-        furnish(server, [f"Stick2={parts}:Broken"])
+        add_components(server, [f"Stick2={parts}:Broken"])

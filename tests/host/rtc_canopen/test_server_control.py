@@ -11,8 +11,8 @@ from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.commands.server_control import ServerControl
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.serve import ServerRunner
 
 ACTIVE = LifeCycleState.ACTIVE
@@ -71,9 +71,9 @@ def test_a_node_that_was_lost_is_restarted_by_hand_and_active_again(away_ms: int
     assert bench.state(16) is not ACTIVE
     assert ask(control, "restart", node=16)["ok"]
     bench.run_ms(800)
-    assert bench.events(EventKind.RESTARTED) == ["Restarted 16 by hand"]
+    assert bench.events(ServerEventType.RESTARTED) == ["Restarted 16 by hand"]
     assert bench.state(16) is (ACTIVE if away_ms == 600 else LifeCycleState.INACTIVE)
-    assert not bench.events(EventKind.DUPLICATE_NODE, EventKind.DUPLICATE_SUSPECTED)
+    assert not bench.events(ServerEventType.DUPLICATE_NODE, ServerEventType.DUPLICATE_SUSPECTED)
 
 
 def test_a_node_that_works_is_reset_and_works_again() -> None:
@@ -92,7 +92,7 @@ def test_a_node_that_is_away_is_looked_for_until_it_is_there() -> None:
     bench.run_ms(500)
     ask(control, "restart", node=16)
     bench.run_ms(3_000)
-    assert bench.server.nodes[16].phase is Phase.ABSENT
+    assert bench.server.nodes[16].phase is NodePhase.ABSENT
     bench.devices[16].physical["power_off"].write(0)
     bench.run_ms(1_500)
     assert bench.state(16) is ACTIVE
@@ -103,7 +103,7 @@ def test_a_node_that_was_refused_is_set_up_again() -> None:
     bench.server.nodes[16].refuse("nobody knows why")
     ask(control, "restart", node=16)
     bench.run_ms(800)
-    assert bench.server.nodes[16].phase is Phase.READY
+    assert bench.server.nodes[16].phase is NodePhase.READY
 
 
 def test_requests_of_a_system_are_answered_and_all_nodes_started() -> None:

@@ -11,8 +11,8 @@ from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, Rol
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.host.rtc_canopen.errors import ServerRefused
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.view import NOT_HEARD, PdoView, PortView, ServerView
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_types.basic import TimedShortSeq
@@ -35,7 +35,7 @@ def booted() -> tuple[Bench, ServerView]:
 def test_before_it_was_heard_a_node_is_absent() -> None:
     _, view = viewed()
     node = view.node(16)
-    assert (node.phase, node.nmt_state, node.proxy_state) == (Phase.ABSENT, "", "")
+    assert (node.phase, node.nmt_state, node.proxy_state) == (NodePhase.ABSENT, "", "")
     assert (node.heartbeat_age_us, node.ports, node.pdos) == (NOT_HEARD, (), ())
 
 
@@ -120,7 +120,7 @@ def test_a_transfer_that_is_not_answered_hides_no_foreign_command() -> None:
     bench.run_ms(150)
     assert not transfer.done
     assert bench.state(16) is LifeCycleState.ERROR
-    assert bench.events(EventKind.FOREIGN_TRANSITION)
+    assert bench.events(ServerEventType.FOREIGN_TRANSITION)
 
 
 def test_pdos_of_the_same_length_are_linked_while_the_server_runs() -> None:
@@ -131,7 +131,7 @@ def test_pdos_of_the_same_length_are_linked_while_the_server_runs() -> None:
         view.link(PdoName(5, "tpdo1"), SAME_LENGTH[1])
     view.link(*SAME_LENGTH)
     bench.run_ms(20)
-    assert bench.events(EventKind.PDO_LINKED) == ["PdoLinked 32 16.tpdo2 to 32.rpdo2: 290h"]
+    assert bench.events(ServerEventType.PDO_LINKED) == ["PdoLinked 32 16.tpdo2 to 32.rpdo2: 290h"]
     with pytest.raises(ServerRefused, match=r"16.tpdo2 and 32.rpdo2 are linked"):
         view.link(*SAME_LENGTH)
 
@@ -142,7 +142,7 @@ def test_a_link_to_a_stopped_device_is_refused_as_it_answers_no_sdo() -> None:
     manager.context_of("Motor0").abort_component(manager.find("Motor0"))
     bench.run_ms(200)
     view.link(*SAME_LENGTH)
-    event = bench.run_until(EventKind.LINK_REFUSED)
+    event = bench.run_until(ServerEventType.LINK_REFUSED)
     assert event.text == "16.tpdo2 to 32.rpdo2: 1401h:01 was not answered"
 
 
@@ -155,7 +155,9 @@ def test_a_link_can_be_ended_and_another_made() -> None:
     view.unlink(*SAME_LENGTH)
     bench.run_ms(20)
     assert (rpdo.number, view.links) == (0x320, ())
-    assert bench.events(EventKind.PDO_UNLINKED) == ["PdoUnlinked 32 16.tpdo2 to 32.rpdo2: 320h"]
+    assert bench.events(ServerEventType.PDO_UNLINKED) == [
+        "PdoUnlinked 32 16.tpdo2 to 32.rpdo2: 320h"
+    ]
     view.link(PdoName(16, "tpdo3"), SAME_LENGTH[1])
     bench.run_ms(20)
     assert rpdo.number == 0x390
@@ -166,11 +168,11 @@ def test_a_link_can_be_ended_and_another_made() -> None:
 def test_a_refused_node_can_be_set_up_again() -> None:
     bench = Bench(cast={16: "f-palette", 32: "f-palette"})
     view = ServerView(bench.server)
-    bench.run_until(EventKind.WRONG_IDENTITY)
+    bench.run_until(ServerEventType.WRONG_IDENTITY)
     assert "not 000C0191h" in view.node(32).problem
     view.boot(32)
     bench.run_ms(50)
-    assert len(bench.events(EventKind.WRONG_IDENTITY)) == 2
+    assert len(bench.events(ServerEventType.WRONG_IDENTITY)) == 2
     with pytest.raises(ServerRefused, match="node 5 is none of: 16, 32"):
         view.boot(5)
 

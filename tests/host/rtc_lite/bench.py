@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.host.spy_link import SpyLink
-from tickrig.device.rtc_lite.component import Component
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig, Station
@@ -14,7 +14,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import ExecutionContext, Manager
-from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
+from tickrig.host.rtc_lite import ProxyEvent, ProxySettings, RtcLiteProxy, attach
 
 TICK_US = 10_000
 PERIOD_US = 10 * TICK_US
@@ -32,10 +32,13 @@ class Bench:
     """
 
     def __init__(
-        self, *kinds: Callable[[], Component], config: NodeConfig | None = None, baud: int = BAUD
+        self,
+        *kinds: Callable[[], LiteComponent],
+        config: LiteConfig | None = None,
+        baud: int = BAUD,
     ) -> None:
         lines = [SerialLine(baud) for _ in kinds]
-        self.nodes = [RtcLiteNode(kind, config or NodeConfig()) for kind in kinds]
+        self.nodes = [RtcLiteNode(kind, config or LiteConfig()) for kind in kinds]
         self.lines = [FaultyPort(line.a, LINE_FAULTS) for line in lines]
         self.rig = Rig(*map(Station, self.nodes, self.lines))
         self.links = [SpyLink(SimLink(self.rig, line.b)) for line in lines]
@@ -43,7 +46,7 @@ class Bench:
         self.context = ExecutionContext(1_000_000 / PERIOD_US)
         self.events: list[ProxyEvent] = []
 
-    def attach(self, at: int, name: str, settings: Settings | None = None) -> RtcLiteProxy:
+    def attach(self, at: int, name: str, settings: ProxySettings | None = None) -> RtcLiteProxy:
         """Make a proxy for a node, in the context that all share."""
         return attach(
             self.manager,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.host.rtc_lite.bench import Bench
 from tickrig.device.rtc_lite.component import LiteA, LiteB
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc_lite import Settings
+from tickrig.host.rtc_lite import ProxySettings
 
 JOINTS = (
     ("ConsoleIn0.out", "LiteA0.in"),
@@ -20,7 +20,7 @@ class Experiment(Bench):
 
     def __init__(self, *, rediscover: bool = False) -> None:
         super().__init__(LiteA, LiteB)
-        settings = Settings(rediscover=rediscover)
+        settings = ProxySettings(rediscover=rediscover)
         self.source = self.manager.add(ConsoleIn("ConsoleIn0"), context=self.context)
         self.lite_a = self.attach(0, "LiteA", settings)
         self.lite_b = self.attach(1, "LiteB", settings)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.device.rtc_lite.bench import Recorder
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.layout import REQUESTS
 
 
@@ -24,10 +24,10 @@ class ScriptedNode:
     """
 
     def __init__(
-        self, make: Callable[[], Recorder] = Recorder, config: NodeConfig | None = None
+        self, make: Callable[[], Recorder] = Recorder, config: LiteConfig | None = None
     ) -> None:
-        self.node = RtcLiteNode(make, config or NodeConfig())
-        self.answers: dict[Command, list[Frame]] = {}
+        self.node = RtcLiteNode(make, config or LiteConfig())
+        self.answers: dict[LiteCommand, list[LiteFrame]] = {}
         self.requests: list[str] = []
         self.now_us = 0
         self._coming = b""
@@ -39,8 +39,8 @@ class ScriptedNode:
         return component
 
     def send(self, traffic: bytes, /) -> None:
-        (request,) = Decoder(REQUESTS).push(traffic)
-        assert isinstance(request, Frame)
+        (request,) = LiteDecoder(REQUESTS).push(traffic)
+        assert isinstance(request, LiteFrame)
         self.requests.append(request.command.value.decode())
         if (frames := self.answers.get(request.command)) is not None:
             self._coming += b"".join(frame.encode() for frame in frames)
@@ -54,7 +54,7 @@ class ScriptedNode:
         data, self._coming = self._coming, b""
         return data
 
-    def come(self, *frames: Frame) -> None:
+    def come(self, *frames: LiteFrame) -> None:
         """Let frames come that nobody asked for."""
         self._coming += b"".join(frame.encode() for frame in frames)
 

@@ -6,9 +6,9 @@ import pytest
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
-from tickrig.device.rtc_lite.component import Echo
+from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.host.rtc import Manager, RtcRefused
-from tickrig.host.rtc_lite import ProxyEvent, RtcLiteProxy, Settings, attach
+from tickrig.host.rtc_lite import ProxyEvent, ProxySettings, RtcLiteProxy, attach
 from tickrig.wire.instant import NEVER
 
 AWAY_US = 3_500_000
@@ -16,13 +16,13 @@ AWAY_US = 3_500_000
 
 
 def test_the_lowest_free_number_is_taken() -> None:
-    bench = Bench(Echo, Echo)
+    bench = Bench(LiteEcho, LiteEcho)
     assert bench.attach(0, "Echo").instance_name == "Echo0"
     assert bench.attach(1, "Echo").instance_name == "Echo1"
 
 
 def test_without_a_context_it_has_its_own_at_10_hz() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     proxy = attach(bench.manager, bench.links[0], "Echo")
     assert [context.rate_hz for context in proxy.own_contexts] == [10.0]
     bench.manager.activate("Echo0")
@@ -31,7 +31,7 @@ def test_without_a_context_it_has_its_own_at_10_hz() -> None:
 
 
 def test_a_device_that_does_not_start_up_is_not_attached() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.nodes[0].inputs.set("power_cut", 1)
     with pytest.raises(RtcRefused, match="on_initialize of Echo0 returned RTC_ERROR"):
         bench.attach(0, "Echo")
@@ -40,7 +40,7 @@ def test_a_device_that_does_not_start_up_is_not_attached() -> None:
 
 def test_a_proxy_that_is_deleted_finalizes_its_device_and_is_minded_no_more() -> None:
     bench = Bench(Recorder)
-    bench.attach(0, "Echo", Settings(rediscover=True))
+    bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_to(PERIOD_US)
@@ -55,7 +55,7 @@ def test_a_proxy_that_is_deleted_finalizes_its_device_and_is_minded_no_more() ->
 
 
 def test_the_system_may_count_time_otherwise_than_the_link() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.rig.run_for(1_000_000_000)
     bench.attach(0, "Echo")
     ahead_us = bench.rig.now_us
@@ -70,7 +70,7 @@ def test_the_system_may_count_time_otherwise_than_the_link() -> None:
 def test_a_listener_that_raises_is_logged_and_the_system_lives_on(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
 
     def listen(event: ProxyEvent) -> None:
         raise ZeroDivisionError
@@ -83,8 +83,8 @@ def test_a_listener_that_raises_is_logged_and_the_system_lives_on(
 
 
 def test_a_line_that_is_gone_is_a_lost_device() -> None:
-    bench = Bench(Echo)
-    bench.attach(0, "Echo", Settings(rediscover=True))
+    bench = Bench(LiteEcho)
+    bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_to(PERIOD_US)
@@ -116,7 +116,7 @@ def test_a_device_that_comes_back_within_the_burst_is_in_error_until_a_reset() -
 
 def test_a_device_that_answers_but_does_not_start_up_is_looked_for_again() -> None:
     bench = Bench(Recorder)
-    bench.attach(0, "Echo", Settings(rediscover=True))
+    bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_for(AWAY_US)
     component = bench.nodes[0].component
@@ -132,8 +132,8 @@ def test_a_device_that_answers_but_does_not_start_up_is_looked_for_again() -> No
 
 
 def test_removal_of_a_lost_proxy_that_somebody_deletes_first_is_told_once() -> None:
-    bench = Bench(Echo)
-    bench.attach(0, "Echo", Settings(rediscover=True))
+    bench = Bench(LiteEcho)
+    bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(2_000_000)
     assert bench.told() == [("FatalError", "Echo0")]
@@ -144,7 +144,7 @@ def test_removal_of_a_lost_proxy_that_somebody_deletes_first_is_told_once() -> N
 
 
 def test_a_proxy_alone_is_an_rt_component_without_pings() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     manager = Manager()
     proxy = manager.add(RtcLiteProxy("Echo0", bench.links[0]), rate_hz=10.0)
     manager.activate("Echo0")
@@ -155,8 +155,8 @@ def test_a_proxy_alone_is_an_rt_component_without_pings() -> None:
 
 
 def test_a_board_that_is_back_has_booted() -> None:
-    bench = Bench(Echo)
-    bench.attach(0, "Echo", Settings(boot_us=3_000_000, rediscover=True))
+    bench = Bench(LiteEcho)
+    bench.attach(0, "Echo", ProxySettings(boot_us=3_000_000, rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_for(AWAY_US)
     bench.nodes[0].inputs.set("power_cut", 0)
@@ -182,10 +182,10 @@ class Deleter:
 
 
 def test_a_proxy_that_is_deleted_as_it_is_to_be_removed_is_not_looked_for() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     deleter = Deleter(bench.manager)
     bench.manager.add_item(deleter)
-    deleter.proxy = bench.attach(0, "Echo", Settings(rediscover=True))
+    deleter.proxy = bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(AWAY_US)
     assert deleter.deleted == 1

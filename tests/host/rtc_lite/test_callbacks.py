@@ -11,8 +11,8 @@ from tests.host.rtc_lite.bench import Bench
 from tests.host.rtc_lite.scripted_node import ScriptedNode
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
 from tickrig.host.rtc_lite import RtcLiteProxy
-from tickrig.wire.rtc_lite.codes import Command, LinkFault
-from tickrig.wire.rtc_lite.frame import Frame, fault_frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
+from tickrig.wire.rtc_lite.frame import LiteFrame, fault_frame
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 OK, ERROR = ReturnCode.RTC_OK, ReturnCode.RTC_ERROR
@@ -52,7 +52,7 @@ class Row:
         self,
         call: Callable[[RtcLiteProxy], ReturnCode],
         state: str,
-        command: Command,
+        command: LiteCommand,
         good: bytes,
         codes: dict[bytes, ReturnCode] = CODES,
     ) -> None:
@@ -61,17 +61,23 @@ class Row:
 
 
 ROWS = {
-    "on_initialize": Row(RtcLiteProxy.on_initialize, "Created", Command.INITIALIZE, b"I", REFUSED),
-    "on_startup": Row(lambda p: p.on_startup(EC), "Inactive", Command.STARTUP, b"I", OPTIONAL),
-    "on_shutdown": Row(lambda p: p.on_shutdown(EC), "Inactive", Command.SHUTDOWN, b"I", OPTIONAL),
-    "on_activated": Row(lambda p: p.on_activated(EC), "Inactive", Command.ACTIVATE, b"A"),
-    "on_execute": Row(lambda p: p.on_execute(EC), "Active", Command.EXECUTE, b"A"),
-    "on_execute with data": Row(lambda p: written(p).on_execute(EC), "Active", Command.WRITE, b""),
-    "on_deactivated": Row(lambda p: p.on_deactivated(EC), "Active", Command.DEACTIVATE, b"I"),
-    "on_aborting": Row(lambda p: p.on_aborting(EC), "Active", Command.ABORT, b"E"),
-    "on_error": Row(lambda p: p.on_error(EC), "Error", Command.ERROR, b"E"),
-    "on_reset": Row(lambda p: p.on_reset(EC), "Error", Command.RESET, b"I", REFUSED),
-    "on_finalize": Row(RtcLiteProxy.on_finalize, "Inactive", Command.FINALIZE, b"N"),
+    "on_initialize": Row(
+        RtcLiteProxy.on_initialize, "Created", LiteCommand.INITIALIZE, b"I", REFUSED
+    ),
+    "on_startup": Row(lambda p: p.on_startup(EC), "Inactive", LiteCommand.STARTUP, b"I", OPTIONAL),
+    "on_shutdown": Row(
+        lambda p: p.on_shutdown(EC), "Inactive", LiteCommand.SHUTDOWN, b"I", OPTIONAL
+    ),
+    "on_activated": Row(lambda p: p.on_activated(EC), "Inactive", LiteCommand.ACTIVATE, b"A"),
+    "on_execute": Row(lambda p: p.on_execute(EC), "Active", LiteCommand.EXECUTE, b"A"),
+    "on_execute with data": Row(
+        lambda p: written(p).on_execute(EC), "Active", LiteCommand.WRITE, b""
+    ),
+    "on_deactivated": Row(lambda p: p.on_deactivated(EC), "Active", LiteCommand.DEACTIVATE, b"I"),
+    "on_aborting": Row(lambda p: p.on_aborting(EC), "Active", LiteCommand.ABORT, b"E"),
+    "on_error": Row(lambda p: p.on_error(EC), "Error", LiteCommand.ERROR, b"E"),
+    "on_reset": Row(lambda p: p.on_reset(EC), "Error", LiteCommand.RESET, b"I", REFUSED),
+    "on_finalize": Row(RtcLiteProxy.on_finalize, "Inactive", LiteCommand.FINALIZE, b"N"),
 }
 
 
@@ -97,14 +103,14 @@ def written(proxy: RtcLiteProxy) -> RtcLiteProxy:
     return proxy
 
 
-def answer(row: Row, status: bytes) -> list[Frame]:
+def answer(row: Row, status: bytes) -> list[LiteFrame]:
     """Make up the reply of a device."""
     if status == b"fault":
-        return [fault_frame(LinkFault.CHECKSUM)]
+        return [fault_frame(LiteLinkFault.CHECKSUM)]
     if not status:
         return []
     fields = row.good if status == b"@" else b"E" if row.good and status in {b"x", b"H"} else b""
-    return [Frame(row.command, status + fields)]
+    return [LiteFrame(row.command, status + fields)]
 
 
 @pytest.mark.parametrize("status", CODES)
@@ -121,7 +127,7 @@ def test_a_callback_returns_what_its_row_says(name: str, status: bytes) -> None:
 def test_in_doubt_a_callback_sends_nothing_and_fails(name: str) -> None:
     row = ROWS[name]
     proxy, link = made(row.state)
-    link.answers[Command.STARTUP] = link.answers[Command.PING] = []
+    link.answers[LiteCommand.STARTUP] = link.answers[LiteCommand.PING] = []
     assert proxy.on_startup(EC) is ERROR
     assert link.taken() == ["AS", "CY"]
     code = row.call(proxy)
@@ -131,10 +137,10 @@ def test_in_doubt_a_callback_sends_nothing_and_fails(name: str) -> None:
 
 def test_an_answered_ping_ends_the_doubt() -> None:
     proxy, link = made("Active")
-    link.answers[Command.EXECUTE] = []
+    link.answers[LiteCommand.EXECUTE] = []
     assert proxy.on_execute(EC) is ERROR
     proxy.tick()
-    del link.answers[Command.EXECUTE]
+    del link.answers[LiteCommand.EXECUTE]
     assert proxy.on_execute(EC) is OK
     assert link.taken() == ["AE", "CY", "AE"]
 
@@ -150,7 +156,7 @@ def test_a_callback_waits_for_a_ping_that_is_under_way() -> None:
 def test_a_callback_goes_on_when_a_single_ping_was_lost() -> None:
     proxy, link = made("Inactive")
     link.now_us = proxy.due_us
-    link.answers[Command.PING] = []
+    link.answers[LiteCommand.PING] = []
     proxy.tick()
     asked_us = link.now_us
     assert proxy.on_activated(EC) is OK
@@ -161,9 +167,9 @@ def test_a_callback_goes_on_when_a_single_ping_was_lost() -> None:
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request() -> None:
     proxy, link = made("Active")
-    link.answers[Command.EXECUTE] = []
+    link.answers[LiteCommand.EXECUTE] = []
     assert proxy.on_execute(EC) is ERROR
-    link.come(Frame(Command.EXECUTE, b"@A"))
+    link.come(LiteFrame(LiteCommand.EXECUTE, b"@A"))
     proxy.tick()
     assert proxy.on_execute(EC) is ERROR
 
@@ -183,11 +189,11 @@ def test_a_reset_begins_from_where_the_device_is(
 ) -> None:
     proxy, link = made("Error")
     link.answers = {
-        Command.ERROR: [Frame(Command.ERROR, b"H" + state)],
-        Command.STATE: [Frame(Command.STATE, b"@" + state)],
-        Command.INITIALIZE: [Frame(Command.INITIALIZE, b"@I")],
-        Command.ABORT: [Frame(Command.ABORT, b"@E")],
-        Command.RESET: [Frame(Command.RESET, b"xE")],
+        LiteCommand.ERROR: [LiteFrame(LiteCommand.ERROR, b"H" + state)],
+        LiteCommand.STATE: [LiteFrame(LiteCommand.STATE, b"@" + state)],
+        LiteCommand.INITIALIZE: [LiteFrame(LiteCommand.INITIALIZE, b"@I")],
+        LiteCommand.ABORT: [LiteFrame(LiteCommand.ABORT, b"@E")],
+        LiteCommand.RESET: [LiteFrame(LiteCommand.RESET, b"xE")],
     }
     assert proxy.on_error(EC) is PRECONDITION
     assert proxy.on_reset(EC) is code
@@ -196,10 +202,10 @@ def test_a_reset_begins_from_where_the_device_is(
 
 def test_a_device_that_did_not_follow_into_error_is_aborted_in_the_next_period() -> None:
     proxy, link = made("Active")
-    link.answers[Command.ABORT] = []
+    link.answers[LiteCommand.ABORT] = []
     assert proxy.on_aborting(EC) is ERROR
     proxy.tick()
-    del link.answers[Command.ABORT]
+    del link.answers[LiteCommand.ABORT]
     link.taken()
     assert proxy.on_error(EC) is OK
     assert link.taken() == ["CX", "AB", "AC"]

@@ -14,7 +14,7 @@ from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.host.rtc import OutPort, connect
-from tickrig.wire.rtc_lite.codes import Command
+from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 DIALOGUES = {row["id"]: row for row in VECTORS["dialogues"]}
@@ -54,7 +54,7 @@ class Stage:
 
     def said(self) -> tuple[bytes, bytes]:
         """Return all that was sent and heard, but for the optional on_startup."""
-        sent = [data for _, data in self.link.sent if data[1:3] != Command.STARTUP.value]
+        sent = [data for _, data in self.link.sent if data[1:3] != LiteCommand.STARTUP.value]
         return b"".join(sent), self.link.heard
 
 

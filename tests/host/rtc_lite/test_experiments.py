@@ -10,8 +10,8 @@ from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, TICK_US, Bench
 from tests.host.rtc_lite.experiment import ALL, JOINTS, Experiment
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.rtc_lite.component import Echo
-from tickrig.host.rtc_lite import Settings
+from tickrig.device.rtc_lite.component import LiteEcho
+from tickrig.host.rtc_lite import ProxySettings
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
 
 PHASES_US = [0, 3_000, 10_000, 20_000, 50_000, 77_777, 99_999]
@@ -196,7 +196,7 @@ def recorder_bench() -> tuple[Bench, RtcLiteProxy]:
 
 
 def test_t6_noise_between_frames_does_no_harm() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.links[0].spoil = lambda frame: b"\xff\x00\x55" + frame
     bench.attach(0, "Echo")
     bench.context.start()
@@ -254,8 +254,8 @@ def test_t7_the_device_is_asked_each_100_ticks() -> None:
 
 
 def test_removal_may_follow_at_once() -> None:
-    bench = Bench(Echo)
-    bench.attach(0, "Echo", Settings(linger_us=0))
+    bench = Bench(LiteEcho)
+    bench.attach(0, "Echo", ProxySettings(linger_us=0))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(2_000_000)
     assert bench.at_us("Removed") == bench.at_us("FatalError")

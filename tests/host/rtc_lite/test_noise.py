@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tickrig.device.chance import Chance
-from tickrig.device.rtc_lite.component import Echo
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.component import LiteEcho
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
-from tickrig.host.rtc_lite import RtcLiteProxy, Settings
-from tickrig.wire.rtc_lite.codes import ContextType
-from tickrig.wire.rtc_lite.frame import Framing
+from tickrig.host.rtc_lite import ProxySettings, RtcLiteProxy
+from tickrig.wire.rtc_lite.codes import LiteContextType
+from tickrig.wire.rtc_lite.frame import LiteFraming
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 NOISY_US = 3_000_000
@@ -72,16 +72,16 @@ SPOILS = st.lists(
 
 
 CONFIGS = [
-    NodeConfig(),
-    NodeConfig(context=ContextType.TIMER),
-    NodeConfig(framing=Framing.RTNO),
+    LiteConfig(),
+    LiteConfig(context=LiteContextType.TIMER),
+    LiteConfig(framing=LiteFraming.RTNO),
 ]
 
 
-def spoilt_bench(spoils: list[Spoil], config: NodeConfig) -> Bench:
+def spoilt_bench(spoils: list[Spoil], config: LiteConfig) -> Bench:
     """An active echo on a line that spoils what passes, each way in turn, until all is used up."""
-    bench = Bench(Echo, config=config)
-    bench.attach(0, "Echo", Settings(framing=config.framing, rediscover=True))
+    bench = Bench(LiteEcho, config=config)
+    bench.attach(0, "Echo", ProxySettings(framing=config.framing, rediscover=True))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_to(2 * PERIOD_US)
@@ -121,7 +121,7 @@ def echoed(bench: Bench) -> list[int]:
 
 @settings(max_examples=80)
 @given(SPOILS, st.sampled_from(CONFIGS))
-def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], config: NodeConfig) -> None:
+def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], config: LiteConfig) -> None:
     bench = spoilt_bench(spoils, config)
     bench.run_for(NOISY_US)
     bench.lines[0].clear("spoil")
@@ -138,9 +138,9 @@ def test_a_pair_comes_back_from_any_noise(spoils: list[Spoil], config: NodeConfi
 
 def test_a_count_that_noise_made_larger_swallows_the_pings_and_the_device_is_found_again() -> None:
     """A node waits for the rest of a frame as long as a PING for its answer (L7, L14)."""
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.context.set_rate(1_000_000 / 100_450)  # the phase between two ticks of the node
-    proxy = bench.attach(0, "Echo", Settings(rediscover=True))
+    proxy = bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_to(250_000)

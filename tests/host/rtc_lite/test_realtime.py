@@ -17,7 +17,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.system.real_time import RealTime
-from tickrig.host.rtc_lite import ProxyEvent, Settings, attach
+from tickrig.host.rtc_lite import ProxyEvent, ProxySettings, attach
 
 EMULATOR = "tickrig.emulators.rtc_lite.cli"
 DEADLINE_S = 10.0
@@ -105,7 +105,7 @@ def test_t3_on_two_ptys(live: Live) -> None:
 
 @pytest.mark.realtime
 def test_an_emulator_that_is_started_again_is_found_again() -> None:
-    settings = Settings(
+    settings = ProxySettings(
         ping_period_us=100_000, linger_us=0, rediscover=True, look_period_us=100_000
     )
     manager, events, paths = Manager(), list[ProxyEvent](), list[str]()

@@ -6,11 +6,11 @@ from tests.host.rtc_lite.bench import PERIOD_US, Bench
 from tests.host.rtc_lite.test_experiments import recorder_bench
 from tests.host.rtc_lite.test_timer import active
 from tests.host.spy_link import SpyLink
-from tickrig.device.rtc_lite.component import Echo
+from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.link import Link
-from tickrig.host.rtc_lite import Settings
-from tickrig.host.rtc_lite.events import EventKind, ProxyEvent
+from tickrig.host.rtc_lite import ProxySettings
+from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType
 
 
 def only_event(bench: Bench) -> ProxyEvent:
@@ -37,7 +37,7 @@ def test_a_lost_device_is_told_with_the_request_that_it_left_out() -> None:
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_for(10 * PERIOD_US)
     event = bench.events[0]
-    assert event.kind is EventKind.FATAL_ERROR
+    assert event.kind is ProxyEventType.FATAL_ERROR
     assert event.reason == "no reply to AE within 100 ms, and none of 4 PINGs was answered"
     assert [frame.split()[1:] for frame in event.frames[-5:]] == [
         [">", "AE"],
@@ -46,7 +46,7 @@ def test_a_lost_device_is_told_with_the_request_that_it_left_out() -> None:
 
 
 def test_a_device_that_is_lost_while_it_is_inactive_is_told_with_its_pings() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.attach(0, "Echo")
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_for(15 * PERIOD_US)
@@ -60,7 +60,10 @@ def test_a_single_lost_reply_is_told() -> None:
     bench.lines[0].clear("cut")
     bench.run_for(3 * PERIOD_US)
     event = only_event(bench)
-    assert (event.kind, event.reason) == (EventKind.PASSIVE_ERROR, "no reply to AE within 100 ms")
+    assert (event.kind, event.reason) == (
+        ProxyEventType.PASSIVE_ERROR,
+        "no reply to AE within 100 ms",
+    )
 
 
 def test_a_wrong_checksum_is_told() -> None:
@@ -99,11 +102,11 @@ class StoppedLink(SpyLink):
 
 
 def test_a_reply_that_came_while_this_process_was_stopped_is_one() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     line: Link[bytes] = bench.links[0]
     bench.links[0] = stopped = StoppedLink(line)
     stopped.rig = bench.rig
-    bench.attach(0, "Echo", Settings(ping_period_us=200_000))
+    bench.attach(0, "Echo", ProxySettings(ping_period_us=200_000))
     bench.context.start()
     bench.manager.activate("Echo0")
     bench.run_for(50 * PERIOD_US)

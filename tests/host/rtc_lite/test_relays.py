@@ -9,14 +9,14 @@ import pytest
 from tests.wire.rtc_lite.vectors import VECTORS
 from tickrig.host.links.errors import DeviceRefused
 from tickrig.host.rtc import InPort, OutPort, connect
-from tickrig.host.rtc_lite.relays import Relays
-from tickrig.wire.rtc_lite.messages import PortData, PortProfile
+from tickrig.host.rtc_lite.relays import PortBridges
+from tickrig.wire.rtc_lite.messages import LitePortData, LitePortProfile
 from tickrig.wire.rtc_types.basic import Time
 
 
-def both_ways(code: str) -> tuple[Relays, OutPort[Any], InPort[Any]]:
+def both_ways(code: str) -> tuple[PortBridges, OutPort[Any], InPort[Any]]:
     """The ports of a device with one in-port and one out-port, and what is joined to them."""
-    relays = Relays([PortProfile(code, b"in")], [PortProfile(code, b"out")])
+    relays = PortBridges([LitePortProfile(code, b"in")], [LitePortProfile(code, b"out")])
     in_port, out_port = relays.ports
     assert isinstance(in_port, InPort)
     assert isinstance(out_port, OutPort)
@@ -30,12 +30,12 @@ def both_ways(code: str) -> tuple[Relays, OutPort[Any], InPort[Any]]:
 def test_a_golden_value_passes_in_and_out(row: dict[str, Any]) -> None:
     payload = bytes.fromhex(row["bytes"])
     relays, source, sink = both_ways(row["type"])
-    relays.give(7_000_000, PortData(b"out", payload))
+    relays.give(7_000_000, LitePortData(b"out", payload))
     value = sink.read()
     assert value is not None
     assert value.tm == Time(7, 0)
     source.write(value)
-    assert list(relays.fresh()) == [PortData(b"in", payload)]
+    assert list(relays.fresh()) == [LitePortData(b"in", payload)]
     assert relays.dropped == 0
 
 
@@ -50,11 +50,11 @@ def test_one_value_a_period_goes_in() -> None:
 
 def test_an_empty_sequence_of_characters_passes() -> None:
     relays, source, sink = both_ways("C")
-    relays.give(0, PortData(b"out", b""))
+    relays.give(0, LitePortData(b"out", b""))
     value = sink.read()
     assert value is not None
     source.write(value)
-    assert list(relays.fresh()) == [PortData(b"in", b"")]
+    assert list(relays.fresh()) == [LitePortData(b"in", b"")]
 
 
 def test_a_value_that_does_not_fit_into_a_frame_is_dropped(
@@ -72,12 +72,12 @@ def test_a_value_that_does_not_fit_into_a_frame_is_dropped(
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        (PortData(b"out", b"\1\2\3"), "dropped at out: TimedLong of 3 bytes"),
-        (PortData(b"no", b"\1\2\3\4"), "dropped at an out-port that was not described: b'no'"),
+        (LitePortData(b"out", b"\1\2\3"), "dropped at out: TimedLong of 3 bytes"),
+        (LitePortData(b"no", b"\1\2\3\4"), "dropped at an out-port that was not described: b'no'"),
     ],
 )
 def test_data_that_fit_no_port_are_dropped(
-    data: PortData, text: str, caplog: pytest.LogCaptureFixture
+    data: LitePortData, text: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     relays, _, sink = both_ways("l")
     relays.give(0, data)
@@ -88,4 +88,4 @@ def test_data_that_fit_no_port_are_dropped(
 
 def test_a_type_that_nobody_knows_is_refused() -> None:
     with pytest.raises(DeviceRefused, match="port 'in' has type 'q'; known: b c o s l f d B C"):
-        Relays([PortProfile("q", b"in")])
+        PortBridges([LitePortProfile("q", b"in")])

@@ -6,13 +6,13 @@ import pytest
 
 from tests.host.rtc_lite.bench import Bench
 from tests.host.rtc_lite.scripted_node import ScriptedNode
-from tickrig.device.rtc_lite.component import Component, Echo
-from tickrig.device.rtc_lite.config import NodeConfig
-from tickrig.device.rtc_lite.ports import InPort, OutPort
+from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho
+from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.host.rtc import ExecutionContext, Manager, ReturnCode, RtcRefused
-from tickrig.host.rtc_lite import RtcLiteProxy, Settings, attach
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import Checksum, Frame
+from tickrig.host.rtc_lite import ProxySettings, RtcLiteProxy, attach
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
 from tickrig.wire.rtc_lite.values import LONG
 
 EC = ExecutionContext()
@@ -58,7 +58,7 @@ def test_a_profile_says_what_the_device_is() -> None:
 def test_half_a_frame_that_was_on_the_line_before_does_not_prevent_a_start_up(
     noise: bytes,
 ) -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.links[0].send(noise)
     bench.rig.run_for(10_000)
     bench.attach(0, "Echo")
@@ -67,7 +67,7 @@ def test_half_a_frame_that_was_on_the_line_before_does_not_prevent_a_start_up(
 
 def test_questions_are_asked_4_times() -> None:
     link = ScriptedNode()
-    link.answers[Command.STATE] = []
+    link.answers[LiteCommand.STATE] = []
     assert RtcLiteProxy("Echo0", link).initialize() is ReturnCode.RTC_ERROR
     assert link.taken() == ["CX"] * 4
     assert link.now_us == 400_000
@@ -76,34 +76,34 @@ def test_questions_are_asked_4_times() -> None:
 @pytest.mark.parametrize(
     ("command", "data", "text"),
     [
-        (Command.STATE, None, "no reply to CX"),
-        (Command.PROFILE, None, "no reply to CZ"),
-        (Command.PROFILE, b"!", "CZ was refused with 0x21"),
+        (LiteCommand.STATE, None, "no reply to CX"),
+        (LiteCommand.PROFILE, None, "no reply to CZ"),
+        (LiteCommand.PROFILE, b"!", "CZ was refused with 0x21"),
         (
-            Command.PROFILE,
+            LiteCommand.PROFILE,
             b"@\1\0\4Echo",
             "1 in-ports and 0 out-ports announced, 0 and 0 described",
         ),
-        (Command.CONTEXT, None, "no reply to BB"),
-        (Command.CONTEXT, b"@\x23", "execution context 0x23, 0x21 and 0x22 are known"),
-        (Command.INITIALIZE, b"xC", "CI was refused with 0x78"),
-        (Command.INITIALIZE, b"@E", "the state of the device is ERROR, not INACTIVE"),
-        (Command.STATE, b"@?", "the state of the device is unknown, not INACTIVE"),
-        (Command.STATE, b"@N", "the state of the device is NONE, not INACTIVE"),
+        (LiteCommand.CONTEXT, None, "no reply to BB"),
+        (LiteCommand.CONTEXT, b"@\x23", "execution context 0x23, 0x21 and 0x22 are known"),
+        (LiteCommand.INITIALIZE, b"xC", "CI was refused with 0x78"),
+        (LiteCommand.INITIALIZE, b"@E", "the state of the device is ERROR, not INACTIVE"),
+        (LiteCommand.STATE, b"@?", "the state of the device is unknown, not INACTIVE"),
+        (LiteCommand.STATE, b"@N", "the state of the device is NONE, not INACTIVE"),
     ],
 )
 def test_what_is_in_the_way_is_said(
-    command: Command, data: bytes | None, text: str, caplog: pytest.LogCaptureFixture
+    command: LiteCommand, data: bytes | None, text: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     link = ScriptedNode()
-    link.answers[command] = [] if data is None else [Frame(command, data)]
+    link.answers[command] = [] if data is None else [LiteFrame(command, data)]
     assert RtcLiteProxy("Echo0", link).initialize() is ReturnCode.RTC_ERROR
     assert f"Echo0: no start-up: {text}" in caplog.text
 
 
 def test_after_a_failed_start_up_another_one_may_be_tried() -> None:
     link = ScriptedNode()
-    link.answers[Command.INITIALIZE] = []
+    link.answers[LiteCommand.INITIALIZE] = []
     proxy = RtcLiteProxy("Echo0", link)
     assert proxy.initialize() is ReturnCode.RTC_ERROR
     link.answers.clear()
@@ -112,10 +112,10 @@ def test_after_a_failed_start_up_another_one_may_be_tried() -> None:
 
 
 def test_two_ports_of_one_name_are_refused(caplog: pytest.LogCaptureFixture) -> None:
-    class Twins(Component):
+    class Twins(LiteComponent):
         type_name = "Twins"
-        inlet = InPort("x", LONG)
-        outlet = OutPort("x", LONG)
+        inlet = LiteInPort("x", LONG)
+        outlet = LiteOutPort("x", LONG)
 
     bench = Bench(Twins)
     with pytest.raises(RtcRefused, match="on_initialize of Twins0 returned RTC_ERROR"):
@@ -126,8 +126,8 @@ def test_two_ports_of_one_name_are_refused(caplog: pytest.LogCaptureFixture) -> 
 
 def test_ports_of_a_failed_start_up_are_made_anew() -> None:
     link = ScriptedNode()
-    port = Frame(Command.IN_PROFILE, b"\3lin")
-    link.answers[Command.PROFILE] = [port, port, Frame(Command.PROFILE, b"@\2\0\1E")]
+    port = LiteFrame(LiteCommand.IN_PROFILE, b"\3lin")
+    link.answers[LiteCommand.PROFILE] = [port, port, LiteFrame(LiteCommand.PROFILE, b"@\2\0\1E")]
     proxy = RtcLiteProxy("Echo0", link)
     assert proxy.initialize() is ReturnCode.RTC_ERROR
     link.answers.clear()
@@ -136,21 +136,21 @@ def test_ports_of_a_failed_start_up_are_made_anew() -> None:
 
 
 def test_a_board_that_boots_is_waited_for() -> None:
-    bench = Bench(Echo)
-    bench.attach(0, "Echo", Settings(boot_us=3_000_000))
+    bench = Bench(LiteEcho)
+    bench.attach(0, "Echo", ProxySettings(boot_us=3_000_000))
     assert bench.links[0].sent[0][0] == 3_000_000
 
 
 def test_parity_in_place_of_a_sum() -> None:
-    bench = Bench(Echo, config=NodeConfig(checksum=Checksum.XOR8))
-    proxy = bench.attach(0, "Echo", Settings(checksum=Checksum.XOR8))
+    bench = Bench(LiteEcho, config=LiteConfig(checksum=LiteChecksum.XOR8))
+    proxy = bench.attach(0, "Echo", ProxySettings(checksum=LiteChecksum.XOR8))
     assert proxy.device is not None
     assert proxy.device.type_name == "Echo0"
 
 
 def test_a_profile_at_300_bit_s_takes_its_time() -> None:
-    bench = Bench(Echo, baud=300)
-    proxy = bench.attach(0, "Echo", Settings(reply_us=500_000))
+    bench = Bench(LiteEcho, baud=300)
+    proxy = bench.attach(0, "Echo", ProxySettings(reply_us=500_000))
     assert list(proxy.ports) == ["in", "out"]
     assert bench.rig.now_us > 2_000_000
 
@@ -160,17 +160,17 @@ def test_a_profile_without_end_ends_after_10_s() -> None:
         def receive(self, timeout_us: int, /) -> bytes:
             if self.requests[-1:] == ["CZ"]:
                 self.now_us += 50_000
-                self.come(Frame(Command.IN_PROFILE, b"\3lin"))
+                self.come(LiteFrame(LiteCommand.IN_PROFILE, b"\3lin"))
             return super().receive(timeout_us)
 
     link = Endless()
-    link.answers[Command.PROFILE] = []
+    link.answers[LiteCommand.PROFILE] = []
     assert RtcLiteProxy("Echo0", link).initialize() is ReturnCode.RTC_ERROR
     assert 40_000_000 <= link.now_us < 41_000_000  # 4 times
 
 
 def test_a_line_that_is_gone_is_no_reply() -> None:
-    bench = Bench(Echo)
+    bench = Bench(LiteEcho)
     bench.links[0].close()
     with pytest.raises(RtcRefused, match="on_initialize of Echo0 returned RTC_ERROR"):
         attach(Manager(), bench.links[0], "Echo")
@@ -181,4 +181,4 @@ def test_a_line_that_is_gone_is_no_reply() -> None:
 )
 def test_a_setting_that_is_too_small_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} is -1, at least [01] is needed"):
-        Settings(**{name: -1})  # type: ignore[arg-type] # a name that mypy does not know
+        ProxySettings(**{name: -1})  # type: ignore[arg-type] # a name that mypy does not know

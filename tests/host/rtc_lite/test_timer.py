@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc_lite.bench import PERIOD_US, Bench
-from tickrig.device.rtc_lite.config import NodeConfig
+from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.host.rtc import InPort, OutPort, ReturnCode, connect
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
-from tickrig.wire.rtc_lite.codes import ContextType
+from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
-CONFIG = NodeConfig(context=ContextType.TIMER, rate_hz=100)
+CONFIG = LiteConfig(context=LiteContextType.TIMER, rate_hz=100)
 
 
 def active() -> tuple[Bench, RtcLiteProxy, Recorder]:

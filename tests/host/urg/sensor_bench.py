@@ -9,7 +9,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.urg.client import Scan, UrgClient
+from tickrig.host.urg.client import UrgClient, UrgScan
 
 
 class SensorBench:
@@ -22,7 +22,7 @@ class SensorBench:
         self.link = SimLink(self.rig, self.line.b)
         self.client = UrgClient(self.link, cluster, interval)
 
-    def run(self, duration_ms: int = 1_000) -> list[Scan]:
+    def run(self, duration_ms: int = 1_000) -> list[UrgScan]:
         scans = []
         for _ in range(duration_ms // 10):
             self.rig.run_for(10_000)

@@ -19,10 +19,10 @@ from tickrig.wire.rtc_canopen.port_types import (
     PORT_TYPES,
     SHORT,
     STRING,
-    PortType,
+    CanopenPortType,
     integer,
 )
-from tickrig.wire.rtc_canopen.profile import Direction, PortProfile, RtcProfile
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
 
 # NEDO report, 3.4.43.3, Table 4: RTC, bits (0 where it varies), code.
 TABLE_4 = """
@@ -32,11 +32,13 @@ String 0 09, WideCharacter 0 0B, WideString 0 0B
 """
 
 
-def port(name: str, kind: PortType[Any], direction: Direction = Direction.IN) -> PortProfile:
-    return PortProfile(name, direction, kind)
+def port(
+    name: str, kind: CanopenPortType[Any], direction: PortDirection = PortDirection.IN
+) -> CanopenPortProfile:
+    return CanopenPortProfile(name, direction, kind)
 
 
-def profile(*ports: PortProfile, **given: Any) -> RtcProfile:
+def profile(*ports: CanopenPortProfile, **given: Any) -> RtcProfile:
     return RtcProfile(**{"type_name": "Mine", "ports": ports, **given})
 
 
@@ -73,7 +75,7 @@ def test_a_sequence_comes_back(values: list[int]) -> None:
         (DOUBLE, -2.0, "00000000000000C0"),
     ],
 )
-def test_a_value_goes_there_and_back(kind: PortType[Any], value: object, data: str) -> None:
+def test_a_value_goes_there_and_back(kind: CanopenPortType[Any], value: object, data: str) -> None:
     assert kind.encode(value) == (bytes.fromhex(data),)
     back = kind.decode([bytes.fromhex(data)])
     assert (back, type(back)) == (value, type(value))
@@ -95,7 +97,7 @@ def test_a_sequence_takes_as_many_elements_as_it_has() -> None:
 def test_ports_have_objects_and_pdos_in_order_of_declaration() -> None:
     mine = profile(
         port("a", SHORT.sequence(2)),
-        port("b", BOOLEAN, Direction.OUT),
+        port("b", BOOLEAN, PortDirection.OUT),
         port("c", LONG),
     )
     rows = [(p.profile.name, p.index, p.number, p.cob_id, p.mapping) for p in mine.placed()]
@@ -104,7 +106,7 @@ def test_ports_have_objects_and_pdos_in_order_of_declaration() -> None:
         ("b", 0x2101, 1, 0x180, (0x2101_0008,)),
         ("c", 0x2102, 2, 0x300, (0x2102_0020,)),
     ]
-    assert [p.profile.name for p in mine.placed(Direction.IN)] == ["a", "c"]
+    assert [p.profile.name for p in mine.placed(PortDirection.IN)] == ["a", "c"]
 
 
 def test_a_version_is_the_revision_number() -> None:
@@ -131,9 +133,12 @@ NAME = "is not a letter and up to 31 letters, digits and underscores"
         ({"rate_hz": 0}, "rate_hz 0 is not in 1..1000"),
         ({"product_code": 2**32}, "product_code 4294967296 is not in 0..0xFFFFFFFF"),
         ({"ports": (port("a b", SHORT),)}, f"port 'a b' {NAME}"),
-        ({"ports": (port("a", SHORT), port("a", LONG, Direction.OUT))}, "2 ports are called 'a'"),
         (
-            {"ports": tuple(port(f"p{n}", SHORT, Direction.OUT) for n in range(5))},
+            {"ports": (port("a", SHORT), port("a", LONG, PortDirection.OUT))},
+            "2 ports are called 'a'",
+        ),
+        (
+            {"ports": tuple(port(f"p{n}", SHORT, PortDirection.OUT) for n in range(5))},
             "5 out-ports; 4 have a COB-ID",
         ),
         ({"ports": (port("a", STRING),)}, "port a: String does not fit a PDO; use an SDO"),

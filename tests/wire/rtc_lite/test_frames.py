@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite import layout
-from tickrig.wire.rtc_lite.codes import Command, LinkFault, Status
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Checksum, Frame, fault_frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteStatus
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, Layout
 
 DIRECTIONS = {"request": layout.REQUESTS, "reply": layout.REPLIES}
@@ -20,16 +20,16 @@ def hexed(data: bytes) -> str:
 
 
 @st.composite
-def frames(draw: st.DrawFn, layouts: dict[Command, Layout]) -> Frame:
+def frames(draw: st.DrawFn, layouts: dict[LiteCommand, Layout]) -> LiteFrame:
     """Any frame of a direction: its data is drawn until the layout says it is whole."""
     command = draw(st.sampled_from(list(layouts)))
     data, size = b"", layouts[command](b"")
     while len(data) < size <= MAX_DATA_BYTES:
-        low_counts = st.integers(0, 20) | st.sampled_from(list(Status))
+        low_counts = st.integers(0, 20) | st.sampled_from(list(LiteStatus))
         data += bytes([draw(low_counts if len(data) < 4 else st.integers(0, 255))])
         size = layouts[command](data)
     assume(size <= MAX_DATA_BYTES)
-    return Frame(command, data)
+    return LiteFrame(command, data)
 
 
 requests = frames(dict(layout.REQUESTS))
@@ -42,93 +42,97 @@ replies = frames(dict(layout.REPLIES))
     ids=[hexed(data) for data in REQUESTS + REPLIES],
 )
 def test_a_golden_frame_is_read_and_written_back(data: bytes, direction: str) -> None:
-    (frame,) = Decoder(DIRECTIONS[direction]).push(data)
-    assert isinstance(frame, Frame)
+    (frame,) = LiteDecoder(DIRECTIONS[direction]).push(data)
+    assert isinstance(frame, LiteFrame)
     assert frame.encode() == data
 
 
-@given(st.lists(requests, max_size=5), st.sampled_from(Checksum), st.integers(1, 9))
+@given(st.lists(requests, max_size=5), st.sampled_from(LiteChecksum), st.integers(1, 9))
 def test_requests_come_back_however_they_are_cut(
-    sent: list[Frame], checksum: Checksum, size: int
+    sent: list[LiteFrame], checksum: LiteChecksum, size: int
 ) -> None:
-    decoder = Decoder(layout.REQUESTS, checksum)
+    decoder = LiteDecoder(layout.REQUESTS, checksum)
     data = b"".join(frame.encode(checksum) for frame in sent)
     chunks = [data[at : at + size] for at in range(0, len(data), size)]
     assert [item for chunk in chunks for item in decoder.push(chunk)] == sent
     assert not decoder.begun
 
 
-@given(st.lists(replies, max_size=5), st.sampled_from(Checksum))
-def test_replies_come_back(sent: list[Frame], checksum: Checksum) -> None:
+@given(st.lists(replies, max_size=5), st.sampled_from(LiteChecksum))
+def test_replies_come_back(sent: list[LiteFrame], checksum: LiteChecksum) -> None:
     data = b"".join(frame.encode(checksum) for frame in sent)
-    assert Decoder(layout.REPLIES, checksum).push(data) == sent
+    assert LiteDecoder(layout.REPLIES, checksum).push(data) == sent
 
 
 @given(st.binary(max_size=200), st.sampled_from(["request", "reply"]))
 def test_after_any_noise_a_cleared_decoder_reads_the_next_frame(
     noise: bytes, direction: str
 ) -> None:
-    decoder = Decoder(DIRECTIONS[direction])
+    decoder = LiteDecoder(DIRECTIONS[direction])
     decoder.push(noise)
     decoder.clear()
     sample = REQUESTS[0] if direction == "request" else REPLIES[0]
     (frame,) = decoder.push(sample)
-    assert isinstance(frame, Frame)
+    assert isinstance(frame, LiteFrame)
 
 
 def test_bytes_before_a_header_are_passed_over() -> None:
-    assert Decoder(layout.REQUESTS).push(b"\x43\x58\x9b" + REQUESTS[0]) == [Frame(Command.STATE)]
+    assert LiteDecoder(layout.REQUESTS).push(b"\x43\x58\x9b" + REQUESTS[0]) == [
+        LiteFrame(LiteCommand.STATE)
+    ]
 
 
 def test_a_header_within_data_is_data() -> None:
-    ping = Frame(Command.PING, b"\n")
-    assert Decoder(layout.REQUESTS).push(ping.encode() * 2) == [ping, ping]
+    ping = LiteFrame(LiteCommand.PING, b"\n")
+    assert LiteDecoder(layout.REQUESTS).push(ping.encode() * 2) == [ping, ping]
 
 
 def test_a_wrong_checksum_is_told_and_the_next_frame_is_read() -> None:
-    found = Decoder(layout.REQUESTS).push(raw("0A 41 41 83", "0A 43 58 9B"))
-    assert found == [LinkFault.CHECKSUM, Frame(Command.STATE)]
+    found = LiteDecoder(layout.REQUESTS).push(raw("0A 41 41 83", "0A 43 58 9B"))
+    assert found == [LiteLinkFault.CHECKSUM, LiteFrame(LiteCommand.STATE)]
 
 
 @pytest.mark.parametrize("command", ["5A 7A", "51 56", "46 48"], ids=["none", "reply", "fault"])
 def test_after_a_command_of_no_request_all_is_thrown_away(command: str) -> None:
-    decoder = Decoder(layout.REQUESTS)
+    decoder = LiteDecoder(layout.REQUESTS)
     assert decoder.push(raw(f"0A {command}")) == []
-    assert decoder.push(b"\x00" + REQUESTS[0]) == [LinkFault.UNKNOWN]
+    assert decoder.push(b"\x00" + REQUESTS[0]) == [LiteLinkFault.UNKNOWN]
     assert decoder.lost
     decoder.clear()
-    assert decoder.push(REQUESTS[0]) == [Frame(Command.STATE)]
+    assert decoder.push(REQUESTS[0]) == [LiteFrame(LiteCommand.STATE)]
 
 
 def test_more_data_than_fit_are_noticed_at_their_count() -> None:
-    decoder = Decoder(layout.REQUESTS)
+    decoder = LiteDecoder(layout.REQUESTS)
     assert decoder.push(raw("0A 50 53 02 38")) == []
     decoder.clear()
-    assert decoder.push(raw("0A 50 53 02 39 69 6E")) == [LinkFault.UNKNOWN]
+    assert decoder.push(raw("0A 50 53 02 39 69 6E")) == [LiteLinkFault.UNKNOWN]
     assert decoder.lost
     assert not decoder.begun
 
 
 def test_a_frame_of_more_than_60_data_bytes_is_refused() -> None:
-    assert len(Frame(Command.WRITE, bytes(60)).encode()) == 64
+    assert len(LiteFrame(LiteCommand.WRITE, bytes(60)).encode()) == 64
     with pytest.raises(FieldError, match="61 data bytes, at most 60 fit"):
-        Frame(Command.WRITE, bytes(61))
+        LiteFrame(LiteCommand.WRITE, bytes(61))
 
 
 def test_parity_is_another_checksum() -> None:
-    assert Frame(Command.STATE).encode(Checksum.XOR8) == raw("0A 43 58 1B")
-    assert Decoder(layout.REQUESTS, Checksum.XOR8).push(REQUESTS[0]) == [LinkFault.CHECKSUM]
+    assert LiteFrame(LiteCommand.STATE).encode(LiteChecksum.XOR8) == raw("0A 43 58 1B")
+    assert LiteDecoder(layout.REQUESTS, LiteChecksum.XOR8).push(REQUESTS[0]) == [
+        LiteLinkFault.CHECKSUM
+    ]
 
 
 @pytest.mark.parametrize(
     ("fault", "frame"),
     [
-        (LinkFault.TIMEOUT, "0A 46 4B 01 92"),
-        (LinkFault.CHECKSUM, "0A 46 48 03 91"),
-        (LinkFault.UNKNOWN, "0A 46 55 41 DC"),
+        (LiteLinkFault.TIMEOUT, "0A 46 4B 01 92"),
+        (LiteLinkFault.CHECKSUM, "0A 46 48 03 91"),
+        (LiteLinkFault.UNKNOWN, "0A 46 55 41 DC"),
     ],
 )
-def test_each_fault_has_its_frame(fault: LinkFault, frame: str) -> None:
+def test_each_fault_has_its_frame(fault: LiteLinkFault, frame: str) -> None:
     assert fault_frame(fault).encode() == raw(frame)
 
 
@@ -143,8 +147,8 @@ def test_each_fault_has_its_frame(fault: LinkFault, frame: str) -> None:
     ],
 )
 def test_a_polled_out_port_brings_data_only_when_it_has_some(reply: bytes, size: int) -> None:
-    assert layout.REPLIES[Command.POLL](reply) == size
+    assert layout.REPLIES[LiteCommand.POLL](reply) == size
 
 
 def test_a_refused_profile_ends_with_its_status() -> None:
-    assert layout.REPLIES[Command.PROFILE](b"!") == 1
+    assert layout.REPLIES[LiteCommand.PROFILE](b"!") == 1

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.wire.errors import FieldError, FramingError
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.messages import (
-    ComponentProfile,
-    PortData,
-    PortProfile,
-    Reply,
+    LiteComponentProfile,
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
     parse_component_profile,
     parse_port_data,
     parse_port_profile,
@@ -28,7 +28,7 @@ from tickrig.wire.rtc_lite.values import (
     LONG_SEQ,
     PORT_TYPES,
     SHORT,
-    PortType,
+    LitePortType,
     encode_name,
 )
 
@@ -53,8 +53,8 @@ def test_a_golden_value_is_read_and_written_in_its_frame(row: dict[str, Any]) ->
     port_type, value = PORT_TYPES[row["type"]], value_of(row)
     assert port_type.encode(value) == raw(row["bytes"])
     assert port_type.decode(raw(row["bytes"])) == value
-    data = PortData(b"in", port_type.encode(value)).encode()
-    assert Frame(Command.WRITE, data).encode() == raw(row["frame"])
+    data = LitePortData(b"in", port_type.encode(value)).encode()
+    assert LiteFrame(LiteCommand.WRITE, data).encode() == raw(row["frame"])
 
 
 def test_all_types_of_the_table_are_there() -> None:
@@ -76,7 +76,7 @@ def test_values_come_back(data: st.DataObject, code: str) -> None:
 
 
 @pytest.mark.parametrize("port_type", PORT_TYPES.values(), ids=list(PORT_TYPES))
-def test_the_initial_value_is_a_value(port_type: PortType[Any]) -> None:
+def test_the_initial_value_is_a_value(port_type: LitePortType[Any]) -> None:
     assert port_type.decode(port_type.encode(port_type.initial)) == port_type.initial
 
 
@@ -103,7 +103,7 @@ def test_any_bytes_are_a_value_or_refused(data: bytes, code: str) -> None:
     ],
 )
 def test_a_value_of_another_type_is_refused(
-    port_type: PortType[Any], value: object, error: str
+    port_type: LitePortType[Any], value: object, error: str
 ) -> None:
     with pytest.raises(FieldError, match=error):
         port_type.encode(value)
@@ -129,32 +129,32 @@ def test_another_name_is_refused(name: str, error: str) -> None:
 
 
 def test_port_data_that_fill_a_frame_fit_and_no_more() -> None:
-    assert len(PortData(b"in", bytes(56)).encode()) == 60
+    assert len(LitePortData(b"in", bytes(56)).encode()) == 60
     with pytest.raises(FieldError, match="make 61 data bytes, 60 fit"):
-        PortData(b"in", bytes(57))
+        LitePortData(b"in", bytes(57))
 
 
 @given(st.binary(max_size=15), st.binary(max_size=43))
 def test_messages_come_back(name: bytes, data: bytes) -> None:
-    sent = PortData(name, data)
+    sent = LitePortData(name, data)
     assert parse_port_data(sent.encode()) == sent
-    port = PortProfile("l", name)
+    port = LitePortProfile("l", name)
     assert parse_port_profile(port.encode()) == port
-    component = ComponentProfile(2, 3, name)
+    component = LiteComponentProfile(2, 3, name)
     assert parse_component_profile(component.encode()) == component
 
 
 def test_a_reply_has_a_status_and_what_it_lets_follow() -> None:
-    assert parse_reply(Frame(Command.EXECUTE, b"@A")) == Reply(0x40, b"A")
-    assert parse_reply(Frame(Command.EXECUTE, b"@A")).ok
-    assert not parse_reply(Frame(Command.WRITE, b"F")).ok
-    assert Reply(0x40, b"A").encode() == b"@A"
+    assert parse_reply(LiteFrame(LiteCommand.EXECUTE, b"@A")) == LiteReply(0x40, b"A")
+    assert parse_reply(LiteFrame(LiteCommand.EXECUTE, b"@A")).ok
+    assert not parse_reply(LiteFrame(LiteCommand.WRITE, b"F")).ok
+    assert LiteReply(0x40, b"A").encode() == b"@A"
 
 
 @pytest.mark.parametrize("data", [b"", b"@", b"@AA", b"!A"])
 def test_a_reply_of_another_length_is_refused(data: bytes) -> None:
     with pytest.raises(FramingError, match=r"AE.* is not a reply"):
-        parse_reply(Frame(Command.EXECUTE, data))
+        parse_reply(LiteFrame(LiteCommand.EXECUTE, data))
 
 
 @given(st.binary(max_size=20))

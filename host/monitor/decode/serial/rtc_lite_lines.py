@@ -8,9 +8,9 @@ from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.object_text import write_bytes
 from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.wire.errors import WireError
-from tickrig.wire.rtc_lite.codes import Command, LinkFault, State, Status
-from tickrig.wire.rtc_lite.decoder import Decoder
-from tickrig.wire.rtc_lite.frame import Checksum, Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteState, LiteStatus
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     parse_component_profile,
@@ -24,7 +24,7 @@ FRAME_GAP_US: Final = 100_000
 """After so long a silence a frame that has begun is forgotten (DECISION L7)."""
 LOST_GAP_US: Final = 20_000
 """After so long a silence a header is looked for again."""
-UNASKED: Final = (Command.DATA, Command.IN_PROFILE, Command.OUT_PROFILE)
+UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
 class RtcLiteLine:
@@ -35,9 +35,12 @@ class RtcLiteLine:
         checksum: how frames are summed up.
     """
 
-    def __init__(self, channel: str, checksum: Checksum = Checksum.SUM8) -> None:
+    def __init__(self, channel: str, checksum: LiteChecksum = LiteChecksum.SUM8) -> None:
         self._channel = channel
-        self._decoders = {True: Decoder(REQUESTS, checksum), False: Decoder(REPLIES, checksum)}
+        self._decoders = {
+            True: LiteDecoder(REQUESTS, checksum),
+            False: LiteDecoder(REPLIES, checksum),
+        }
         self._heard_us = {True: 0, False: 0}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
@@ -48,36 +51,36 @@ class RtcLiteLine:
         self._heard_us[to_device] = at_us
         return [self._line(at_us, to_device, found) for found in decoder.push(data)]
 
-    def _line(self, at_us: int, to_device: bool, found: Frame | LinkFault) -> LineRecord:
-        if isinstance(found, LinkFault):
+    def _line(self, at_us: int, to_device: bool, found: LiteFrame | LiteLinkFault) -> LineRecord:
+        if isinstance(found, LiteLinkFault):
             decoded = Decoded(KIND, None, f"no frame: {found.name.lower()}")
             return LineRecord(at_us, self._channel, to_device, b"", decoded)
         decoded = decode_request(found) if to_device else decode_answer(found)
         return LineRecord(at_us, self._channel, to_device, found.body, decoded)
 
 
-def decode_request(frame: Frame) -> Decoded:
+def decode_request(frame: LiteFrame) -> Decoded:
     """Decode a frame to the device.
 
-    >>> decode_request(Frame(Command.ACTIVATE)).text
+    >>> decode_request(LiteFrame(LiteCommand.ACTIVATE)).text
     'activate'
     """
     name = _name(frame.command)
-    if frame.command is Command.WRITE:
+    if frame.command is LiteCommand.WRITE:
         return _port(name, frame.data)
     text = f"{name} {write_bytes(frame.data)}" if frame.data else name
     return Decoded(KIND, None, text, (Signal("command", name),))
 
 
-def decode_answer(frame: Frame) -> Decoded:
+def decode_answer(frame: LiteFrame) -> Decoded:
     """Decode a frame from the device.
 
-    >>> decode_answer(Frame(Command.STATE, b"@C")).text
+    >>> decode_answer(LiteFrame(LiteCommand.STATE, b"@C")).text
     'state: ok, created'
     """
     name = _name(frame.command)
     try:
-        if frame.command is Command.DATA:
+        if frame.command is LiteCommand.DATA:
             return _port(name, frame.data)
         if frame.command in UNASKED:
             profile = parse_port_profile(frame.data)
@@ -90,17 +93,17 @@ def decode_answer(frame: Frame) -> Decoded:
         return Decoded(KIND, None, f"{name}: {error}")
 
 
-def _reply(name: str, frame: Frame) -> Decoded:
+def _reply(name: str, frame: LiteFrame) -> Decoded:
     reply = parse_reply(frame)
-    known = reply.status in Status.__members__.values()
-    status = Status(reply.status).name.lower().replace("_", " ") if known else f"{reply.status}"
+    known = reply.status in LiteStatus.__members__.values()
+    status = LiteStatus(reply.status).name.lower().replace("_", " ") if known else f"{reply.status}"
     signals = [Signal("command", name), Signal("status", status)]
     words = [f"{name}: {status}"]
     if frame.command in WITH_STATE and reply.fields:
         state = _state(reply.fields[0])
         signals.append(Signal("state", state))
         words.append(state)
-    elif frame.command is Command.PROFILE and reply.ok:
+    elif frame.command is LiteCommand.PROFILE and reply.ok:
         words.append(parse_component_profile(reply.fields).type_name.decode("latin-1"))
     elif reply.fields:
         words.append(write_bytes(reply.fields))
@@ -115,9 +118,9 @@ def _port(name: str, data: bytes) -> Decoded:
 
 
 def _state(code: int) -> str:
-    known = code in State.__members__.values()
-    return State(code).name.lower() if known else f"{code:02X}h"
+    known = code in LiteState.__members__.values()
+    return LiteState(code).name.lower() if known else f"{code:02X}h"
 
 
-def _name(command: Command) -> str:
+def _name(command: LiteCommand) -> str:
     return command.name.lower().replace("_", " ")

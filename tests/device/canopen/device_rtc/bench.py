@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
+from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.wire.rtc_canopen.port_types import SHORT
 
@@ -22,12 +22,12 @@ CALLBACKS = (
 )
 
 
-class Recorder(Component):
+class Recorder(CanopenComponent):
     """Notes its callbacks; those in `failing` fail, in each new component too."""
 
     type_name = "Recorder"
-    inlet = InPort("inlet", SHORT)
-    outlet = OutPort("outlet", SHORT)
+    inlet = CanopenInPort("inlet", SHORT)
+    outlet = CanopenOutPort("outlet", SHORT)
     called: list[str] = []  # noqa: RUF012 - a test gives each kind its own
     failing: set[str] = set()  # noqa: RUF012
 
@@ -71,7 +71,7 @@ class RtcBench(Bus):
         failing: callbacks that fail.
     """
 
-    def __init__(self, *, strict: bool = False, kind: type[Component] = Recorder) -> None:
+    def __init__(self, *, strict: bool = False, kind: type[CanopenComponent] = Recorder) -> None:
         self.called: list[str] = []
         self.failing: set[str] = set()
         mine = {"called": self.called, "failing": self.failing, "strict_cia301": strict}

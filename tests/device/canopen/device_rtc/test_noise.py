@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.canopen.device_rtc.component import ERROR, Component, Result
+from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_canopen.port_types import OCTET, SHORT
 
@@ -17,13 +17,13 @@ Traffic = list[tuple[int, CanFrame | None]]
 """Ticks to wait, then a frame; None presses or releases the button."""
 
 
-class Moody(Component):
+class Moody(CanopenComponent):
     """Each bit of its in-port lets a callback fail."""
 
     type_name = "Moody"
     rate_hz = 300
-    mood = InPort("mood", OCTET)
-    count = OutPort("count", SHORT)
+    mood = CanopenInPort("mood", OCTET)
+    count = CanopenOutPort("count", SHORT)
 
     def on_initialize(self) -> None:
         self.counted = 0

@@ -9,28 +9,28 @@ import pytest
 from tests.device.canopen.device_rtc.bench import Recorder, RtcBench
 from tests.device.canopen.device_rtc.test_life_cycle import GOLDEN
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.device_rtc.component import Component, Echo
+from tickrig.device.canopen.device_rtc.component import CanopenComponent, CanopenEcho
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import InPort, OutPort
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
 from tickrig.device.physical import Input
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, CHARACTER, DOUBLE, LONG, SHORT
 
 
-class Everything(Component):
+class Everything(CanopenComponent):
     """Four ports each way, of several types and lengths."""
 
     type_name = "Everything"
     version = "2.3"
     rate_hz = 1_000
-    in1 = InPort("in1", LONG)
-    in2 = InPort("in2", SHORT.sequence(3))
-    in3 = InPort("in3", BOOLEAN)
-    in4 = InPort("in4", CHARACTER.sequence(2))
-    out1 = OutPort("out1", LONG)
-    out2 = OutPort("out2", SHORT.sequence(3))
-    out3 = OutPort("out3", BOOLEAN)
-    out4 = OutPort("out4", DOUBLE)
+    in1 = CanopenInPort("in1", LONG)
+    in2 = CanopenInPort("in2", SHORT.sequence(3))
+    in3 = CanopenInPort("in3", BOOLEAN)
+    in4 = CanopenInPort("in4", CHARACTER.sequence(2))
+    out1 = CanopenOutPort("out1", LONG)
+    out2 = CanopenOutPort("out2", SHORT.sequence(3))
+    out3 = CanopenOutPort("out3", BOOLEAN)
+    out4 = CanopenOutPort("out4", DOUBLE)
 
     def on_execute(self) -> None:
         if self.in1.is_new:
@@ -41,7 +41,7 @@ class Everything(Component):
             self.out3.write(self.in3.read())
 
 
-def active(kind: type[Component], first: str = "000#0110") -> Bus:
+def active(kind: type[CanopenComponent], first: str = "000#0110") -> Bus:
     bus = Bus(make_device_rtc(kind, 16))
     bus.step()
     bus.step(first)
@@ -119,7 +119,7 @@ def test_an_in_port_is_new_by_sdo_too() -> None:
 
 
 def test_an_in_port_that_was_read_is_not_new() -> None:
-    bus = active(Echo)
+    bus = active(CanopenEcho)
     assert bus.step("210#01000000") + bus.run(30) == ["190#01000000"]
 
 
@@ -163,7 +163,7 @@ def test_a_component_runs_at_its_rate_without_drift(rate_hz: int) -> None:
 
 
 def test_a_component_reads_the_physical_inputs_that_it_declares() -> None:
-    class Scale(Echo):
+    class Scale(CanopenEcho):
         physical = (Input("weight_g", "on the scale", high=5_000, unit="g"),)
 
         def on_execute(self) -> None:
@@ -175,7 +175,7 @@ def test_a_component_reads_the_physical_inputs_that_it_declares() -> None:
 
 
 def test_two_inputs_of_one_name_are_refused() -> None:
-    class Twice(Echo):
+    class Twice(CanopenEcho):
         physical = (Input("shut_down", "mine"),)
 
     with pytest.raises(ValueError, match="Twice: 2 inputs are called 'shut_down'"):
@@ -184,4 +184,4 @@ def test_two_inputs_of_one_name_are_refused() -> None:
 
 def test_a_component_without_a_name_is_refused() -> None:
     with pytest.raises(ValueError, match="Component: type_name '' is not a letter and up to 31"):
-        make_device_rtc(Component, 16)
+        make_device_rtc(CanopenComponent, 16)

@@ -5,13 +5,13 @@ import pytest
 from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.wire.rtc_lite.codes import Command
-from tickrig.wire.rtc_lite.frame import Checksum, Frame
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
 from tickrig.wire.rtc_lite.messages import (
-    ComponentProfile,
-    PortData,
-    PortProfile,
-    Reply,
+    LiteComponentProfile,
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
 )
 
 
@@ -82,7 +82,7 @@ def test_how_a_line_is_cut_makes_no_difference() -> None:
     assert (line.at_us, line.decoded.text) == (5_000, "event PowerOn")
 
 
-def rtc_lite(frame: Frame, *, to_device: bool) -> str:
+def rtc_lite(frame: LiteFrame, *, to_device: bool) -> str:
     (line,) = RtcLiteLine("ttyS0").take(0, frame.encode(), to_device=to_device)
     return line.decoded.text
 
@@ -90,53 +90,60 @@ def rtc_lite(frame: Frame, *, to_device: bool) -> str:
 @pytest.mark.parametrize(
     ("frame", "text"),
     [
-        (Frame(Command.ACTIVATE), "activate"),
-        (Frame(Command.PING, b"\x07"), "ping 07"),
-        (Frame(Command.WRITE, PortData(b"in", b"\x2a\0").encode()), "write in: 2A 00"),
+        (LiteFrame(LiteCommand.ACTIVATE), "activate"),
+        (LiteFrame(LiteCommand.PING, b"\x07"), "ping 07"),
+        (LiteFrame(LiteCommand.WRITE, LitePortData(b"in", b"\x2a\0").encode()), "write in: 2A 00"),
     ],
 )
-def test_a_request_of_rtc_lite_says_this(frame: Frame, text: str) -> None:
+def test_a_request_of_rtc_lite_says_this(frame: LiteFrame, text: str) -> None:
     assert rtc_lite(frame, to_device=True) == text
 
 
 @pytest.mark.parametrize(
     ("frame", "text"),
     [
-        (Frame(Command.STATE, Reply(ord("@"), b"C").encode()), "state: ok, created"),
-        (Frame(Command.STATE, Reply(ord("@"), b"z").encode()), "state: ok, 7Ah"),
-        (Frame(Command.WRITE, Reply(ord("F")).encode()), "write: no in port"),
-        (Frame(Command.WRITE, Reply(ord("~")).encode()), "write: 126"),
-        (Frame(Command.PING, Reply(ord("@"), b"\x07").encode()), "ping: ok, 07"),
-        (Frame(Command.DATA, PortData(b"out", b"\1").encode()), "data out: 01"),
-        (Frame(Command.IN_PROFILE, PortProfile("L", b"in").encode()), "in profile in: L"),
+        (LiteFrame(LiteCommand.STATE, LiteReply(ord("@"), b"C").encode()), "state: ok, created"),
+        (LiteFrame(LiteCommand.STATE, LiteReply(ord("@"), b"z").encode()), "state: ok, 7Ah"),
+        (LiteFrame(LiteCommand.WRITE, LiteReply(ord("F")).encode()), "write: no in port"),
+        (LiteFrame(LiteCommand.WRITE, LiteReply(ord("~")).encode()), "write: 126"),
+        (LiteFrame(LiteCommand.PING, LiteReply(ord("@"), b"\x07").encode()), "ping: ok, 07"),
+        (LiteFrame(LiteCommand.DATA, LitePortData(b"out", b"\1").encode()), "data out: 01"),
         (
-            Frame(
-                Command.PROFILE, Reply(ord("@"), ComponentProfile(1, 1, b"Lamp").encode()).encode()
+            LiteFrame(LiteCommand.IN_PROFILE, LitePortProfile("L", b"in").encode()),
+            "in profile in: L",
+        ),
+        (
+            LiteFrame(
+                LiteCommand.PROFILE,
+                LiteReply(ord("@"), LiteComponentProfile(1, 1, b"Lamp").encode()).encode(),
             ),
             "profile: ok, Lamp",
         ),
-        (Frame(Command.CHECKSUM_FAULT, b"\3"), "checksum fault"),
-        (Frame(Command.OUT_PROFILE, b"\0"), "out profile: 00 is not a length, a letter and a name"),
+        (LiteFrame(LiteCommand.CHECKSUM_FAULT, b"\3"), "checksum fault"),
+        (
+            LiteFrame(LiteCommand.OUT_PROFILE, b"\0"),
+            "out profile: 00 is not a length, a letter and a name",
+        ),
     ],
 )
-def test_an_answer_of_rtc_lite_says_this(frame: Frame, text: str) -> None:
+def test_an_answer_of_rtc_lite_says_this(frame: LiteFrame, text: str) -> None:
     assert rtc_lite(frame, to_device=False) == text
 
 
 def test_bytes_that_are_no_frame_are_said_to_be() -> None:
-    line = RtcLiteLine("ttyS0", Checksum.XOR8)
-    data = Frame(Command.STATE).encode(Checksum.SUM8)
+    line = RtcLiteLine("ttyS0", LiteChecksum.XOR8)
+    data = LiteFrame(LiteCommand.STATE).encode(LiteChecksum.SUM8)
     (found,) = line.take(0, data, to_device=True)
     assert found.decoded.text == "no frame: checksum"
     assert line.take(1_000, b"\nZZZ", to_device=True)[0].decoded.text == "no frame: unknown"
-    whole = Frame(Command.STATE).encode(Checksum.XOR8)
+    whole = LiteFrame(LiteCommand.STATE).encode(LiteChecksum.XOR8)
     assert line.take(2_000, whole, to_device=True) == []
     assert [found.decoded.text for found in line.take(30_000, whole, to_device=True)] == ["state"]
 
 
 def test_a_frame_that_stops_is_forgotten_after_100_ms() -> None:
     line = RtcLiteLine("ttyS0")
-    whole = Frame(Command.STATE).encode()
+    whole = LiteFrame(LiteCommand.STATE).encode()
     assert line.take(0, whole[:2], to_device=True) == []
     (found,) = line.take(100_000, whole, to_device=True)
     assert found.decoded.text == "state"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
 from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.host.rtc_canopen.builder.build import build
@@ -63,14 +63,14 @@ int main(void) {{
 """
 
 
-def component(folder: Path, project: Project) -> type[Component]:
+def component(folder: Path, project: Project) -> type[CanopenComponent]:
     """Return the class of the skeleton."""
     stem = next(name for name in build(project) if name.endswith(".py"))
     space: dict[str, object] = {"__name__": "skeleton"}
     exec(compile((folder / stem).read_text("utf-8"), stem, "exec"), space)
     kind = space[project.profile.type_name]
     assert isinstance(kind, type)
-    assert issubclass(kind, Component)
+    assert issubclass(kind, CanopenComponent)
     return kind
 
 
@@ -152,7 +152,11 @@ def test_the_fragment_is_a_system_definition_of_this_node(tmp_path: Path, text: 
 
 
 def test_names_that_a_component_has_are_known() -> None:
-    mine = {name for name in (*dir(Component), *vars(Component())) if not name.startswith("_")}
+    mine = {
+        name
+        for name in (*dir(CanopenComponent), *vars(CanopenComponent()))
+        if not name.startswith("_")
+    }
     assert mine == COMPONENT_NAMES
 
 

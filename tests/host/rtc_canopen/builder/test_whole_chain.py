@@ -13,7 +13,7 @@ from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, parse_project
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.serve import read_files, serve
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 
 
 def test_the_server_activates_what_the_builder_wrote(tmp_path: Path) -> None:
@@ -23,7 +23,7 @@ def test_the_server_activates_what_the_builder_wrote(tmp_path: Path) -> None:
     (node,) = make_nodes(describe_nodes(parse_node(f"16={tmp_path / 'gripper.py'}:Gripper")), wire)
     link = CanHost(Rig(Station(node, node.port)), wire.end())
     definition = parse_definition((tmp_path / "gripper.yaml").read_text("utf-8"))
-    server = Server(definition, read_files(definition, tmp_path))
+    server = RtcCanopenServer(definition, read_files(definition, tmp_path))
     serve(server, link, 1_000_000)
     proxy = server.nodes[16].proxy
     assert proxy is not None

@@ -15,9 +15,9 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.session import Furnish, Session
+from tickrig.host.rtc_canopen.editor.session import AddComponents, EditorSession
 from tickrig.host.rtc_canopen.editor.widgets import CursorView
-from tickrig.host.rtc_canopen.events import Event
+from tickrig.host.rtc_canopen.events import ServerEvent
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.host.tui.line_view import LineView, line_text
 
@@ -34,15 +34,15 @@ class Desk:
         nodes: by node-ID.
     """
 
-    def __init__(self, path: Path, cast: dict[int, str], furnish: Furnish) -> None:
+    def __init__(self, path: Path, cast: dict[int, str], furnish: AddComponents) -> None:
         wire = CanWire()
         self.nodes: dict[int, Node] = {n: node(wire, n, model) for n, model in cast.items()}
         rig = Rig(*(Station(one, one.port) for one in self.nodes.values()))
         self.link = CanHost(rig, wire.end())
-        self.events: list[Event] = []
+        self.events: list[ServerEvent] = []
         server = open_server(path)
         furnish(server)
-        self.session = Session(server, path, self.link, furnish, (self.events.append,))
+        self.session = EditorSession(server, path, self.link, furnish, (self.events.append,))
         self.app = SystemEditor(self.session, "rig")
         self.pilot: Pilot[None]
 
@@ -93,7 +93,7 @@ def at_desk(
     path: Path = FIG_120,
     cast: dict[int, str] | None = None,
     size: tuple[int, int] = (80, 24),
-    furnish: Furnish = lambda server: None,
+    furnish: AddComponents = lambda server: None,
 ) -> None:
     """Let somebody work at a desk where all nodes have booted."""
 

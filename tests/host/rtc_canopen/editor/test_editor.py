@@ -15,8 +15,8 @@ from tests.host.rtc_canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.widgets import Question
-from tickrig.host.rtc_canopen.server import Server
+from tickrig.host.rtc_canopen.editor.widgets import QuestionScreen
+from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.wire.rtc_types.basic import TimedShortSeq
 
@@ -211,7 +211,7 @@ def test_an_object_is_written_and_read_again() -> None:
         for _ in range(3):
             await desk.pass_ms(20)
         await desk.press("w")
-        assert isinstance(desk.app.screen, Question)
+        assert isinstance(desk.app.screen, QuestionScreen)
         await desk.press("1", "2", "enter")
         for _ in range(3):
             await desk.pass_ms(20)
@@ -454,7 +454,7 @@ def test_an_eds_that_is_gone_has_no_objects(two: Path, tmp_path: Path) -> None:
 
 
 def test_components_beside_the_proxies_are_shown_and_connected(two: Path) -> None:
-    def furnish(server: Server) -> None:
+    def furnish(server: RtcCanopenServer) -> None:
         server.manager.add(Knob("Knob0", TimedShortSeq))
 
     async def act(desk: Desk) -> None:

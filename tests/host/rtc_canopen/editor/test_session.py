@@ -12,9 +12,9 @@ import pytest
 from tests.host.rtc_canopen.bench import SYSTEMS
 from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import Stamped, StampedLink
-from tickrig.host.rtc_canopen.editor.session import Session
-from tickrig.host.rtc_canopen.events import Event, EventKind
+from tickrig.host.links.link import StampedFrames, StampedLink
+from tickrig.host.rtc_canopen.editor.session import EditorSession
+from tickrig.host.rtc_canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc_canopen.serve import open_server
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState
@@ -36,15 +36,15 @@ class Broken:
     def receive(self, timeout_us: int, /) -> Frames:
         raise LinkClosed("gone")
 
-    def hear(self, timeout_us: int, /) -> tuple[int, Stamped]:
+    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         raise LinkClosed("gone")
 
     def close(self) -> None:
         """Nothing is open."""
 
 
-def session(link: StampedLink, *listeners: Callable[[Event], None]) -> Session:
-    return Session(open_server(FIG_120), FIG_120, link, listeners=listeners)
+def session(link: StampedLink, *listeners: Callable[[ServerEvent], None]) -> EditorSession:
+    return EditorSession(open_server(FIG_120), FIG_120, link, listeners=listeners)
 
 
 def test_it_looks_for_its_nodes_and_leaves_them_at_the_end() -> None:
@@ -66,8 +66,8 @@ def test_it_looks_for_its_nodes_and_leaves_them_at_the_end() -> None:
 def test_events_and_bus_states_reach_whoever_listens_also_after_another_definition() -> None:
     off = threading.Event()
 
-    def listen(event: Event) -> None:
-        if event.kind is EventKind.BUS_OFF:
+    def listen(event: ServerEvent) -> None:
+        if event.kind is ServerEventType.BUS_OFF:
             off.set()
 
     link = CanLink.open("session2", "virtual")

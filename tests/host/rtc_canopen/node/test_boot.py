@@ -12,8 +12,8 @@ from tests.host.rtc_canopen.components import add_knob
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.definition.device_file import read_device_file
 from tickrig.host.rtc_canopen.errors import DefinitionError
-from tickrig.host.rtc_canopen.events import EventKind
-from tickrig.host.rtc_canopen.node.served_node import Phase
+from tickrig.host.rtc_canopen.events import ServerEventType
+from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 PALETTE = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"
@@ -73,7 +73,7 @@ def test_a_node_that_comes_later_is_found_by_its_boot_up() -> None:
     bench = Bench(PALETTE, ONE)
     bench.devices[16].physical["power_off"].write(1)
     bench.run_ms(3_300)
-    assert bench.server.nodes[16].phase is Phase.ABSENT
+    assert bench.server.nodes[16].phase is NodePhase.ABSENT
     bench.devices[16].physical["power_off"].write(0)
     before_us = bench.now_us
     bench.boot()
@@ -104,17 +104,17 @@ def test_a_stopped_node_with_heartbeat_is_reset_as_it_answers_no_sdo() -> None:
 
 def test_a_node_of_another_kind_is_refused() -> None:
     bench = Bench(cast={16: "motor-core-unit", 32: "motor-core-unit"})
-    event = bench.run_until(EventKind.WRONG_IDENTITY)
+    event = bench.run_until(ServerEventType.WRONG_IDENTITY)
     assert (event.node, event.text) == (16, "1000h:00 is 000C0191h, not 00070191h")
     bench.run_ms(300)
-    assert bench.server.nodes[16].phase is Phase.REFUSED
+    assert bench.server.nodes[16].phase is NodePhase.REFUSED
     assert bench.proxy(16) is None
     assert bench.state(32) is LifeCycleState.INACTIVE
 
 
 def test_a_refused_value_ends_the_boot_of_that_node_alone() -> None:
     bench = Bench(PALETTE_AND_MOTOR + "sdo: [{node: 16, index: 0x1000, sub: 0, value: 1, size: 4}]")
-    event = bench.run_until(EventKind.SDO_ABORTED)
+    event = bench.run_until(ServerEventType.SDO_ABORTED)
     assert (event.node, event.text) == (16, "1000h:00 aborted: 06010002h READ_ONLY")
     bench.run_ms(300)
     assert bench.server.nodes[16].problem == event.text
@@ -125,7 +125,7 @@ def test_a_node_that_falls_silent_while_it_boots_is_looked_for_again() -> None:
     bench = Bench(PALETTE, ONE)
     bench.run_ms(3)
     bench.devices[16].physical["unplugged"].write(1)
-    event = bench.run_until(EventKind.SDO_TIMEOUT)
+    event = bench.run_until(ServerEventType.SDO_TIMEOUT)
     assert event.text == "1018h:02 was not answered"
     bench.devices[16].physical["unplugged"].write(0)
     bench.boot()
@@ -152,7 +152,7 @@ def test_a_name_that_is_there_twice_refuses_the_proxy(ports: str, reason: str) -
     bench = Bench(PALETTE[:-3] + f", ports: {ports}}}]\n", ONE)
     if ports == "{}":
         add_knob(bench.server.manager, TimedOctet, "Palette0")
-    event = bench.run_until(EventKind.PROXY_REFUSED)
+    event = bench.run_until(ServerEventType.PROXY_REFUSED)
     assert (event.node, event.text) == (16, reason)
     bench.run_ms(500)
     assert bench.server.nodes[16].problem == reason

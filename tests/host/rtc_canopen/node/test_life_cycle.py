@@ -9,7 +9,7 @@ import pytest
 
 from tests.host.rtc_canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 GOLDEN = Path(__file__).parents[3] / "golden" / "rtc_canopen.json"
@@ -59,7 +59,7 @@ def test_a_device_that_ignores_the_start_is_told_of_as_not_confirmed() -> None:
         lambda old, new: bench.devices[16].slave.enter(old) if new == 5 else None
     )
     bench.server.manager.activate("Palette0")
-    event = bench.run_until(EventKind.NOT_CONFIRMED, 16)
+    event = bench.run_until(ServerEventType.NOT_CONFIRMED, 16)
     assert event.text == "OPERATIONAL was not reported"
     bench.run_ms(200)
     assert bench.state(16) is ERROR
@@ -74,7 +74,7 @@ def test_a_state_is_waited_for_three_heartbeat_times_at_least_300_ms(
     node = bench.devices[16].slave
     node.on_state.append(lambda old, new: node.enter(old) if new == 5 else None)
     bench.server.manager.activate("Palette0")
-    event = bench.run_until(EventKind.NOT_CONFIRMED, 16)
+    event = bench.run_until(ServerEventType.NOT_CONFIRMED, 16)
     (asked_us,) = [at for at, heard in bench.log.heard if str(heard) == "000#0110"]
     assert wait_ms * 1_000 - 100 <= event.at_us - asked_us <= wait_ms * 1_000
 

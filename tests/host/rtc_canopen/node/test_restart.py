@@ -5,11 +5,11 @@ from __future__ import annotations
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR, Bench
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc_canopen.events import EventKind
+from tickrig.host.rtc_canopen.events import ServerEventType
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 TWICE = PALETTE_AND_MOTOR.replace("f-palette.eds,", "f-palette.eds, restart: 2,")
-TOLD = (EventKind.RESTARTED, EventKind.NOT_RESTARTED)
+TOLD = (ServerEventType.RESTARTED, ServerEventType.NOT_RESTARTED)
 
 
 def running(text: str = TWICE, *active: int) -> Bench:

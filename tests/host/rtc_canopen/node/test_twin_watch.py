@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.rtc_canopen.node.twin_watch import CROWDED, TwinWatch
+from tickrig.host.rtc_canopen.node.twin_watch import CROWDED, DuplicateNodeDetector
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 MS = 1_000
 BOOT_UP, PRE_OPERATIONAL = NmtState.INITIALISING, NmtState.PRE_OPERATIONAL
 
 
-def watched(before_ms: tuple[int, ...], boot_ms: int, after_ms: tuple[int, ...]) -> TwinWatch:
+def watched(
+    before_ms: tuple[int, ...], boot_ms: int, after_ms: tuple[int, ...]
+) -> DuplicateNodeDetector:
     """Heartbeats, a boot-up that nobody asked for, and heartbeats."""
-    watch = TwinWatch(100 * MS)
+    watch = DuplicateNodeDetector(100 * MS)
     for at_ms in before_ms:
         watch.hear(at_ms * MS, PRE_OPERATIONAL, listening=False)
     watch.hear(boot_ms * MS, BOOT_UP, listening=False)
@@ -57,14 +59,14 @@ def test_while_there_is_a_stranger_it_is_listened_for_longer() -> None:
 def test_states_that_no_command_explains_show_twins_at_the_second_time(
     states: str, twins: bool
 ) -> None:
-    watch = TwinWatch(100 * MS)
+    watch = DuplicateNodeDetector(100 * MS)
     for place, word in enumerate(states.split()):
         watch.hear(100 * MS * place, NmtState[word], listening=False)
     assert bool(watch.sign) is twins
 
 
 def test_states_that_were_commanded_show_nothing_however_late_they_come() -> None:
-    watch = TwinWatch(100 * MS)
+    watch = DuplicateNodeDetector(100 * MS)
     for command in (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL) * 3:
         watch.command(command)
     for place in range(6):
@@ -74,14 +76,14 @@ def test_states_that_were_commanded_show_nothing_however_late_they_come() -> Non
 
 
 def test_two_heartbeats_in_each_producer_time_are_a_suspicion_and_a_burst_is_none() -> None:
-    watch = TwinWatch(100 * MS)
+    watch = DuplicateNodeDetector(100 * MS)
     for place in range(2 * CROWDED):
         watch.hear(50 * MS * place, PRE_OPERATIONAL, listening=False)
     assert watch.suspicion == ""
     for place in range(2 * CROWDED, 2 * CROWDED + 4):
         watch.hear(50 * MS * place, PRE_OPERATIONAL, listening=False)
     assert watch.suspicion == "two heartbeats in each 100 ms"
-    held_up = TwinWatch(100 * MS)
+    held_up = DuplicateNodeDetector(100 * MS)
     for place in range(1_000):
         held_up.hear(100 * MS * (place // 50 * 50) + place, PRE_OPERATIONAL, listening=False)
     assert (held_up.suspicion, held_up.sign) == ("", "")

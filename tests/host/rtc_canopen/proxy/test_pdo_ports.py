@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.rtc import InPort, connect
-from tickrig.host.rtc_canopen.proxy.pdo_layout import PORT_TYPES, lay_out, proxy_index
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PDO_FIELD_TYPES, lay_out, proxy_index
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MappedObject
@@ -54,7 +54,7 @@ def test_an_object_is_a_port_of_its_type(row: Row) -> None:
     assert (port.name, port.data_type) == ("x", one)
     assert layout.decode(data) == (value,)
     assert PdoSink(layout, "x").encode("x", one(Time(), value)) == data
-    assert PORT_TYPES[code, bits].many is many
+    assert PDO_FIELD_TYPES[code, bits].many is many
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_an_object_is_a_port_of_its_type(row: Row) -> None:
 )
 def test_a_value_that_does_not_fit_is_refused(code: int, bits: int, value: Any) -> None:
     with pytest.raises(ValueError, match="is"):
-        PORT_TYPES[code, bits].encode(value)
+        PDO_FIELD_TYPES[code, bits].encode(value)
 
 
 def types(*codes: int) -> dict[tuple[int, int], int]:
@@ -118,7 +118,7 @@ def test_bits_and_dummies_keep_their_places() -> None:
     assert layout.encode((False, True)).hex() == "0002"
 
 
-@given(st.lists(st.sampled_from(sorted(PORT_TYPES)), min_size=1, max_size=8), st.binary())
+@given(st.lists(st.sampled_from(sorted(PDO_FIELD_TYPES)), min_size=1, max_size=8), st.binary())
 def test_what_is_decoded_is_encoded_again(kinds: list[tuple[int, int]], data: bytes) -> None:
     layout = lay_out(0x1800, 0x181, mapped(*(b for _, b in kinds)), types(*(c for c, _ in kinds)))
     size = layout.size
