@@ -19,10 +19,10 @@ def main() -> None:
     loop.activate()
     convoy.follow(1, leader=0)
     loop.run_to(6 * SECOND_US)
-    print("towards the cart:  {:.1f} {:.1f}".format(*cart.truth))
+    print("towards the cart:  {:.1f} {:.1f}".format(*cart.true_pose))
     convoy.follow(1, leader=2)
     loop.run_to(30 * SECOND_US)
-    print("behind the other:  {:.1f} {:.1f}".format(*cart.truth))
+    print("behind the other:  {:.1f} {:.1f}".format(*cart.true_pose))
 
 
 if __name__ == "__main__":

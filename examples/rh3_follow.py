@@ -24,7 +24,7 @@ def main() -> None:
     loop.chain.position_input.goal(Pose(3.0, 1.0, 0.0))
     for t_us in range(6 * SECOND_US, 30 * SECOND_US, 6 * SECOND_US):
         loop.run_to(t_us)
-        places = ("{:5.2f} {:5.2f}".format(*robot.truth) for robot in convoy.robots)
+        places = ("{:5.2f} {:5.2f}".format(*robot.true_pose) for robot in convoy.robots)
         print(f"{t_us / 1e6:2.0f} s:", " | ".join(places))
 
 

@@ -32,7 +32,7 @@ def main() -> None:
     loop.manager.activate("GamePad0")
     loop.run_to(12 * SECOND_US)
     for robot in convoy.robots:
-        print("{:5.2f} {:5.2f} {:5.2f}".format(*robot.truth))
+        print("{:5.2f} {:5.2f} {:5.2f}".format(*robot.true_pose))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ SECOND_US = 1_000_000
 def main() -> None:
     """Drive 3 m with a post on the way."""
     loop = ClosedLoop(world=World(posts=(Post(2.0, 0.1, 0.2),)))
-    (eye,) = loop.eyes
+    (eye,) = loop.range_finders
     guard = Guard(loop.manager, loop.chain, lambda name: SimLink(loop.rig, eye.line.b))
     loop.activate("tuned")
     guard.activate()

@@ -23,7 +23,7 @@ ETA: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class VelocityLimits:
     """What a command may be.
 
     Attributes:

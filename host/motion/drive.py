@@ -8,8 +8,7 @@ from typing import Final, Protocol
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.least_time import least_time_s
-from tickrig.host.motion.motion_run import MotionRun, Sample
+from tickrig.host.motion.motion_run import MotionRun, Sample, least_time_s
 from tickrig.wire.rtc_types.rh2 import RunMode
 
 PERIOD_US: Final = 20_000

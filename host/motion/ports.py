@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import Final, TypeVar
 
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.host.rtc.ports.data_port import InPort
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
+from tickrig.host.rtc import ExecutionContext, InPort, OutPort
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
 from tickrig.wire.rtc_types.idl import Struct
 
 T = TypeVar("T", bound=Struct)
@@ -42,6 +44,19 @@ def to_pose(data: Pose2D) -> Pose | None:
     """Return a pose, its heading in -pi..pi; None if a number is not `sound`."""
     x, y, heading = data.position.x, data.position.y, data.heading
     return Pose(x, y, wrap(heading)) if sound(x, y, heading) else None
+
+
+def newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
+    """Return the pose that arrived last; None if nothing arrived, or a number is not `sound`."""
+    latest = newest(port)
+    return None if latest is None else to_pose(latest.data)
+
+
+def write_velocity(
+    port: OutPort[iis.TimedVelocity2D], ec: ExecutionContext, vx: float, vy: float, va: float
+) -> None:
+    """Write a velocity of now: m/s ahead, m/s to the left, rad/s to the left."""
+    port.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=Velocity2D(vx, vy, va)))
 
 
 def to_pose_2d(pose: Pose) -> Pose2D:

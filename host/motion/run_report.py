@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.components.omni_to_2wd import plan
-from tickrig.host.motion.control_laws import Limits, steps
+from tickrig.host.motion.control_laws import VelocityLimits, steps
 from tickrig.host.motion.drive import PERIOD_US
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.least_time import least_time_s
-from tickrig.host.motion.motion_run import MotionRun
+from tickrig.host.motion.motion_run import MotionRun, least_time_s
 
 
-def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: Limits) -> list[str]:
+def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: VelocityLimits) -> list[str]:
     """Return a line for each measure."""
     least_s, track = least_time_s(plan(start, points)), run.cross_track
     took_s = run.duration_s if run.reached_s is None else run.reached_s
@@ -29,7 +28,7 @@ def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: Limits) -
     ]
 
 
-def limits_of(chain: MotionChain) -> Limits:
+def limits_of(chain: MotionChain) -> VelocityLimits:
     """Return the limits that a chain is configured to keep."""
     follower = chain.path_follower
     dv, dw = steps(
@@ -38,4 +37,4 @@ def limits_of(chain: MotionChain) -> Limits:
         PERIOD_US / 1e6,
         follower.acc_cycle.value,
     )
-    return Limits(follower.max_v.value, follower.max_w.value, dv, dw)
+    return VelocityLimits(follower.max_v.value, follower.max_w.value, dv, dw)

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from math import hypot, pi, sin
 from typing import Final
 
-from tickrig.host.motion.dead_reckoning import Wheels
 from tickrig.host.motion.drive import BaseConnection, OnSample, drive
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.geometry import Pose, Wheels
 
 SIDE_M: Final = 4.0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import ClassVar, TypeVar
 
 from tickrig.host.rtc.component_action import ComponentAction, guarded
@@ -26,16 +26,11 @@ class ModuleSpec:
     category: str = "generic"
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentProfile:
-    """A component as OpenRTM describes it."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ComponentProfile(ModuleSpec):
+    """A component as OpenRTM describes it: what its class has, and what it has itself."""
 
     instance_name: str
-    type_name: str
-    description: str
-    version: str
-    vendor: str
-    category: str
     port_profiles: tuple[PortProfile, ...]
     properties: Mapping[str, str] = field(default_factory=dict)
 
@@ -70,15 +65,9 @@ class RtComponent(ComponentAction):
     @property
     def profile(self) -> ComponentProfile:
         """The component as it is."""
-        spec, ports = self.spec, tuple(port.profile for port in self.ports.values())
+        ports = tuple(port.profile for port in self.ports.values())
         return ComponentProfile(
-            self.instance_name,
-            spec.type_name,
-            spec.description,
-            spec.version,
-            spec.vendor,
-            spec.category,
-            ports,
+            **asdict(self.spec), instance_name=self.instance_name, port_profiles=ports
         )
 
     def add_port(self, port: P) -> P:

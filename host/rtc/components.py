@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
@@ -14,22 +14,22 @@ from tickrig.wire.rtc_types import basic
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.idl import Struct
 
-SEQ_PORTS: Final[Mapping[str, type[Struct]]] = {
-    "Octet": basic.TimedOctet,
-    "Short": basic.TimedShort,
-    "Long": basic.TimedLong,
-    "Float": basic.TimedFloat,
-    "Double": basic.TimedDouble,
-    "OctetSeq": basic.TimedOctetSeq,
-    "ShortSeq": basic.TimedShortSeq,
-    "LongSeq": basic.TimedLongSeq,
-    "FloatSeq": basic.TimedFloatSeq,
-    "DoubleSeq": basic.TimedDoubleSeq,
-}
-"""Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
-
 LENGTH: Final = 10
 """Elements of a sequence that SeqOut writes."""
+
+_COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
+    "Octet": lambda n: n & 0xFF,
+    "Short": lambda n: n & 0x7FFF,
+    "Long": lambda n: n,
+    "Float": lambda n: (n & 0x7FFF) / 4,
+    "Double": lambda n: n / 4,
+}
+"""What SeqOut writes in period n, by the name of the port."""
+
+SEQ_PORTS: Final[Mapping[str, Any]] = {
+    name + seq: getattr(basic, f"Timed{name}{seq}") for seq in ("", "Seq") for name in _COUNTED
+}
+"""Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
 
 
 class ConsoleIn(RtComponent):
@@ -129,8 +129,15 @@ class SeqOut(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Write the next values."""
-        for value in _values(Time.from_us(ec.now_us), self._count):
-            self.outs[type(value).__name__.removeprefix("Timed")].write(value)
+        now = Time.from_us(ec.now_us)
+        for name, port in self.outs.items():
+            counted = _COUNTED[name.removesuffix("Seq")]
+            data: Any = tuple(counted(n) for n in range(self._count, self._count + LENGTH))
+            if name in _COUNTED:
+                data = data[0]
+            elif name == "OctetSeq":
+                data = bytes(data)
+            port.write(port.data_type(now, data))
         self._count += 1
         return ReturnCode.RTC_OK
 
@@ -160,20 +167,3 @@ EXAMPLES: tuple[type[RtComponent], ...] = (
     SeqOut,
     ConfigSample,
 )
-
-
-def _values(tm: Time, n: int) -> tuple[Struct, ...]:
-    octets = bytes(k & 0xFF for k in range(n, n + LENGTH))
-    shorts = tuple(k & 0x7FFF for k in range(n, n + LENGTH))
-    return (
-        basic.TimedOctet(tm, octets[0]),
-        basic.TimedShort(tm, shorts[0]),
-        basic.TimedLong(tm, n),
-        basic.TimedFloat(tm, shorts[0] / 4),
-        basic.TimedDouble(tm, n / 4),
-        basic.TimedOctetSeq(tm, octets),
-        basic.TimedShortSeq(tm, shorts),
-        basic.TimedLongSeq(tm, tuple(range(n, n + LENGTH))),
-        basic.TimedFloatSeq(tm, tuple(k / 4 for k in shorts)),
-        basic.TimedDoubleSeq(tm, tuple(k / 4 for k in range(n, n + LENGTH))),
-    )

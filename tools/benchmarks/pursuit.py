@@ -13,7 +13,7 @@ from itertools import pairwise
 from math import copysign, cos, hypot, sin, sqrt
 from typing import ClassVar, Final
 
-from tickrig.host.motion.control_laws import Limits
+from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Pose, Twist, wrap
 from tickrig.host.motion.ports import newest, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
@@ -27,7 +27,7 @@ APPROACH_MIN_M_S: Final = 0.05
 ROTATE_RAD: Final = 0.785
 ANGULAR_ACCELERATION: Final = 3.2
 SPACING_M: Final = 0.05
-LIMITS: Final = Limits(0.3, 0.3, 0.006, 0.1)
+LIMITS: Final = VelocityLimits(0.3, 0.3, 0.006, 0.1)
 
 
 @dataclass(frozen=True)

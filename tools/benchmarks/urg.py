@@ -46,7 +46,7 @@ def with_eyes(name: str, world: World) -> None:
     values = []
     for _ in range(RUNS):
         loop = ClosedLoop(world=world)
-        line = loop.eyes[0].line.b
+        line = loop.range_finders[0].line.b
         guard = Guard(
             loop.manager, loop.chain, lambda name, loop=loop, line=line: SimLink(loop.rig, line)
         )

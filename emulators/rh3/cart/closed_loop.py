@@ -17,122 +17,13 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.host.control.clock import RealClock
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager
 from tickrig.wire.instant import NEVER
 
 BAUD: Final = 115_200
-
-
-@dataclass(frozen=True, slots=True)
-class Cart:
-    """One cart.
-
-    Attributes:
-        base: the emulated base.
-        chain: its components.
-        port: the base's port; faults of the wire are armed here.
-    """
-
-    base: Rh3Base
-    chain: MotionChain
-    port: FaultyPort[bytes]
-
-    @property
-    def truth(self) -> Pose:
-        """Where it is."""
-        pose = self.base.ground.pose
-        return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
-
-
-class ClosedLoop:
-    """Carts, their lines and one manager, moved on together.
-
-    Args:
-        parameters: one for each base.
-        seed: of the wire faults' chance.
-        dense: run every tick of every base.
-        world: what is around them; with one, each carries a range finder that sees it.
-
-    Attributes:
-        rig: the bases on their lines.
-        manager: the components.
-        carts: in the order of the parameters.
-        eyes: the range finders, in the same order.
-    """
-
-    def __init__(
-        self,
-        *parameters: BaseParameters,
-        seed: int = 0,
-        dense: bool = False,
-        world: World | None = None,
-    ) -> None:
-        bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
-        lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
-        ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
-        self.eyes = _eyes(bases, world) if world else ()
-        stations = [Station(eye.urg, eye.line.a) for eye in self.eyes]
-        self.rig = Rig(*map(Station, bases, ports), *stations, couplings=self.eyes, dense=dense)
-        self.manager = Manager()
-        self.carts = tuple(
-            Cart(base, MotionChain(self.manager, self._opener(line), str(n) if n else ""), port)
-            for n, (base, line, port) in enumerate(zip(bases, lines, ports, strict=True))
-        )
-
-    @property
-    def cart(self) -> Cart:
-        """The first cart."""
-        return self.carts[0]
-
-    @property
-    def chain(self) -> MotionChain:
-        """The components of the first cart."""
-        return self.cart.chain
-
-    @property
-    def pose(self) -> Pose:
-        """Where the first cart truly is."""
-        return self.cart.truth
-
-    @property
-    def now_us(self) -> int:
-        """The present time."""
-        return self.rig.now_us
-
-    def activate(self, set_id: str = "default") -> None:
-        """Activate all components, with a configuration set."""
-        for cart in self.carts:
-            cart.chain.use(set_id)
-            cart.chain.activate()
-
-    def run_to(self, t_us: int) -> None:
-        """Go on to a time."""
-        while (due_us := self.manager.due_us) <= t_us:
-            self.rig.run_to(due_us)
-            self.manager.tick(due_us)
-        if self.rig.now_us < t_us:
-            self.rig.run_to(t_us)
-
-    def run_until(self, done: Callable[[], bool], timeout_us: int, step_us: int = 20_000) -> bool:
-        """Go on until something is so; False if it was not in time."""
-        until_us = self.now_us + timeout_us
-        while not done() and self.now_us < until_us:
-            self.run_to(min(self.now_us + step_us, until_us))
-        return done()
-
-    def _opener(self, line: Rs485Line) -> Callable[[str], SimLink]:
-        return lambda name: SimLink(self.rig, line.b)
-
-
-def _eyes(bases: Sequence[Rh3Base], world: World) -> tuple[MountedUrg, ...]:
-    """Return a range finder for each base; it sees the others too."""
-    return tuple(
-        MountedUrg(base, world, [other for other in bases if other is not base]) for base in bases
-    )
-
-
 USB_BAUD: Final = 12_000_000
 
 AHEAD_M: Final = 0.2
@@ -183,3 +74,112 @@ class MountedUrg:
                 inputs.set(name, value)
         places = [(base.read("x_m"), base.read("y_m")) for base in self._others]
         self.urg.world = self.world.with_posts(*(Post(x, y, OUTLINE_M) for x, y in places))
+
+
+@dataclass(frozen=True, slots=True)
+class Cart:
+    """One cart.
+
+    Attributes:
+        base: the emulated base.
+        chain: its components.
+        port: the base's port; faults of the wire are armed here.
+    """
+
+    base: Rh3Base
+    chain: MotionChain
+    port: FaultyPort[bytes]
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where it is."""
+        pose = self.base.ground.pose
+        return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
+
+
+class ClosedLoop:
+    """Carts, their lines and one manager, moved on together.
+
+    Args:
+        parameters: one for each base.
+        seed: of the wire faults' chance.
+        dense: run every tick of every base.
+        world: what is around them; with one, each carries a range finder that sees it.
+        pace: how many times as fast as the machine's its time passes; as it goes without one.
+
+    Attributes:
+        rig: the bases on their lines.
+        manager: the components.
+        carts: in the order of the parameters.
+        cart: the first cart.
+        chain: the components of the first cart.
+        range_finders: range finders, in the same order.
+    """
+
+    def __init__(
+        self,
+        *parameters: BaseParameters,
+        seed: int = 0,
+        dense: bool = False,
+        world: World | None = None,
+        pace: float | None = None,
+    ) -> None:
+        self._pace, self._clock = pace, RealClock()
+        bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
+        lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
+        ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
+        self.range_finders = _range_finders(bases, world) if world else ()
+        stations = [Station(eye.urg, eye.line.a) for eye in self.range_finders]
+        self.rig = Rig(
+            *map(Station, bases, ports), *stations, couplings=self.range_finders, dense=dense
+        )
+        self.manager = Manager()
+        self.carts = tuple(
+            Cart(base, MotionChain(self.manager, self._opener(line), str(n) if n else ""), port)
+            for n, (base, line, port) in enumerate(zip(bases, lines, ports, strict=True))
+        )
+        self.cart = self.carts[0]
+        self.chain = self.cart.chain
+
+    @property
+    def pose(self) -> Pose:
+        """Where the first cart truly is."""
+        return self.cart.true_pose
+
+    @property
+    def now_us(self) -> int:
+        """The present time."""
+        return self.rig.now_us
+
+    def activate(self, set_id: str = "default") -> None:
+        """Activate all components, with a configuration set."""
+        for cart in self.carts:
+            cart.chain.use(set_id)
+            cart.chain.activate()
+
+    def run_to(self, t_us: int) -> None:
+        """Go on to a time."""
+        if self._pace is not None:
+            self._clock.wait_until(round(t_us / self._pace))
+        while (due_us := self.manager.due_us) <= t_us:
+            self.rig.run_to(due_us)
+            self.manager.tick(due_us)
+        if self.rig.now_us < t_us:
+            self.rig.run_to(t_us)
+
+    def run_until(self, done: Callable[[], bool], timeout_us: int, step_us: int = 20_000) -> bool:
+        """Go on until something is so; False if it was not in time."""
+        until_us = self.now_us + timeout_us
+        while not done() and self.now_us < until_us:
+            self.run_to(min(self.now_us + step_us, until_us))
+        return done()
+
+    def _opener(self, line: Rs485Line) -> Callable[[str], SimLink]:
+        return lambda name: SimLink(self.rig, line.b)
+
+
+def _range_finders(bases: Sequence[Rh3Base], world: World) -> tuple[MountedUrg, ...]:
+    """Return a range finder for each base; it sees the others too."""
+    return tuple(
+        MountedUrg(base, world, [other for other in bases if other is not base]) for base in bases
+    )

@@ -1,8 +1,8 @@
-"""A robot on omni wheels as one RT component: its base is inside, there is no line."""
+"""Robots that go together in one map frame: carts on two wheels, and on omni wheels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -17,6 +17,7 @@ from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, Retu
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 
+WIDE: Final = {"dataport.buffer.length": "64"}
 STEP_US: Final = 1_000
 
 WATCHDOG_US: Final = 500_000
@@ -44,7 +45,7 @@ class OmniCart(RtComponent):
         self._wanted, self._heard_us = Velocity(), 0
 
     @property
-    def truth(self) -> Pose:
+    def true_pose(self) -> Pose:
         """Where it is."""
         pose = self.body.pose
         return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
@@ -69,11 +70,8 @@ class OmniCart(RtComponent):
         for _ in range(ec.period_us // STEP_US):
             self.body.step(self._wanted)
         now = Time.from_us(ec.now_us)
-        self.position.write(iis.TimedPose2D(now, data=to_pose_2d(self.truth)))
+        self.position.write(iis.TimedPose2D(now, data=to_pose_2d(self.true_pose)))
         return ReturnCode.RTC_OK
-
-
-WIDE: Final = {"dataport.buffer.length": "64"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,19 +81,19 @@ class Robot:
     Attributes:
         position: where its self-position leaves.
         velocity: where its moving command arrives.
-        look: returns where it truly is.
+        cart: it has the true pose.
         sideways: it goes any way.
     """
 
     position: str
     velocity: str
-    look: Callable[[], Pose]
+    cart: Cart | OmniCart
     sideways: bool = False
 
     @property
-    def truth(self) -> Pose:
+    def true_pose(self) -> Pose:
         """Where it is."""
-        return self.look()
+        return self.cart.true_pose
 
 
 class Convoy:
@@ -153,15 +151,14 @@ class Convoy:
         velocity = f"RefHardRh3{suffix}.InTargetVelocity"
         if number:
             manager.disconnect(f"PathFollower{suffix}.velocity", velocity)
-        return Robot(f"Odometry{suffix}.OdometryPosition", velocity, lambda: cart.truth)
+        return Robot(f"Odometry{suffix}.OdometryPosition", velocity, cart)
 
     def _omni_cart(self, number: int, pose: Pose) -> Robot:
         name = f"OmniCart{number}"
         cart = self.loop.manager.add(OmniCart(name), rate_hz=50.0)
         cart.place(pose)
         self.loop.manager.activate(name)
-        look: Callable[[], Pose] = lambda: cart.truth  # noqa: E731 - beside that of a cart
-        return Robot(f"{name}.OdometryPosition", f"{name}.InTargetVelocity", look, sideways=True)
+        return Robot(f"{name}.OdometryPosition", f"{name}.InTargetVelocity", cart, sideways=True)
 
 
 def place(cart: Cart, pose: Pose) -> None:

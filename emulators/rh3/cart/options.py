@@ -21,9 +21,8 @@ from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.dead_reckoning import Wheels
 from tickrig.host.motion.drive import BaseConnection, start, stop
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.geometry import Pose, Wheels
 from tickrig.host.motion.motion_run import MotionRun, Sample
 from tickrig.host.motion.track_map import WIDTH, LiveMap, TrackMap
 from tickrig.host.rtc import Manager
@@ -87,8 +86,40 @@ class MotionOptions:
     def _connection(self) -> BaseConnection:
         if self.device is not None:
             return SerialBaseConnection(self.device, self.baud)
-        loop = ClosedLoop(self.base)
-        return loop if self.pace is None else PacedBaseConnection(loop, self.pace)
+        return ClosedLoop(self.base, pace=self.pace)
+
+
+class SerialBaseConnection:
+    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
+
+    Args:
+        url: what DeviceFileName is set to; a path or a pyserial URL.
+        baud: bit rate in bit/s.
+
+    Attributes:
+        chain: its components.
+    """
+
+    def __init__(self, url: str, baud: int) -> None:
+        self._manager = Manager()
+        self.chain = MotionChain(self._manager, partial(SerialLink, baud=baud))
+        self.chain.ref_hard.configuration.set("DeviceFileName", url)
+        self._runner = RealTime(self._manager, RealClock())
+
+    @property
+    def now_us(self) -> int:
+        """Time since the start."""
+        return self._manager.now_us
+
+    @property
+    def pose(self) -> Pose:
+        """Where odometry takes it to be: nobody else knows."""
+        return self.chain.odometry.pose
+
+    def run_to(self, t_us: int) -> None:
+        """Wait until it is so late, and run what is due meanwhile."""
+        while self.now_us < t_us:
+            self._runner.step()
 
 
 class RunWatcher:
@@ -128,7 +159,7 @@ class RunWatcher:
 
 @contextmanager
 def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatcher]:
-    """OnSample a run; Ctrl-C ends it with exit status 130."""
+    """Watch a run; Ctrl-C ends it with exit status 130."""
     watcher = RunWatcher(options, points)
     with stopped_by_signals(watcher.end):
         try:
@@ -153,70 +184,3 @@ def demand_arrival(connection: BaseConnection, run: MotionRun) -> None:
         raise click.ClickException(connection.chain.ref_hard.trouble)
     if run.reached_s is None:
         raise click.ClickException(f"not there after {run.duration_s:.1f} s")
-
-
-class SerialBaseConnection:
-    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
-
-    Args:
-        url: what DeviceFileName is set to; a path or a pyserial URL.
-        baud: bit rate in bit/s.
-    """
-
-    def __init__(self, url: str, baud: int) -> None:
-        self._manager = Manager()
-        self._chain = MotionChain(self._manager, partial(SerialLink, baud=baud))
-        self._chain.ref_hard.configuration.set("DeviceFileName", url)
-        self._runner = RealTime(self._manager, RealClock())
-
-    @property
-    def chain(self) -> MotionChain:
-        """Its components."""
-        return self._chain
-
-    @property
-    def now_us(self) -> int:
-        """Time since the start."""
-        return self._manager.now_us
-
-    @property
-    def pose(self) -> Pose:
-        """Where odometry takes it to be: nobody else knows."""
-        return self._chain.odometry.pose
-
-    def run_to(self, t_us: int) -> None:
-        """Wait until it is so late, and run what is due meanwhile."""
-        while self.now_us < t_us:
-            self._runner.step()
-
-
-class PacedBaseConnection:
-    """A `BaseConnection` in virtual time that passes so many times as fast as the machine's.
-
-    Args:
-        connection: the one in virtual time.
-        pace: 1 is real time.
-    """
-
-    def __init__(self, connection: BaseConnection, pace: float) -> None:
-        self._connection, self._pace, self._clock = connection, pace, RealClock()
-
-    @property
-    def chain(self) -> MotionChain:
-        """Its components."""
-        return self._connection.chain
-
-    @property
-    def now_us(self) -> int:
-        """The virtual time."""
-        return self._connection.now_us
-
-    @property
-    def pose(self) -> Pose:
-        """Where it truly is."""
-        return self._connection.pose
-
-    def run_to(self, t_us: int) -> None:
-        """Go on to a virtual time when it has come."""
-        self._clock.wait_until(round(t_us / self._pace))
-        self._connection.run_to(t_us)

@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 from typing import ClassVar, Final
 
-from tickrig.host.motion.dead_reckoning import Wheels, moved
-from tickrig.host.motion.geometry import Pose, wrap
+from tickrig.host.motion.geometry import Pose, Wheels, moved, wrap
 from tickrig.host.motion.ports import arrived, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.states import RtcRefused

@@ -7,19 +7,16 @@ from typing import ClassVar
 
 from tickrig.host.motion.control_laws import (
     ControlLaw,
-    Limits,
     ReferenceSpin,
     Regulator,
     TimeOptimalSpin,
+    VelocityLimits,
     steps,
 )
-from tickrig.host.motion.dead_reckoning import twist_of
-from tickrig.host.motion.geometry import Pose, Twist, clip
-from tickrig.host.motion.ports import newest, sound, to_pose
+from tickrig.host.motion.geometry import Pose, Twist, clip, twist_of
+from tickrig.host.motion.ports import newest_pose, sound, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
 from tickrig.wire.rtc_types.rh2 import Path, RunMode
 
 Mode = Callable[[Path, Pose, Pose], Twist]
@@ -115,19 +112,18 @@ class PathFollower(RtComponent):
             self.path = path if sound(*numbers) else Path(RunMode.STOP)
         wanted = self._wanted(self._present(ec))
         self.twist = self._limits(ec).smooth(wanted, self.twist)
-        data = Velocity2D(self.twist.v, 0.0, self.twist.w)
-        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        write_velocity(self.velocity, ec, self.twist.v, 0.0, self.twist.w)
         return ReturnCode.RTC_OK
 
-    def _limits(self, ec: ExecutionContext) -> Limits:
+    def _limits(self, ec: ExecutionContext) -> VelocityLimits:
         dv, dw = steps(
             self.max_acc_v.value, self.max_acc_w.value, ec.period_us / 1e6, self.acc_cycle.value
         )
-        return Limits(self.max_v.value, self.max_w.value, dv, dw)
+        return VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
     def _present(self, ec: ExecutionContext) -> Pose | None:
         """Return the latest pose, None if there was none for long."""
-        if (latest := newest(self.position)) is not None and (pose := to_pose(latest.data)):
+        if (pose := newest_pose(self.position)) is not None:
             self._pose, self._seen_us = pose, ec.now_us
         elif ec.now_us - self._seen_us > self.pose_timeout.value * 1e6:
             self._pose = None

@@ -12,8 +12,7 @@ from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
 from tickrig.host.motion.components.base_texts import fault_text, refusal_text
-from tickrig.host.motion.dead_reckoning import wheel_speeds
-from tickrig.host.motion.geometry import Twist
+from tickrig.host.motion.geometry import Twist, wheel_speeds
 from tickrig.host.motion.ports import newest, sound
 from tickrig.host.rtc import (
     ExecutionContext,
@@ -137,7 +136,7 @@ class RefHardRh3(RtComponent):
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and order settings and power."""
+        """Open the line, and order settings and power; a fault of the base is cleared."""
         self._forget()
         self.velocity.clear()
         if not all(constant.value for constant in self.constants):
@@ -164,10 +163,6 @@ class RefHardRh3(RtComponent):
                 _LOG.warning("%s: %s", self.instance_name, error)
             self._master.close()
         self._master = None
-        return ReturnCode.RTC_OK
-
-    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Error; `on_activated` clears the fault in the base."""
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:

@@ -7,7 +7,7 @@ from math import copysign, pi, sqrt
 from typing import ClassVar, Final, NamedTuple
 
 from tickrig.host.motion.geometry import Pose, positive, wrap
-from tickrig.host.motion.ports import newest, sound, to_pose, to_pose_2d
+from tickrig.host.motion.ports import newest, newest_pose, sound, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -89,8 +89,7 @@ class PathInterface(RtComponent):
         now = Time.from_us(ec.now_us)
         if (path := newest(self.path)) is not None:
             self._take(now, path)
-        latest = newest(self.position)
-        if latest is not None and (pose := to_pose(latest.data)) is not None:
+        if (pose := newest_pose(self.position)) is not None:
             self._judge(now, pose)
         if self._order is not None:
             self.target_path.write(self._order)

@@ -6,11 +6,9 @@ from math import cos, sin
 from typing import ClassVar
 
 from tickrig.host.motion.geometry import Pose, clip, wrap
-from tickrig.host.motion.ports import newest, to_pose
+from tickrig.host.motion.ports import newest_pose, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 
 class Follower(RtComponent):
@@ -63,13 +61,11 @@ class Follower(RtComponent):
             for before, target, step in zip(self._commanded, wanted, steps, strict=True)
         )
         self._commanded = vx, vy, va
-        data = Velocity2D(vx, vy, va)
-        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        write_velocity(self.velocity, ec, vx, vy, va)
         return ReturnCode.RTC_OK
 
     def _present(self, ec: ExecutionContext, port: InPort[iis.TimedPose2D]) -> Pose | None:
-        latest = newest(port)
-        if latest is not None and (pose := to_pose(latest.data)) is not None:
+        if (pose := newest_pose(port)) is not None:
             self._seen[port] = ec.now_us, pose
         seen_us, seen = self._seen.get(port, (0, None))
         return seen if ec.now_us - seen_us <= self.pose_timeout.value * 1e6 else None

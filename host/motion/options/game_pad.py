@@ -8,11 +8,10 @@ from tickrig.host.links.errors import LinkError
 from tickrig.host.motion.options.evdev_pad import EvdevPad
 from tickrig.host.motion.options.keyboard_pad import KeyboardPad
 from tickrig.host.motion.options.pad import GamePadDevice, GamePadOpener, StickPosition
+from tickrig.host.motion.ports import write_velocity
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 KEYBOARD: Final = "keyboard"
 
@@ -50,7 +49,7 @@ class GamePad(RtComponent):
         self._pushed = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the pad."""
+        """Open the pad, also after Error."""
         try:
             self._pad = self._opener(self.device.value)
         except LinkError as error:
@@ -60,10 +59,6 @@ class GamePad(RtComponent):
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Close the pad."""
         self._let_go(ec)
-        return ReturnCode.RTC_OK
-
-    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Error; `on_activated` opens the pad again."""
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
@@ -86,8 +81,7 @@ class GamePad(RtComponent):
 
     def _write(self, ec: ExecutionContext, hand: StickPosition) -> None:
         vx, vy = hand.forward * self.max_v.value, hand.left * self.max_vy.value
-        data = Velocity2D(vx, vy, hand.turn * self.max_w.value)
-        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        write_velocity(self.velocity, ec, vx, vy, hand.turn * self.max_w.value)
 
     def _let_go(self, ec: ExecutionContext) -> None:
         if self._pushed:

@@ -40,7 +40,7 @@ class LrfCaptureUrg(RtComponent):
         self._client: UrgClient | None = None
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and let the sensor measure."""
+        """Open the line, and let the sensor measure; also after Error."""
         try:
             link = self._open_link(self.device.value)
             self._client = UrgClient(link, self.cluster.value)
@@ -51,10 +51,6 @@ class LrfCaptureUrg(RtComponent):
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Switch the laser off, and give the line back."""
         self._close()
-        return ReturnCode.RTC_OK
-
-    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """Leave Error; `on_activated` begins anew."""
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:

@@ -6,9 +6,9 @@ from math import cos, sin
 from typing import ClassVar, Final
 
 from tickrig.host.motion.components.ref_hard import RefHard
-from tickrig.host.motion.control_laws import Limits
+from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Twist
-from tickrig.host.motion.ports import MOST, newest, sound
+from tickrig.host.motion.ports import MOST, newest, sound, write_velocity
 from tickrig.host.rtc import (
     Consumer,
     ExecutionContext,
@@ -21,8 +21,8 @@ from tickrig.host.rtc import (
 )
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedDouble
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
+from tickrig.wire.rtc_types.basic import TimedDouble
+from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.sensors import RangeData
 
 ANY: Final = 1e9
@@ -164,9 +164,8 @@ class ObstaclesAvoidance(RtComponent):
         if not free and wanted.v > 0:
             wanted = Twist()
         step = self.max_acc_v.value * ec.period_us / 1e6
-        self._before = Limits(ANY, ANY, step, ANY).smooth(wanted, self._before)
-        data = Velocity2D(self._before.v, 0.0, self._before.w)
-        self.leaving.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        self._before = VelocityLimits(ANY, ANY, step, ANY).smooth(wanted, self._before)
+        write_velocity(self.leaving, ec, self._before.v, 0.0, self._before.w)
 
 
 class CollisionDetection(RtComponent):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.motion.ports import newest, sound
+from tickrig.host.motion.ports import newest, sound, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 _LOG: Final = log_of(__name__)
@@ -73,7 +72,7 @@ class SwitchInput(RtComponent):
             _LOG.info("%s: %s drives", self.instance_name, driver)
 
     def _write(self, ec: ExecutionContext, data: Velocity2D) -> None:
-        self.velocity.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=data))
+        write_velocity(self.velocity, ec, data.vx, data.vy, data.va)
 
 
 def _made_sound(data: Velocity2D) -> Velocity2D:

@@ -60,8 +60,8 @@ def check(at: Path, file: Path) -> None:
     """
     with loading():
         from tickrig.host.rtc.commands.system_file import file_format, read_system  # noqa: PLC0415
-        from tickrig.host.rtc.system.compare import differences  # noqa: PLC0415
         from tickrig.host.rtc.system.rts_profile import parse_rts_profile  # noqa: PLC0415
+        from tickrig.host.rtc.system.system import differences  # noqa: PLC0415
         from tickrig.host.rtc.system.system_toml import parse_toml  # noqa: PLC0415
 
     parse = parse_rts_profile if file_format(file) == "xml" else parse_toml

@@ -5,8 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Final
 
-from tickrig.host.motion.dead_reckoning import moved, wheel_speeds
-from tickrig.host.motion.geometry import Pose, Twist
+from tickrig.host.motion.geometry import Pose, Twist, moved, wheel_speeds
 from tickrig.host.motion.ports import arrived, sound, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of

@@ -54,9 +54,9 @@ def test_a_leader_that_is_lost_stops_its_follower() -> None:
     convoy.loop.run_to(4 * SECOND_US)
     convoy.loop.manager.disconnect(convoy.robots[0].position, "Follower1.leader")
     convoy.loop.run_to(7 * SECOND_US)
-    stopped = convoy.robots[1].truth
+    stopped = convoy.robots[1].true_pose
     convoy.loop.run_to(9 * SECOND_US)
-    assert convoy.robots[1].truth == stopped
+    assert convoy.robots[1].true_pose == stopped
     assert 0.5 < stopped.x < 2.5
 
 
@@ -92,7 +92,7 @@ class Omni:
         for _ in range(round(seconds * 50)):
             self.feed.write(iis.TimedVelocity2D(data=Velocity2D(vx, vy, 0.0)))
             self.manager.run_for(20_000)
-        return self.cart.truth
+        return self.cart.true_pose
 
 
 def test_a_robot_on_omni_wheels_goes_sideways() -> None:
@@ -104,10 +104,10 @@ def test_silence_stops_a_robot_on_omni_wheels() -> None:
     omni = Omni()
     before = omni.go(0.2)
     omni.manager.run_for(2 * SECOND_US)
-    assert 0.1 < omni.cart.truth.x - before.x < 0.12
-    stopped = omni.cart.truth.x
+    assert 0.1 < omni.cart.true_pose.x - before.x < 0.12
+    stopped = omni.cart.true_pose.x
     omni.manager.run_for(SECOND_US)
-    assert omni.cart.truth.x == pytest.approx(stopped, abs=1e-9)
+    assert omni.cart.true_pose.x == pytest.approx(stopped, abs=1e-9)
 
 
 def test_a_velocity_with_a_number_that_is_none_stops_a_robot_on_omni_wheels() -> None:

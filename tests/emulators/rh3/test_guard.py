@@ -25,7 +25,7 @@ class Seeing:
 
     def __init__(self, world: World, *, dense: bool = False) -> None:
         self.loop = ClosedLoop(world=world, dense=dense)
-        (self.eye,) = self.loop.eyes
+        (self.eye,) = self.loop.range_finders
         line = self.eye.line.b
         self.guard = Guard(
             self.loop.manager, self.loop.chain, lambda name: SimLink(self.loop.rig, line)
@@ -94,17 +94,17 @@ def test_a_cart_waits_until_another_has_left_its_way() -> None:
     loop = ClosedLoop(BaseParameters(), BaseParameters(), world=EMPTY)
     first, second = loop.carts
     place(second, Pose(1.5, 0.0, pi / 2))
-    line = loop.eyes[0].line.b
+    line = loop.range_finders[0].line.b
     guard = Guard(loop.manager, first.chain, lambda name: SimLink(loop.rig, line))
     loop.activate("tuned")
     guard.activate()
     loop.run_to(SECOND_US // 2)
     first.chain.position_input.goal(Pose(1.8))
     loop.run_to(4 * SECOND_US)
-    assert 0.5 < first.truth.distance(second.truth) < 1.0
+    assert 0.5 < first.true_pose.distance(second.true_pose) < 1.0
     second.chain.position_input.goal(Pose(1.5, 1.0, pi / 2))
     loop.run_to(14 * SECOND_US)
-    assert first.truth.distance(Pose(1.8)) < 0.005
+    assert first.true_pose.distance(Pose(1.8)) < 0.005
 
 
 class Push:

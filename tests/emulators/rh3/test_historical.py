@@ -68,7 +68,7 @@ def followed(law: str, k3: int) -> Following:
     offsets, turns = [], []
     for _ in range(PERIODS):
         loop.run_to(loop.now_us + 20_000)
-        offsets.append(loop.cart.truth.y)
+        offsets.append(loop.cart.true_pose.y)
         turns.append(chain.path_follower.twist.w)
     return Following(offsets, turns)
 

@@ -39,7 +39,7 @@ class DrivenCart:
     def arrives(self, goal: Pose, timeout_s: float = 30.0) -> bool:
         finished = self.loop.run_until(lambda: self.entered.finished > 0, round(timeout_s * 1e6))
         self.run(1.0)
-        return finished and self.cart.truth.distance(goal) < NEAR
+        return finished and self.cart.true_pose.distance(goal) < NEAR
 
     @property
     def moves(self) -> bool:
@@ -78,9 +78,9 @@ def test_a_goal_entered_in_motion_waits() -> None:
     driven = DrivenCart()
     driven.entered.goal(Pose(0.5))
     driven.loop.run_until(lambda: driven.entered.finished == 1, 20_000_000)
-    assert driven.cart.truth.distance(AHEAD) < NEAR
+    assert driven.cart.true_pose.distance(AHEAD) < NEAR
     driven.loop.run_until(lambda: driven.entered.finished == 2, 60_000_000)
-    assert driven.cart.truth.distance(Pose(0.5)) < NEAR
+    assert driven.cart.true_pose.distance(Pose(0.5)) < NEAR
 
 
 def test_the_present_pose_as_goal_is_finished_at_once() -> None:
@@ -89,7 +89,7 @@ def test_the_present_pose_as_goal_is_finished_at_once() -> None:
     assert driven.entered.finished == 1
     driven.run(0.5)
     assert not driven.moves
-    assert driven.cart.truth == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    assert driven.cart.true_pose == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
 
 
 def test_a_goal_that_is_no_number_changes_nothing() -> None:
@@ -108,7 +108,7 @@ def test_an_empty_list_stops_the_cart() -> None:
     path.write(iis.TimedPath2DSeq())
     driven.run(2.0)
     assert not driven.moves
-    assert driven.cart.truth.x < 0.9
+    assert driven.cart.true_pose.x < 0.9
     assert driven.entered.finished == 1
 
 
@@ -202,7 +202,7 @@ def test_deactivate_and_activate_sets_the_odometry_to_its_initial_pose() -> None
     assert odometry.pose == pytest.approx((5.0, 0.0, 0.0))
     driven.entered.replace(Pose(6.0))
     driven.loop.run_until(lambda: driven.entered.finished == 2, 30_000_000)
-    assert driven.cart.truth.x == pytest.approx(2.0, abs=2 * NEAR)
+    assert driven.cart.true_pose.x == pytest.approx(2.0, abs=2 * NEAR)
 
 
 @pytest.mark.parametrize("turned", [0, 1, 3])
@@ -214,7 +214,7 @@ def test_the_order_of_activation_does_not_matter(turned: int) -> None:
         loop.manager.activate(name)
         loop.run_to(loop.now_us + 100_000)
     assert loop.run_until(lambda: loop.cart.chain.position_input.finished == 1, 20_000_000)
-    assert loop.cart.truth.distance(Pose(0.3)) < NEAR
+    assert loop.cart.true_pose.distance(Pose(0.3)) < NEAR
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.002])
@@ -227,5 +227,7 @@ def test_dense_and_sparse_runs_are_the_same(loss: float) -> None:
             loop.cart.port.arm("drop", loss)
         loop.cart.chain.position_input.goal(Pose(0.3, 0.1, 0.5))
         loop.run_to(6_000_000)
-        ends.append((loop.cart.truth, loop.cart.chain.odometry.pose, loop.cart.base.read("served")))
+        ends.append(
+            (loop.cart.true_pose, loop.cart.chain.odometry.pose, loop.cart.base.read("served"))
+        )
     assert ends[0] == ends[1]

@@ -14,18 +14,17 @@ import pytest
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.omni_to_2wd import plan
-from tickrig.host.motion.control_laws import Limits
+from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.drive import drive, expect, start
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.least_time import least_time_s
-from tickrig.host.motion.motion_run import MotionRun
+from tickrig.host.motion.motion_run import MotionRun, least_time_s
 
 Points = tuple[Pose, ...]
 GOAL: Points = (Pose(1.0, 0.5, pi / 2),)
 LINES: Points = (Pose(2.0), Pose(2.0, 2.0), Pose(0.0, 2.0), Pose())
 """A square of 2 m back to the start, with its headings along the legs."""
 
-LIMITS = Limits(v=1.0, w=0.3, dv=0.006, dw=0.1)
+LIMITS = VelocityLimits(v=1.0, w=0.3, dv=0.006, dw=0.1)
 EXCHANGE_BYTES = 59
 """Of the request and the answer of a period."""
 

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.motion.dead_reckoning import moved, twist_of, wheel_speeds
-from tickrig.host.motion.geometry import Pose, Twist, wrap
+from tickrig.host.motion.geometry import Pose, Twist, moved, twist_of, wheel_speeds, wrap
 
 TREAD, RADIUS = 0.464, 0.0995
 ways = st.floats(-2.0, 2.0)

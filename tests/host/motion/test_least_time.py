@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.least_time import MotionLimits, least_time_s, way_time_s
+from tickrig.host.motion.motion_run import MotionLimits, least_time_s, way_time_s
 
 SQUARE = [Pose(4, 0), Pose(4, 4), Pose(0, 4), Pose(0, 0)]
 

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.motion.control_laws import Limits, steps
+from tickrig.host.motion.control_laws import VelocityLimits, steps
 from tickrig.host.motion.geometry import Twist
 
-LIMITS = Limits(v=1.0, w=0.3, dv=0.006, dw=0.1)
+LIMITS = VelocityLimits(v=1.0, w=0.3, dv=0.006, dw=0.1)
 speeds = st.floats(-1e3, 1e3)
 
 

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.motion.control_laws import Limits
+from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Pose, Twist
 from tickrig.host.motion.motion_run import MotionRun, Sample
 
 LINE = Pose(2.0, 0.0, 0.0)
-LIMITS = Limits(0.3, 0.3, 0.006, 0.1)
+LIMITS = VelocityLimits(0.3, 0.3, 0.006, 0.1)
 
 
 def run(*samples: Sample) -> MotionRun:

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.motion.control_laws import Limits, ReferenceSpin, TimeOptimalSpin
+from tickrig.host.motion.control_laws import ReferenceSpin, TimeOptimalSpin, VelocityLimits
 from tickrig.host.motion.geometry import Twist, wrap
 
 H, LATENCY = 0.02, 0.03
-LIMITS = Limits(1.0, 0.3, 0.006, 0.1)
+LIMITS = VelocityLimits(1.0, 0.3, 0.006, 0.1)
 REFERENCE, OPTIMAL = ReferenceSpin(5.0), TimeOptimalSpin(2.5, H, LATENCY)
 
 

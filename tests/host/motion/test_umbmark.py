@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.motion.dead_reckoning import Wheels, moved
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.geometry import Pose, Wheels, moved
 from tickrig.host.motion.umbmark import Error, Umbmark, square
 
 SIDE_M = 4.0

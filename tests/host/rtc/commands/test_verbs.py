@@ -14,9 +14,8 @@ from tests.host.rtc.commands.served import Served
 from tests.host.rtc.spy import ERROR
 from tickrig.emulators.commands.cli import main
 from tickrig.host.rtc import Provider, ServicePort
-from tickrig.host.rtc.system.compare import differences
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system.system import System, describe
+from tickrig.host.rtc.system.system import System, describe, differences
 from tickrig.host.rtc.system.system_toml import parse_toml
 
 
