@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.panels.tabs import make_panels
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.cli.can_options import BusOptions
@@ -29,7 +29,7 @@ async def _draw(log: str, keys: Sequence[str]) -> str:
     session = open_session([log], BusOptions(), Model())
     while not session.model.ended:
         session.step()
-    monitor = Monitor(session, [panel(session) for panel in PANELS])
+    monitor = Monitor(session, make_panels(session, print))
     async with monitor.run_test(size=SIZE) as pilot:
         await pilot.press(*keys)
         monitor.look()

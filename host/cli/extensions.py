@@ -97,6 +97,6 @@ class ExtensionGroup(Generic[T]):
             raise ExtensionError(f"{place} ({path}): {explain_error(error)}") from error
         if not self.accepts(found):
             raise ExtensionError(f"{place} ({path}) is not {self.wanted}")
-        if (name := getattr(found, "name", None)) is not None and repr(name) not in place:
+        if isinstance(name := getattr(found, "name", None), str) and repr(name) not in place:
             raise ExtensionError(f"{place} ({path}) calls itself {name!r}")
         return found

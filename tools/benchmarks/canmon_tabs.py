@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.table import RUNS, percentiles, row
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
@@ -32,6 +32,8 @@ SETTINGS = {
         "rules": {"no_emcy": True, "nodes": [5], "max_load": 60, "heartbeat": {"5": "100ms±20%"}}
     },
 }
+
+PANELS = tuple(map(TABS.load, TABS.built_in))
 
 
 class Frames:

@@ -12,6 +12,7 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
@@ -52,6 +53,7 @@ rule_options: Final[Decorator] = add_options(
         "--max-gap", multiple=True, metavar="CAN-ID=TIME", help="Comes again, as 181=20ms."
     ),
     click.option("--known", multiple=True, metavar="CAN-IDS", help="No others, as 080,181-18F."),
+    click.option("--rule", multiple=True, metavar="NAME", help="One of an installed package."),
 )
 """Add a rule each as an option."""
 
@@ -69,7 +71,7 @@ def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
     if options.get("max_load") is not None:  # 0 is a limit, too
         given["max_load"] = options["max_load"]
     try:
-        rules = parse_rules(joined(words, given))
+        rules = parse_rules(joined(words, given), load_rule)
     except ValueError as error:
         raise Refused(str(error)) from None
     if rules == Rules(bit_rate=rules.bit_rate):
@@ -81,7 +83,7 @@ def _file(path: Path) -> RuleValues:
     """Read a file, and check it alone so that it is named if it is wrong."""
     try:
         words = tomllib.loads(path.read_text("utf-8"))
-        parse_rules(words)
+        parse_rules(words, load_rule)
     except OSError as error:
         refuse_path("rules", error)
     except ValueError as error:

@@ -64,11 +64,11 @@ def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
 
 def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
     """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
-    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - slow
+    from tickrig.host.canmon import extensions  # noqa: PLC0415 - slow
 
     objects = read_eds_files(eds)
     with refusing_dbc():
-        return Decoder(objects, dbc)
+        return extensions.make_decoder(objects, dbc)
 
 
 @contextmanager

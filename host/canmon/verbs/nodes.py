@@ -9,6 +9,7 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import listen, paint, patience_us, span_option
@@ -16,7 +17,6 @@ from tickrig.host.canmon.sources.source import explain_sources, open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.monitor.decode.board_text import board_json, render_board
-from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import Record
@@ -80,7 +80,7 @@ class NodesView:
     """
 
     def __init__(self, eds: dict[int, EdsObjects]) -> None:
-        self._decoder = Decoder(eds)
+        self._decoder = make_decoder(eds)
         self._board = NodeBoard(self._decoder, {node: found.name for node, found in eds.items()})
         self._watch = Stopwatch()
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.ending import until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence import steps
@@ -41,7 +41,7 @@ class Watch:
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
         self.eds = eds
-        self._decoder, self._latest = Decoder(eds), DecodedCondition()
+        self._decoder, self._latest = make_decoder(eds), DecodedCondition()
 
     def take(self, record: Record) -> None:
         """Decode a frame; conditions are asked about it next."""

@@ -20,6 +20,7 @@ from tickrig.host.canmon.verbs.decode_options import (
 )
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
@@ -81,7 +82,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
     try:
         with loading():
             from tickrig.host.canmon.tui.app import Monitor  # noqa: PLC0415 - an extra
-            from tickrig.host.canmon.tui.panels.panels import PANELS  # noqa: PLC0415
+            from tickrig.host.canmon.tui.panels.tabs import make_panels  # noqa: PLC0415
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
@@ -96,7 +97,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
             model = Model(objects, setup.dbc, setup.options.bitrate)
         session = open_session(setup.source, setup.options, model)
         try:
-            panels = [panel(session) for panel in PANELS]
+            panels = make_panels(session, say)
             bench = PanelSettings(workspace, setup, panels)
             bench.load()
         except BaseException:

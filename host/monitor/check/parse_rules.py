@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
+from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
@@ -14,9 +15,11 @@ from tickrig.host.text.values import parse_time_us
 RuleValues = Mapping[str, object]
 """Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
 
+LoadRule = Callable[[str], Callable[[], Rule]]
+
 SWITCHES: Final = ("no_emcy", "no_sdo_abort", "no_error_frames", "no_reboot", "no_loss")
 NUMBERS: Final = ("max_load", "bitrate")
-LISTS: Final = ("heartbeat", "nodes", "max_gap", "known")
+LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
 VALUES: Final = (*NUMBERS, *LISTS)
 
 _HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
@@ -24,8 +27,16 @@ _MAX_NODE: Final = 127
 _MAX_IDENTS: Final = 1 << 16
 
 
-def parse_rules(words: RuleValues) -> Rules:
+def _no_rule(name: str) -> Callable[[], Rule]:
+    raise ValueError(f"no rule {name!r}")
+
+
+def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
     """Read rules.
+
+    Args:
+        words: the rules.
+        load_rule: returns what makes a rule of another package, by its name under `rule`.
 
     Raises:
         ValueError: one that is not known, or not like it must be.
@@ -49,6 +60,7 @@ def parse_rules(words: RuleValues) -> Rules:
         nodes=tuple(sorted(nodes)),
         max_gaps=tuple((parse_ident(ident), _time_us(time)) for ident, _, time in gaps),
         known=frozenset(idents) if "known" in words else None,
+        others=tuple(map(load_rule, _lists("rule", words))),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -41,6 +42,7 @@ class Rules:
         nodes: nodes that must be heard.
         max_gaps: identifiers and the longest gap of each, microseconds.
         known: all identifiers that may come, None for any.
+        others: what makes further rules, those of installed packages.
     """
 
     max_load: float | None = None
@@ -54,6 +56,7 @@ class Rules:
     nodes: tuple[int, ...] = ()
     max_gaps: tuple[tuple[int, int], ...] = ()
     known: frozenset[int] | None = None
+    others: tuple[Callable[[], Rule], ...] = ()
 
     def names(self) -> list[str]:
         """Return the names of all rules, for a report."""
@@ -71,6 +74,7 @@ class Rules:
         made += [NodesPresent(self.nodes)] * bool(self.nodes)
         made += [MaxGap(*gap) for gap in self.max_gaps]
         made += [KnownIds(self.known)] if self.known is not None else []
+        made += [make() for make in self.others]
         return made
 
     def load(self, bit_rate: int | None) -> MaxLoad | None:

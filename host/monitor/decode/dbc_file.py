@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.decode.decoded import DBC, Decoded, Signal
-from tickrig.wire.can import CanFrame
+from tickrig.host.monitor.frames.record import Record
+from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.canopen.datatypes import Value
 
 if TYPE_CHECKING:
@@ -50,8 +51,11 @@ class DbcFile:
             for ident, message in self._messages.items()
         }
 
-    def decode(self, frame: CanFrame) -> Decoded | None:
+    def decode(self, record: Record) -> Decoded | None:
         """Return the signals of a frame; None where the file does not name its CAN-ID."""
+        frame = record.frame
+        if isinstance(frame, ErrorFrame):
+            return None
         ident = frame.can_id, frame.extended
         message = self._messages.get(ident)
         if message is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Protocol
 
 from tickrig.host.monitor.decode.bus_decoder import BusDecoder
 from tickrig.host.monitor.decode.dbc_file import DbcFile
@@ -19,12 +19,21 @@ from tickrig.wire.can_error import ErrorFrame
 NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
 
 
+class FrameDecoder(Protocol):
+    """Decodes frames that neither the standard nor a DBC file describes."""
+
+    def decode(self, record: Record) -> Decoded | None:
+        """Return what a frame says; None for a frame of others."""
+        ...
+
+
 class Decoder:
     """Decodes what was heard, in order; each bus has its own nodes.
 
     Args:
         eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus.
         dbc: DBC files; the CAN-IDs that they name mean nothing else.
+        first: asked before anything else what a frame says.
 
     Raises:
         OSError: a file cannot be read.
@@ -33,13 +42,16 @@ class Decoder:
     """
 
     def __init__(
-        self, eds: Mapping[int, Path | EdsObjects] = NO_EDS, dbc: Sequence[Path] = ()
+        self,
+        eds: Mapping[int, Path | EdsObjects] = NO_EDS,
+        dbc: Sequence[Path] = (),
+        first: Sequence[FrameDecoder] = (),
     ) -> None:
         self._eds = {
             node: read_eds_objects(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
-        self._dbc = tuple(DbcFile(path) for path in dbc)
+        self._first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
         self._buses: dict[str, BusDecoder] = {}
 
     def take(self, record: Record) -> Decoded:
@@ -47,8 +59,8 @@ class Decoder:
         frame = record.frame
         if isinstance(frame, ErrorFrame):
             return decode_error(frame)
-        for file in self._dbc:
-            decoded = file.decode(frame)
+        for decoder in self._first:
+            decoded = decoder.decode(record)
             if decoded is not None:
                 return decoded
         if frame.extended:

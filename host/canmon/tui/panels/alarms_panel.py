@@ -10,6 +10,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Static, TextArea
 
+from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
@@ -135,7 +136,7 @@ class AlarmsPanel(Panel):
         if not isinstance(words, Mapping):
             raise SettingError(("rules",), "is no table of rules")
         with below("rules"):
-            self.held.hold(parse_rules(words))
+            self.held.hold(parse_rules(words, load_rule))
         self.rules_text = rules_toml(words)
 
     def save(self) -> dict[str, Any]:
@@ -163,7 +164,7 @@ class AlarmsPanel(Panel):
         if not area.display:
             return
         try:
-            rules = parse_rules(tomllib.loads(area.text))
+            rules = parse_rules(tomllib.loads(area.text), load_rule)
             with self.session.lock:
                 self.held.hold(rules)
         except ValueError as error:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import AnyRecord, Record
@@ -46,7 +46,7 @@ class Model:
         bit_rate: int | None = None,
     ) -> None:
         self.eds = dict(eds or {})
-        self.decoder = Decoder(self.eds, dbc)
+        self.decoder = make_decoder(self.eds, dbc)
         self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
         self.top = TopModel(bit_rate)
         self.trace = Trace()

@@ -22,7 +22,7 @@ from tests.host.canmon.tui.pilot import (
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
 from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.panels import PANELS
+from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.tasks.model import Meant, Model
@@ -34,6 +34,8 @@ from tickrig.host.tui.key_footer import KeyFooter
 from tickrig.host.tui.line_view import line_text
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
+
+PANELS = tuple(map(TABS.load, TABS.built_in))
 
 
 @pytest.fixture

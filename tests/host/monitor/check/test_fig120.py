@@ -13,10 +13,25 @@ from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
 from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.frame_rules import FrameRule
 from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rule import Finding
+from tickrig.host.monitor.frames.ident import EXTENDED
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
+
+
+class NoExtended(FrameRule):
+    """A rule of another package."""
+
+    name = "no-extended"
+
+    def wants(self, ident: int, /) -> bool:
+        return bool(ident & EXTENDED)
+
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
+        return "an extended identifier"
+
 
 RULES = parse_rules(
     {
@@ -31,7 +46,9 @@ RULES = parse_rules(
         "nodes": f"{PALETTE},{MOTOR}",
         "max_gap": f"{LINK:03X}=51ms",
         "known": "000,190,290,2A0,390,590,5A0,610,620,710,720",
-    }
+        "rule": "no-extended",
+    },
+    {"no-extended": NoExtended}.__getitem__,
 )
 S = 1_000_000
 

@@ -1,0 +1,116 @@
+"""What installed packages add to `canmon`: decoders and check rules (docs/extending.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.refused import Refused
+from tickrig.host.text.user_file import explain_error
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.check.rule import FrameSelection, Rule
+    from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.decode.decoder import Decoder, FrameDecoder
+    from tickrig.host.monitor.decode.node_memory import EdsObjects
+    from tickrig.host.monitor.frames.record import Record
+
+T = TypeVar("T")
+
+DECODER: Final = ("decode",)
+RULE: Final = ("wants", "selection", "judge", "end")
+
+
+def _is_class_with(found: object, methods: Iterable[str]) -> bool:
+    return isinstance(found, type) and all(hasattr(found, name) for name in methods)
+
+
+DECODERS: Final = ExtensionGroup[Any](
+    "tickrig.decoders",
+    "decoder or rule",
+    {},
+    lambda found: _is_class_with(found, DECODER) or _is_class_with(found, RULE),
+    "a class with `decode`, nor a check rule",
+)
+
+
+def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
+    """Return a decoder that asks those of installed packages first.
+
+    Raises:
+        OSError: a DBC file cannot be read.
+        DbcError: it is malformed, or cantools is not there.
+    """
+    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - slow
+
+    made: list[FrameDecoder] = []
+    for name, found in DECODERS.load_foreign(say).items():
+        if _is_class_with(found, DECODER):
+            try:
+                made.append(_CheckedDecoder(name, found()))
+            except Exception as error:  # a foreign constructor may raise anything
+                say(f"decoder {name!r}: {explain_error(error)}")
+    return Decoder(eds, dbc, made)
+
+
+def load_rule(name: str) -> Callable[[], Rule]:
+    """Return what makes the check rule of an installed package.
+
+    Raises:
+        ExtensionError: there is none of this name, or it cannot be used.
+    """
+    found = DECODERS.load(name)
+    if not _is_class_with(found, RULE):
+        raise ExtensionError(f"{name!r} is a decoder, no rule")
+
+    def make() -> Rule:
+        return _CheckedRule(name, _called(name, found))
+
+    make()
+    return make
+
+
+class _CheckedDecoder:
+    """A foreign decoder, left out once it has raised."""
+
+    def __init__(self, name: str, decoder: FrameDecoder) -> None:
+        self._name, self._decoder, self._broken = name, decoder, False
+
+    def decode(self, record: Record) -> Decoded | None:
+        if self._broken:
+            return None
+        try:
+            return self._decoder.decode(record)
+        except Exception as error:  # a foreign decoder may raise anything
+            self._broken = True
+            say(f"decoder {self._name!r} is left out: {explain_error(error)}")
+            return None
+
+
+class _CheckedRule:
+    """A foreign rule; what it raises ends the command in one line."""
+
+    def __init__(self, name: str, rule: Rule) -> None:
+        self.name, self._rule = name, rule
+
+    def wants(self, ident: int, /) -> bool:
+        return bool(_called(self.name, self._rule.wants, ident))
+
+    def selection(self, ident: int, /) -> FrameSelection:
+        return _called(self.name, self._rule.selection, ident)
+
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
+        return _called(self.name, self._rule.judge, record, gap_us)
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        return _called(self.name, lambda: list(self._rule.end(latest_us, end_us)))
+
+
+def _called(name: str, call: Callable[..., T], *arguments: object) -> T:
+    try:
+        return call(*arguments)
+    except Exception as error:  # a foreign rule may raise anything
+        raise Refused(f"rule {name!r}: {explain_error(error)}") from error
