@@ -6,8 +6,7 @@ from pathlib import Path
 
 from tickrig import CanWire
 from tickrig.emulators.can.outside.host import CanHost  # internal
-from tickrig.emulators.canopen.bench import make_bench  # internal
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # internal
+from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
 from tickrig.emulators.canopen.rig_file import read_rig  # internal
 from tickrig.host.rtc_canopen.robots.beego import Beego  # internal
 from tickrig.host.rtc_canopen.robots.joystick import Joystick  # internal

@@ -12,8 +12,7 @@ from typing import Final
 
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes
+from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.session import EditorSession

@@ -66,3 +66,19 @@ class Transcript:
     def _hear(self, line: WireLine) -> None:
         if not self._sending and self._wanted(line):
             self.tell(line.at_us, line.mark, escape(line.data))
+
+
+class FrameTranscript(Transcript):
+    """Touches, watched outputs and missed expectations, without the frames.
+
+    Args:
+        emulator: what is watched.
+        write: takes the lines.
+    """
+
+    def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:
+        super().__init__(emulator, write, lambda line: False)
+
+    def send(self, now_us: int, data: bytes, shown: bytes) -> None:
+        """Send a frame; the log shows it when it has passed."""
+        self._emulator.send(now_us, data)

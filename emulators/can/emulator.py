@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.end import Accepted, CanEnd
-from tickrig.emulators.can.outside.bridge import CanBridge
-from tickrig.emulators.can.outside.without_echo import CountingPort
+from tickrig.emulators.can.outside.bridge import CanBridge, CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.record.trace import Mark

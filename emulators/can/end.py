@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from tickrig.device.core import Device
 from tickrig.device.twin import Copyable
-from tickrig.emulators.can.error_counters import ErrorCounters
+from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER

@@ -1,15 +1,91 @@
-"""The error counters of all nodes of a bus."""
+"""Fault confinement: the error counters of all nodes, and their return from bus-off."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from tickrig.emulators.can.error_counters import ErrorCounters
 from tickrig.wire.can_error import ErrorState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
+
+PASSIVE_LIMIT: Final = 128
+BUS_OFF_LIMIT: Final = 256
+TRANSMIT_ERROR: Final = 8
+BACK_FROM_PASSIVE: Final = 119
+"""REC after a good frame in a passive receiver; 119 to 127 is allowed."""
+
+
+class ErrorCounters:
+    """The two error counters of one node (ISO 11898-1, fault confinement).
+
+    Not emulated: the receiver's further 8 for a dominant bit after its error
+    flag, and the warning limit of 96, which is no state.
+
+    Attributes:
+        tec: transmit error counter.
+        rec: receive error counter.
+        state: error-active, error-passive or bus-off.
+    """
+
+    __slots__ = ("rec", "state", "tec")
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Become error-active with both counters at 0: power-on, or after bus-off."""
+        self.tec = self.rec = 0
+        self.state = ErrorState.ACTIVE
+
+    @property
+    def clean(self) -> bool:
+        """Whether a good frame would change nothing."""
+        return not (self.tec or self.rec)
+
+    def transmitted(self) -> None:
+        """Count a frame that went well."""
+        if self.tec:
+            self.tec -= 1
+            self._note()
+
+    def received(self) -> None:
+        """Count a frame that came well."""
+        if self.rec:
+            self.rec = (
+                min(self.rec - 1, BACK_FROM_PASSIVE) if self._receiver_passive else self.rec - 1
+            )
+            self._note()
+
+    def transmit_failed(self) -> None:
+        """Count an error while transmitting."""
+        self.tec += TRANSMIT_ERROR
+        self._note()
+
+    def receive_failed(self) -> None:
+        """Count an error while receiving; a passive receiver's counter stays where it is."""
+        if not self._receiver_passive:
+            self.rec += 1
+            self._note()
+
+    def not_acknowledged(self) -> None:
+        """Count a frame that nobody acknowledged; it makes nobody bus-off (exception A)."""
+        if self.state is ErrorState.ACTIVE:
+            self.transmit_failed()
+
+    @property
+    def _receiver_passive(self) -> bool:
+        return self.rec >= PASSIVE_LIMIT
+
+    def _note(self) -> None:
+        if self.tec >= BUS_OFF_LIMIT:
+            self.state = ErrorState.BUS_OFF
+        elif self.tec >= PASSIVE_LIMIT or self._receiver_passive:
+            self.state = ErrorState.PASSIVE
+        else:
+            self.state = ErrorState.ACTIVE
 
 
 class FaultConfinement:
@@ -72,3 +148,59 @@ class FaultConfinement:
         """Forget an end that is no longer on the bus."""
         if end in self.marked:
             self.marked.remove(end)
+
+
+SEQUENCES: Final = 128
+SEQUENCE_BITS: Final = 11
+"""A node returns after 128 times 11 recessive bits in a row (ISO 11898-1, bus-off recovery)."""
+
+
+class Recovery:
+    """Counts, for each node that was asked to return, the sequences it has seen.
+
+    Args:
+        bit: length of a bit, in the units in which all times here are.
+
+    Attributes:
+        active: whether any node waits.
+    """
+
+    def __init__(self, bit: int) -> None:
+        self._sequence = SEQUENCE_BITS * bit
+        self._waiting: dict[int, tuple[CanEnd, int, int]] = {}  # end, sequences left, since
+        self.active = False
+
+    def begin(self, end: CanEnd, now: int) -> None:
+        """Let a node wait; asking twice changes nothing."""
+        self._waiting.setdefault(end.number, (end, SEQUENCES, now))
+        self.active = True
+
+    def leave(self, end: CanEnd) -> None:
+        """Let a node wait no longer."""
+        self._waiting.pop(end.number, None)
+        self.active = bool(self._waiting)
+
+    @property
+    def due(self) -> int:
+        """When the first node will be back if the bus stays recessive."""
+        return min(
+            (since + left * self._sequence for _, left, since in self._waiting.values()),
+            default=NEVER,
+        )
+
+    def interrupt(self, at: int, until: int) -> None:
+        """Count what was seen before a dominant bit `at`; the bus is recessive again at `until`."""
+        for number, (end, left, since) in self._waiting.items():
+            seen = max(0, at - since) // self._sequence
+            self._waiting[number] = (end, left - seen, max(since, until))
+
+    def take(self, now: int) -> list[CanEnd]:
+        """Take the nodes that are back by `now`."""
+        back = [
+            end
+            for end, left, since in self._waiting.values()
+            if since + left * self._sequence <= now
+        ]
+        for end in back:
+            self.leave(end)
+        return back

@@ -8,12 +8,9 @@ from math import gcd
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Cache, Listeners
-from tickrig.emulators.can.arbiter import CanArbiter
-from tickrig.emulators.can.error_counters import ErrorCounters
-from tickrig.emulators.can.fault_confinement import FaultConfinement
+from tickrig.emulators.can.arbitration import CanArbiter, dominant, first_difference
+from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
 from tickrig.emulators.can.faults import CanFaults, Verdict
-from tickrig.emulators.can.priority import dominant, first_difference
-from tickrig.emulators.can.recovery import Recovery
 from tickrig.emulators.can.routes import CanRoutes
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import INTERFRAME_BITS, frame_bits

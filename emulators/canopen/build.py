@@ -2,26 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.slave import UNCONFIGURED, ServiceMaker
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
+from tickrig.device.canopen.device_rtc.device import application_of as application_of_component
+from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
+from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can.emulator import CanEmulator
+from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.body.body_spec import BodySpec
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds.device_description import DeviceDescription
-from tickrig.emulators.canopen.eds.eds_cache import EdsCache
+from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.node import NODE_INPUTS, Node
 from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
+from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
-from tickrig.emulators.canopen.profiles import application_of
-from tickrig.emulators.canopen.rtc import describe_rtc
+from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.rig import Station
 from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.log import log_of
+from tickrig.host.text.user_file import explain_error, find_class
 from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.rtc_canopen.objects import device_info
+
+DEVICE_TYPE: Final = 0x1000
+
+PROFILES: Final[dict[str, ServiceMaker]] = {"none": Application, "401": Ds401, "402": Ds402}
+"""Device profiles by the number that the low word of 1000h holds."""
+
+
+def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
+    """Return a profile of `choices.PROFILES`; `auto` takes that of the device type, if it is there.
+
+    >>> application_of(Dictionary([])).__name__
+    'Application'
+    """
+    if profile == AUTO:
+        entry = dictionary.find(DEVICE_TYPE)
+        number = entry.number & 0xFFFF if entry else 0
+        return PROFILES.get(str(number), Application)
+    return PROFILES[profile]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,3 +149,79 @@ def _name(node_id: int, found: dict[str, Described]) -> str:
         return str(node_id)
     count = sum(item.node_id == UNCONFIGURED for item in found.values())
     return f"{LSS}{count + 1}" if count else LSS
+
+
+ANY_ID: Final = 1
+
+
+def describe_rtc(spec: str) -> DeviceDescription:
+    """Describe the component that `FILE.py:Class` stands for.
+
+    Raises:
+        ValueError: its file cannot be run, or it cannot be a DeviceRTC.
+    """
+    kind: type[CanopenComponent] = find_class(spec, CanopenComponent)
+    for item in kind.physical:
+        if item.name in NODE_INPUTS:
+            raise ValueError(f"{spec}: input {item.name!r} is one that every node has")
+    try:
+        make_device_rtc(kind, ANY_ID)
+    except Exception as error:  # a user's constructor may raise anything
+        raise ValueError(f"{spec}: {explain_error(error, spec.rpartition(':')[0])}") from None
+    return DeviceDescription(
+        spec,
+        device_info(kind.profile()),
+        make_dictionary(kind),
+        application=application_of_component(kind),
+    )
+
+
+NAME: Final = "canopen-slave"
+
+_logger = log_of(__name__)
+
+
+def make_bench(  # noqa: PLR0913 - options, by keyword
+    wire: CanWire,
+    nodes: Sequence[Node],
+    body: BodySpec | None = None,
+    *,
+    outside: CountingPort | None = None,
+    link: str = "",
+    trace: CandumpFile | None = None,
+    clock: Clock | None = None,
+) -> CanEmulator:
+    """Put nodes together with a body, the bus outside, if there are such, and a clock."""
+    bodies = [body.put_on(nodes)] if body else []
+    stations = [Station(node, node.port) for node in nodes]
+    return CanEmulator(
+        NAME,
+        Nodes(nodes, bodies),
+        stations,
+        wire,
+        couplings=bodies,
+        outside=outside,
+        clock=clock,
+        trace=trace,
+        link=link,
+    )
+
+
+def store_keeper(store: StoreFile) -> Callable[[int], None]:
+    """Return what writes the file whenever a node has stored something.
+
+    Where writing fails there is one warning, and it is tried again.
+    """
+    failed = False
+
+    def keep(now_us: int) -> None:
+        nonlocal failed
+        try:
+            store.save()
+            failed = False
+        except OSError as error:
+            if not failed:
+                _logger.warning("store %s: %s; the emulator goes on", store.path, error.strerror)
+            failed = True
+
+    return keep

@@ -113,9 +113,9 @@ def main(
     eval "$(_CANOPEN_SLAVE_EMU_COMPLETE=bash_source canopen-slave-emu)"
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.canopen import emulate  # noqa: PLC0415 - slow
+        from tickrig.emulators.canopen import run  # noqa: PLC0415 - slow
 
     if write_eds:
-        emulate.write_eds(options["model"], options["rtc"], write_eds)
+        run.write_eds(options["model"], options["rtc"], write_eds)
     else:
-        context.exit(emulate.emulate(node_id, nodes, rig, options))
+        context.exit(run.emulate(node_id, nodes, rig, options))

@@ -12,7 +12,7 @@ from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import application_of, make_dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
-from tickrig.emulators.canopen.eds.device_description import DeviceDescription
+from tickrig.emulators.canopen.eds import DeviceDescription
 from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
 
 VENDOR: Final = "tickrig"

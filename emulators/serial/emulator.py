@@ -8,7 +8,6 @@ from typing import Protocol
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
-from tickrig.emulators.record.tap import Tap
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter, WireLog
 from tickrig.emulators.rig.clock import Clock
@@ -16,9 +15,8 @@ from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.faults import FaultType, FaultyPort
 from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.serial.bridge import Bridge
+from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
-from tickrig.emulators.serial.host_end import HostEnd
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 

@@ -8,7 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.device.core import Device as Device
     from tickrig.emulators.can.wire import CanWire as CanWire
-    from tickrig.emulators.canopen.eds.eds import read_eds as read_eds
+    from tickrig.emulators.canopen.eds import read_eds as read_eds
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.rig import Rig as Rig
     from tickrig.emulators.rig.rig import Station as Station
@@ -24,7 +24,7 @@ else:
         {
             "tickrig.device.core": ("Device",),
             "tickrig.emulators.can.wire": ("CanWire",),
-            "tickrig.emulators.canopen.eds.eds": ("read_eds",),
+            "tickrig.emulators.canopen.eds": ("read_eds",),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
             "tickrig.emulators.rig.rig": ("Rig", "Station"),
             "tickrig.emulators.rig.sim_link": ("SimLink",),

@@ -12,7 +12,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.eds.eds_cache import EdsCache
+from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType

@@ -2,18 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final
 
 import can
 from can.broadcastmanager import CyclicSendTaskABC, ModifiableCyclicTaskABC
 from can.typechecking import CanFilters, Channel
 
-from tickrig.emulators.can.outside.channels import CHANNELS
 from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkError
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError
+
+
+class CanChannels:
+    """The buses that can be opened by name at present.
+
+    python-can opens a bus by two strings, so the names have to be kept where
+    the whole process finds them: in `CHANNELS`, the one place of this package
+    with state of its own. What is there was put there by `offer`, for the time
+    of a `with` block, and nothing is ever made up or left behind.
+
+    >>> with CHANNELS.offer("robot", Rig(), CanWire()):
+    ...     CHANNELS.names
+    ('robot',)
+    >>> CHANNELS.names
+    ()
+    """
+
+    def __init__(self) -> None:
+        self._channels: dict[str, tuple[Rig, CanWire]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that are offered."""
+        return tuple(self._channels)
+
+    @contextmanager
+    def offer(self, name: str, rig: Rig, wire: CanWire) -> Iterator[None]:
+        """Let a bus of a rig be opened under a name.
+
+        Raises:
+            ValueError: the name is offered already.
+        """
+        if name in self._channels:
+            raise ValueError(f"channel {name!r} is offered already")
+        self._channels[name] = (rig, wire)
+        try:
+            yield
+        finally:
+            del self._channels[name]
+
+    def open(self, name: str) -> CanHost:
+        """Connect one more host to a bus.
+
+        Raises:
+            KeyError: no bus is offered under this name.
+        """
+        rig, wire = self._channels[name]
+        return CanHost(rig, wire.end())
+
+
+CHANNELS: Final = CanChannels()
+"""The channels of the interface `tickrig`."""
 
 
 class TickrigBus(can.BusABC):

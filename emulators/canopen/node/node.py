@@ -12,8 +12,15 @@ from tickrig.device.physical import Output
 from tickrig.device.twin import Copyable
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node_inputs import Emergency, Quantity, Switch
-from tickrig.emulators.canopen.node.signals import ObjectSignal, Signal, find_object, object_name
+from tickrig.emulators.canopen.node.signals import (
+    Emergency,
+    ObjectSignal,
+    Quantity,
+    Signal,
+    Switch,
+    find_object,
+    object_name,
+)
 from tickrig.host.text.values import Setting
 from tickrig.wire.can import Frames
 from tickrig.wire.can_error import ErrorState

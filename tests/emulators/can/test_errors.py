@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
 from tickrig.emulators.can.end import CanEnd
-from tickrig.emulators.can.error_counters import ErrorCounters
+from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.can.wire import CanWire
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits

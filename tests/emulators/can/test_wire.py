@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames, some_frames
-from tickrig.emulators.can.priority import priority
+from tickrig.emulators.can.arbitration import priority
 from tickrig.emulators.can.wire import CanWire
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits

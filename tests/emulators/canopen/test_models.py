@@ -10,9 +10,8 @@ from canopen.objectdictionary import ODVariable, import_od
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.eds.eds import read_eds
+from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
+from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node.node import NODE_OUTPUTS
 from tickrig.emulators.canopen.node.node_spec import NodeSpec

@@ -12,7 +12,7 @@ from examples.device_rtc_gripper import Gripper
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.device_rtc.device import make_dictionary
 from tickrig.emulators.canopen.cli import main
-from tickrig.emulators.canopen.eds.eds import read_eds
+from tickrig.emulators.canopen.eds import read_eds
 
 ROOT = Path(__file__).parents[3]
 GRIPPER = "examples/device_rtc_gripper.py:Gripper"

@@ -18,12 +18,12 @@ from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.can.emulator import CanEmulator
-from tickrig.emulators.can.outside.channels import CHANNELS
 from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.eds.eds import read_eds
+from tickrig.emulators.canopen.build import make_bench
+from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.rig_clock import RigClock

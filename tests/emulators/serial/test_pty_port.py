@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 import serial
 
-from tickrig.emulators.record.tap import Tap
 from tickrig.emulators.record.trace import Mark
-from tickrig.emulators.serial.bridge import Bridge
+from tickrig.emulators.serial.bridge import Bridge, Tap
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER

@@ -13,8 +13,7 @@ from can.typechecking import CanFilters
 from tests.emulators.can.can_bench import Log, frames
 from tests.emulators.can.test_can_rig import Node
 from tests.emulators.sim_bench import eds
-from tickrig.emulators.can.outside.channels import CHANNELS
-from tickrig.emulators.can.outside.interface import TickrigBus
+from tickrig.emulators.can.outside.interface import CHANNELS, TickrigBus
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.links.can_message import to_frame, to_message

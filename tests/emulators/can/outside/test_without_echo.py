@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import frames
-from tickrig.emulators.can.outside.without_echo import ECHO_US, WithoutEcho
+from tickrig.emulators.can.outside.bridge import ECHO_US, WithoutEcho
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
-from tickrig.emulators.canopen.build import describe_nodes, make_nodes
+from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.emulators.canopen.rig_file import read_rig

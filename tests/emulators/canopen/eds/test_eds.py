@@ -6,8 +6,7 @@ import pytest
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.canopen.eds.device_description import DeviceDescription
-from tickrig.emulators.canopen.eds.eds import describe, read_eds
+from tickrig.emulators.canopen.eds import DeviceDescription, describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile

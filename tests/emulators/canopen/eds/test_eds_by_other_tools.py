@@ -11,8 +11,8 @@ from dcf.parse import parse_file
 
 from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.emulators.canopen.build import describe_rtc
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.rtc import describe_rtc
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.canopen.eds.eds_cache import EdsCache
+from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.wire.canopen.eds.eds_finding import EdsError
 
 TYPE = "[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\n"

@@ -15,8 +15,8 @@ from tickrig.emulators.bench.control import Control
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bench import make_bench
-from tickrig.emulators.canopen.eds.eds import read_eds
+from tickrig.emulators.canopen.build import make_bench
+from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.scenario.scenario import ScenarioParser
 

@@ -9,7 +9,7 @@ import can
 import pytest
 
 from tests.interop.buses import MULTICAST, PORT
-from tickrig.emulators.can.outside.channels import CHANNELS
+from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.errors import SourceFailed

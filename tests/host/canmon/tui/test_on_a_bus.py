@@ -5,7 +5,7 @@ from collections.abc import Callable
 from tests.host.canmon.tui.rig_session import EPOS, NODE
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.can.outside.channels import CHANNELS
+from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask

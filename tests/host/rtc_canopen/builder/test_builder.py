@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
-from tickrig.emulators.canopen.rtc import describe_rtc
+from tickrig.emulators.canopen.build import describe_rtc
 from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.names import COMPONENT_NAMES
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project

@@ -1,1 +1,0 @@
-"""Dictionaries out of EDS and DCF files."""
