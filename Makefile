@@ -2,11 +2,12 @@
 #   make test   lint, types, import contracts, wheel, tests, coverage
 #   make demo   an RRC on a pty, driven by the host client; CANopen: a potentiometer turns a motor;
 #               two PICs as RT components, one loses its power
+#   make docs   the API reference, made of the docstrings
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
 VENV   ?= .venv
 READY  := $(VENV)/.ready
 
-.PHONY: test demo bench clean
+.PHONY: test demo docs bench clean
 
 test: $(READY)
 	PATH="$(abspath $(VENV))/bin:$$PATH" tools/check
@@ -17,6 +18,10 @@ demo: $(READY)
 	$(VENV)/bin/tickrig demo fig120
 	@echo
 	$(VENV)/bin/tickrig demo rtc-lite
+
+docs: $(READY)
+	$(VENV)/bin/sphinx-build -W --keep-going -q docs build/docs
+	@echo build/docs/api/index.html
 
 bench: $(READY)
 	$(VENV)/bin/python tools/bench

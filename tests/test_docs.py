@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -11,8 +15,9 @@ from tests.host.live import live_rrc, pty
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.rrc.replies import RrcEvent
 
+PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.testing")
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "tests/hil/README.md"])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "tests/hil/README.md"])
 
 
 def blocks(page: str, language: str) -> list[str]:
@@ -63,3 +68,19 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
             assert (page.parent / target).exists(), f"{page.name} points to {target}"
     for named in re.findall(r"`(tests/[\w/]+\.py)`", text):
         assert (ROOT / named).exists(), f"{page.name} names {named}"
+
+
+def test_the_api_reference_is_made_without_warnings(tmp_path: Path) -> None:
+    process = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-W", "-q", str(ROOT / "docs"), str(tmp_path / "html")],
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (process.returncode, process.stderr) == (0, "")
+    for place in PLACES:
+        page = tmp_path / "html" / "api" / f"{place.rpartition('.')[2]}.html"
+        text = page.read_text("utf-8")
+        for name in import_module(place).__all__:
+            assert f'id="{place}.{name}"' in text

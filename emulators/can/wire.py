@@ -17,7 +17,7 @@ BABBLER: Final = -1  # number of the node that the fault `babble` adds
 
 
 class CanWire(Copyable):
-    r"""A classic CAN bus (ISO 11898-1) whose nodes are `CanEnd`s.
+    r"""A classic CAN bus (ISO 11898-1); each node has a `CanEnd`.
 
     A frame takes exactly the bits that it has, stuff bits included; it is
     received, and stamped, when its end of frame has passed. Among several that

@@ -21,11 +21,9 @@ MIN_RATE_HZ: Final = 1e-6
 class ExecutionContext:
     """Runs components period by period: three passes over all of them, in the order of adding.
 
-    | pass | what |
-    |---|---|
-    | pre | moves that were asked for: activate, deactivate, reset, abort |
-    | do | on_execute in Active, on_error in Error |
-    | post | on_state_update in Active |
+    - pre: moves that were asked for (activate, deactivate, reset, abort);
+    - do: on_execute in Active, on_error in Error;
+    - post: on_state_update in Active.
 
     Requests are checked when they are made, and take effect in the next
     period: nothing waits. Periods fall on the multiples of `period_us`.
