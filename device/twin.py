@@ -14,25 +14,12 @@ from enum import Enum
 from io import BytesIO
 from typing import Any, ClassVar, NoReturn, SupportsIndex, TypeVar
 
+from tickrig.wire.immutable import Immutable
+
+__all__ = ["Copyable", "Immutable", "Listeners", "NonCopyable", "twin"]
+
 T = TypeVar("T")
 K = TypeVar("K")
-
-
-class Immutable:
-    """A description that never changes once it is made, as that of a dictionary.
-
-    Copies within the process share it; a pickle has it by value.
-    """
-
-    __slots__ = ()
-
-    def __copy__(self: T) -> T:
-        """Return it itself."""
-        return self
-
-    def __deepcopy__(self: T, memo: dict[int, Any]) -> T:
-        """Return it itself."""
-        return self
 
 
 class Copyable:

@@ -22,8 +22,6 @@ GRAPH = imports()
 # Circles that are still to be opened: who opens one takes its line away.
 MODULE_CIRCLES: list[list[str]] = []
 ROOM_CIRCLES = {
-    "tickrig.device.canopen": "bus, pdo",
-    "tickrig.device.canopen.ds402": "modes, motion, objects, state",
 }
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.abort import SdoAbort, whole_number
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.pdo.pdo_parameters import whole_number
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, is_restricted
 from tickrig.wire.canopen.datatypes import Value
@@ -114,8 +113,11 @@ class Sync(Service):
         self._announce(data[0] if data else 0)
 
     def _announce(self, counter: int) -> None:
-        for told in self.node.on_sync:
-            told(counter)
+        node = self.node
+        for notify in node.sync_handlers:
+            notify(counter)
+        for notify in node.on_sync:
+            notify(counter)
 
     def _changed(self, entry: Entry) -> None:
         """Follow another COB-ID, period or overflow value."""

@@ -19,7 +19,7 @@ class Application(Service):
     called in the ticks that it asks for: by `request`, by `schedule`, when one
     of its watched objects has changed, and when a physical input was set. It
     hears of NMT states (`state_changed`), of resets (`start`), of lost masters
-    (`communication_error`) and, if it enters itself in `node.on_sync`, of each
+    (`communication_error`) and, if it enters itself in `node.sync_handlers`, of each
     SYNC; it tells errors by `node.emergency`.
 
     Attributes:

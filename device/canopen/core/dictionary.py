@@ -9,13 +9,14 @@ from typing import Final, Self
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.twin import Immutable
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
 
 
-class DictionaryDescription:
+class DictionaryDescription(Immutable):
     """What never changes in the dictionaries of one type of device; all its slaves share it.
 
     Args:
@@ -66,7 +67,8 @@ class Dictionary:
         by_multiplexer: entries that an SDO has named, by the three bytes that name them.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
-    >>> from tickrig.wire.canopen.eds.object_table import RW
+    >>> from tickrig.device.twin import Immutable
+    from tickrig.wire.canopen.eds.object_table import RW
     >>> dictionary = Dictionary([EntryDescription(0x2000, 0, "Gain", DataType.UNSIGNED8, RW)])
     >>> dictionary[0x2000, 0].value = 5
     >>> dictionary[0x2000, 0].value, dictionary.copy()[0x2000, 0].value

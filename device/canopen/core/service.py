@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self
 
-from tickrig.device.twin import NonCopyable
+from tickrig.device.twin import Copyable
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
@@ -20,7 +20,7 @@ ALIVE = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 
 
-class Service(NonCopyable):
+class Service(Copyable):
     """One communication service: SDO server, PDOs, SYNC, ...
 
     A service finds its objects in the dictionary when it is made and hangs its

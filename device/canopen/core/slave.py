@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
-from tickrig.device.twin import NonCopyable
+from tickrig.device.twin import Copyable, Listeners
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
@@ -28,7 +28,7 @@ _can_id = itemgetter(0)
 ServiceMaker = Callable[["CanopenSlave", int], Service]
 
 
-class CanopenSlave(NonCopyable):
+class CanopenSlave(Copyable):
     """A `Device[Frames]` that is a CANopen slave (CiA 301).
 
     Frames of a tick are handled in the order in which they came over the wire.
@@ -57,11 +57,14 @@ class CanopenSlave(NonCopyable):
         on_accepts: called when these two have changed.
         time_of_day: the latest TIME stamp that was received, None before the first.
         silent_until_us: nothing is sent before; LSS switches the bit rate.
-        on_state: told of each change of the NMT state, old and new.
-        on_sync: told the counter of each SYNC, 0 if it has none: RPDOs, TPDOs, then others.
-        on_bit_rate: told the bit rate in bit/s that LSS has switched to.
-        boots: asked at the end of Initialising whether the node boots or stays there.
-        admits: asked before each NMT command whether it is carried out.
+        on_state: called with the old and the new state on each change of the NMT state.
+        on_sync: called with the counter of each SYNC, 0 if it has none.
+        on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
+        sync_handlers: the same as `on_sync`, for what belongs to the slave: RPDOs, TPDOs, then
+            the application.
+        boots: returns at the end of Initialising whether the node boots or stays there.
+        admits: returns before each NMT command whether it is carried out.
+        entered: called as `on_state`, before it; what belongs to the slave.
     """
 
     def __init__(
@@ -76,11 +79,13 @@ class CanopenSlave(NonCopyable):
         self.dictionary, self.nonvolatile = dictionary, nonvolatile or Nonvolatile()
         self.configured_id = self.pending_id = node_id
         self.node_id, self.state, self.now_us = node_id, NmtState.INITIALISING, 0
-        self.on_state: list[Callable[[NmtState, NmtState], None]] = []
-        self.on_sync: list[Callable[[int], None]] = []
-        self.on_bit_rate: list[Callable[[int], None]] = []
+        self.on_state: Listeners[Callable[[NmtState, NmtState], None]] = Listeners()
+        self.on_sync: Listeners[Callable[[int], None]] = Listeners()
+        self.on_bit_rate: Listeners[Callable[[int], None]] = Listeners()
+        self.sync_handlers: list[Callable[[int], None]] = []
         self.boots: Callable[[], bool] = _boots
         self.admits: Callable[[NmtCommand], bool] = _admits
+        self.entered: Callable[[NmtState, NmtState], None] | None = None
         self.time_of_day: TimeOfDay | None = None
         self.silent_until_us = 0
         self._powered = False
@@ -160,13 +165,13 @@ class CanopenSlave(NonCopyable):
             service.communication_error()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Tell what the CAN controller reports; for the one that owns the controller."""
+        """Take what the CAN controller reports; for the one that owns the controller."""
         if self._powered:
             for service in self.services:
                 service.bus_state(state)
 
     def overrun(self) -> None:
-        """Tell that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
+        """Report that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
         self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
         self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
@@ -194,8 +199,8 @@ class CanopenSlave(NonCopyable):
 
     def _listen_to(self, accepts: frozenset[int] | None) -> None:
         self.accepts = accepts
-        for told in self.on_accepts:
-            told()
+        for notify in self.on_accepts:
+            notify()
 
     def enter(self, state: NmtState) -> None:
         """Change the NMT state; services and application hear of it."""
@@ -205,8 +210,10 @@ class CanopenSlave(NonCopyable):
         self.rewire()
         for service in self.services:
             service.state_changed(old, state)
-        for told in self.on_state:
-            told(old, state)
+        if self.entered is not None:
+            self.entered(old, state)
+        for notify in self.on_state:
+            notify(old, state)
 
     def reset_node(self) -> None:
         """Reset application and communication: every object has its power-on value again."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort, CanopenPort
 from tickrig.device.declared import declared
 from tickrig.device.physical import Input, QuantityBank
-from tickrig.device.twin import NonCopyable
+from tickrig.device.twin import Copyable
 from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
@@ -32,7 +32,7 @@ Result = ReturnCode | None
 """What a callback returns; nothing means that all went well."""
 
 
-class CanopenComponent(NonCopyable):
+class CanopenComponent(Copyable):
     """A component on a CANopen device; a subclass says what it is and does.
 
     Ports are declared as attributes of the class; each component has its own, with

@@ -46,8 +46,8 @@ class DeviceRtc(Application):
         self.life = CanopenLifeCycle(node, self._make)
         self.outputs = outputs_of(self.life.component)
         self._timer = Timer(kind.rate_hz)
-        node.on_state.append(self._moved)
         node.boots, node.admits = self.life.boots, self.life.admits
+        node.entered = self._moved
 
     def read(self, name: str) -> float | str:
         """Return the present value of a physical output."""

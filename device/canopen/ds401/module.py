@@ -74,7 +74,7 @@ class Ds401(Application):
         self._faults = self._make_faults()
         self._lines = terminals.digital_input_names(self._digital_inputs.lines)
         self._terminals = terminals.outputs(self._digital_outputs, self._analogue_outputs)
-        self.outputs = {name: item for name, (item, _) in self._terminals.items()}
+        self.outputs = {name: terminal.output for name, terminal in self._terminals.items()}
         self._has_physical_inputs()
         self._watch_objects()
 
@@ -109,7 +109,7 @@ class Ds401(Application):
 
     def read(self, name: str) -> float:
         """Return the present value of a physical output; KeyError if there is none."""
-        return self._terminals[name][1]()
+        return self._terminals[name].level
 
     def on_execute(self, now_us: int) -> None:
         """Look for faults, read inputs, tell events, put outputs out."""

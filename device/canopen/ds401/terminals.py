@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Final
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
 
 from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
 from tickrig.device.canopen.ds401.digital_outputs import DigitalOutputs
@@ -11,7 +11,22 @@ from tickrig.device.physical import Input, Output
 
 GROUP_LINES: Final = 8
 
-Terminal = tuple[Output, Callable[[], float]]
+
+class DigitalTerminal(NamedTuple):
+    """One digital output, or all of them."""
+
+    output: Output
+    outputs: DigitalOutputs
+    shift: int
+    mask: int
+
+    @property
+    def level(self) -> int:
+        """The lines as a number."""
+        return self.outputs.level >> self.shift & self.mask
+
+
+Terminal = DigitalTerminal | AnalogueOutput
 
 
 def digital_input_names(lines: int) -> tuple[str, ...]:
@@ -35,19 +50,13 @@ def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def outputs(digital: DigitalOutputs, analogue: Iterable[AnalogueOutput]) -> dict[str, Terminal]:
-    """Return the outputs by name, each with what reads it: `do1`.., `do` and `ao1`.."""
-    found = [_line(digital, line) for line in range(1, digital.lines + 1)]
+    """Return the outputs by name: `do1`.., `do` and `ao1`.."""
+    found: list[Terminal] = [
+        DigitalTerminal(Output(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
+        for line in range(1, digital.lines + 1)
+    ]
     if found:
         everything = Output("do", "all digital outputs as a number, output 1 is bit 0")
-        found.append((everything, lambda: digital.level))
-    found += (_channel(output) for output in analogue)
-    return {item.name: (item, read) for item, read in found}
-
-
-def _line(digital: DigitalOutputs, line: int) -> Terminal:
-    output = Output(f"do{line}", f"digital output {line}")
-    return output, lambda: digital.level >> line - 1 & 1
-
-
-def _channel(output: AnalogueOutput) -> Terminal:
-    return output.output, lambda: output.level
+        found.append(DigitalTerminal(everything, digital, 0, (1 << digital.lines) - 1))
+    found += analogue
+    return {terminal.output.name: terminal for terminal in found}

@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
-from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402 import terminals
+from tickrig.device.canopen.ds402.actual_values import MEASURES, ActualValues, Measure
+from tickrig.device.canopen.ds402.allowed import guard_values
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
 from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.limits import Limits
 from tickrig.device.canopen.ds402.motion.motor import IdealMotor, Motor
-from tickrig.device.canopen.ds402.motion.reference import Control, Reference
-from tickrig.device.canopen.ds402.motion.stopping import Stopping
+from tickrig.device.canopen.ds402.motion.stopping import Ramp, Stopping
 from tickrig.device.canopen.ds402.motion.switches import Switches
-from tickrig.device.canopen.ds402.objects import indices, terminals
-from tickrig.device.canopen.ds402.objects.allowed import guard_values
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.objects.error_codes import (
+    COMMUNICATION_ERRORS,
+    ErrorCode,
+    register_of,
+)
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import CONFIGURATION, Settings, read_settings
-from tickrig.device.canopen.ds402.objects.telling import MEASURES, Measure, Multiplexer, Telling
-from tickrig.device.canopen.ds402.state.automaton import Automaton
-from tickrig.device.canopen.ds402.state.connection import Connection
-from tickrig.device.canopen.ds402.state.fault_memory import FaultMemory
-from tickrig.device.canopen.ds402.state.faults import ErrorCode
-from tickrig.device.canopen.ds402.state.state import Controlword, DriveState, command_of
+from tickrig.device.canopen.ds402.objects.settings import CONFIGURATION, read_settings
+from tickrig.device.canopen.ds402.state.automaton import (
+    Automaton,
+    Controlword,
+    DriveState,
+    command_of,
+)
 from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
@@ -39,9 +46,19 @@ TARGETS: Final = (
     indices.INTERPOLATION_DATA,
 )
 
+MOVING: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+"""States in which a lost connection matters."""
 
 COOLING_US: Final = 1_000_000
 """Period in which a drive at rest looks at its temperature."""
+
+
+class AbortConnection(IntEnum):
+    """What a lost connection does (6007h); other values do nothing."""
+
+    FAULT = 1
+    DISABLE_VOLTAGE = 2
+    QUICK_STOP = 3
 
 
 class Ds402(Application):
@@ -50,7 +67,9 @@ class Ds402(Application):
     The controlword acts when it changes; from Ready to switch on, Enable operation
     leads through Switched on at once. A lost connection and NMT Stop act as 6007h
     says while the motor has power. A mode that the drive has not is refused with
-    0609 0030h. Without a servo, the motor is an ideal one.
+    0609 0030h. Without a servo, the motor is an ideal one. A pressed limit switch, and a
+    software limit that could not be kept otherwise, stop the motor with the quick stop
+    deceleration; it can be moved back.
 
     Not emulated: a brake, the velocity mode 2 of frequency converters, touch probes.
 
@@ -61,37 +80,28 @@ class Ds402(Application):
 
     Attributes:
         modes: the modes that the drive has, by number.
-        measures: what its objects tell.
+        measures: what its objects show, by index.
         bounds: what it takes for sound.
-        encoder_error: what it calls a pulled encoder.
+        encoder_error: error code of a pulled encoder.
         limits_are_faults: the end of the way is a fault, not just a stop.
         more_targets: objects of a maker whose change is a new target.
-        settings: the present configuration.
-        axis: motor, reference and zero.
-        faults: those since the last reset.
-        connection: the way to the master.
-        control: the loop that the motor works with in this tick.
-        controlword: as it was written last.
+        axis: motor, reference, settings and zero.
+        switches: limit switches and home switch.
         mode: the mode of operation at work.
         mode_number: its number, as in 6061h.
-        fresh: a SYNC came or a target changed since the last step.
         limited: a limit cut something in this step (bit 11 of the statusword).
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = MODES
-    measures: ClassVar[Mapping[Multiplexer, Measure]] = MEASURES
+    measures: ClassVar[Mapping[int, Measure]] = MEASURES
     bounds: ClassVar[Bounds] = Bounds()
     encoder_error: ClassVar[ErrorCode] = ErrorCode.INCREMENTAL_SENSOR
     limits_are_faults: ClassVar[bool] = False
     more_targets: ClassVar[tuple[int, ...]] = ()
     outputs = terminals.OUTPUTS
 
-    settings: Settings
     axis: Axis
-    motor: Motor
-    reference: Reference
     switches: Switches
-    control: Control
     mode: Mode
     mode_number: int
 
@@ -99,37 +109,35 @@ class Ds402(Application):
         super().__init__(node, slot)
         self._servo = servo
         motor: Motor = servo or IdealMotor()
-        self.parameters = Parameters(node.dictionary)
-        listed = self.parameters.number(indices.SUPPORTED_MODES)
+        self.parameters = parameters = Parameters(node.dictionary)
+        listed = parameters.number(indices.SUPPORTED_MODES)
         self.offered = offered(self.modes, listed)
         self._supported = listed or supported(self.offered)
-        self.settings = read_settings(self.parameters, motor.counts_per_turn)
-        self.axis = Axis(motor, self.settings)
-        self.motor, self.reference, self.switches = motor, self.axis.reference, Switches()
-        self.automaton, self.stopping, self.limits = Automaton(self), Stopping(self), Limits(self)
-        self.supervision, self.telling = (
-            Supervision(self, self.bounds),
-            Telling(self, self.measures),
+        self.axis = Axis(motor, read_settings(parameters, motor.counts_per_turn))
+        self.switches, self.stopping = Switches(), Stopping(self.axis, parameters)
+        self.limits = Limits(self.axis, self.switches)
+        self._view = DriveView(
+            parameters=parameters,
+            axis=self.axis,
+            switches=self.switches,
+            limits=self.limits,
+            stopping=self.stopping,
         )
-        self.faults, self.connection = FaultMemory(self), Connection(self)
-        self.control, self.controlword = Control.POSITION, 0
-        self.mode, self.mode_number = Mode(self), 0
-        self.fresh = self.limited = False
-        self._stale = True
-        self._wired: tuple[ErrorCode, ...] = ()
-        self._winding_dc = 0
+        self.mode, self.mode_number = Mode(self._view), 0
+        self.automaton = Automaton(self.stopping, self._begin_mode)
+        self.supervision = Supervision(self.axis, self.bounds)
+        self.actual_values = ActualValues(node.dictionary, self.measures)
+        self.limited, self._stale, self._winding_dc = False, True, 0
+        self._faults: list[int] = []
+        self._lost: set[int] = set()
         plant = () if servo is None else terminals.PLANT_INPUTS
         self.has_inputs((*terminals.DRIVE_INPUTS, *plant))
-        self._listen()
-
-    def _listen(self) -> None:
-        parameters = self.parameters
         parameters.watch((indices.CONTROLWORD,), self._controlled)
         parameters.watch((indices.MODES_OF_OPERATION,), self._mode_written)
-        parameters.watch((*TARGETS, *self.more_targets), self._refresh)
-        parameters.watch(CONFIGURATION, self._outdate)
-        guard_values(self.node.dictionary, self.offered)
-        self.node.on_sync.append(self._sync)
+        parameters.watch((*TARGETS, *self.more_targets), self._target_written)
+        parameters.watch(CONFIGURATION, self._configuration_written)
+        guard_values(node.dictionary, self.offered)
+        node.sync_handlers.append(self._sync)
 
     @property
     def state(self) -> DriveState:
@@ -141,84 +149,48 @@ class Ds402(Application):
         """Whether it is in Operation enabled."""
         return self.automaton.state is DriveState.OPERATION_ENABLED
 
-    @property
-    def following_error(self) -> float:
-        """Counts from the motor to the reference."""
-        return self.reference.position - self.motor.counts
-
     def read(self, name: str) -> float | str:
         """Return a physical output."""
         return terminals.READ[name](self)
 
-    def target_velocity(self, offset: int = 0) -> float:
-        """Return 60FFh and an offset in counts per second, cut to the limits."""
-        settings = self.settings
-        wanted = self.parameters.number(indices.TARGET_VELOCITY) + offset
-        return self.limits.velocity(wanted * settings.units.per_velocity)
-
-    def target_current(self, offset: int = 0) -> float:
-        """Return 6071h and an offset in amperes, cut to the limits."""
-        per_mille = (self.parameters.number(indices.TARGET_TORQUE) + offset) * self.axis.forward
-        return self.limits.current(per_mille * self.settings.rated_current_a / 1_000)
-
-    def within(self, counts: float) -> float:
-        """Return a position in counts, cut to the software limits."""
-        return self.limits.position(counts)
-
     def fault(self, code: int) -> None:
-        """Have a fault with an emergency error code."""
-        self.faults.take(code)
-
-    def wired_faults(self) -> list[ErrorCode]:
-        """Return the faults that the electronics see; a short circuit needs power to be seen."""
-        if not self._wired:
-            return []
-        powered = self.automaton.powered
-        return [code for code in self._wired if powered or code is not ErrorCode.OVER_CURRENT]
-
-    def begin_mode(self) -> None:
-        """Begin the chosen mode anew."""
-        self.mode = self.modes[self.mode_number](self)
-        self.mode.enter()
-
-    def operate(self, now_us: int) -> bool:
-        """Make a step of the mode; say whether nothing is left to do."""
-        mode = self.mode
-        self.control = mode.control
-        step = mode.halt if mode.halts and mode.halted else mode.run
-        return self.limits.guard(step, now_us) if mode.minds_limits else step(now_us)
+        """Have a fault with an emergency error code; one that is there already is none."""
+        if code not in self._faults:
+            self._note(code)
+            self.node.emergency(code, register_of(code))
 
     def power_on(self) -> None:
         """Count from 0 on."""
-        self.motor.release()
-        self.axis.zero, self.axis.homed = float(self.motor.counts), False
+        axis = self.axis
+        axis.motor.release()
+        axis.zero, axis.homed = float(axis.motor.counts), False
 
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast."""
-        self.motor.release()
-        self.motor.step_to(now_us)
-        if self.inputs.changed:
-            self.inputs.changed = False
-            self._inputs_changed()
-        return NEVER if self.motor.resting else now_us + TICK_US
+        motor = self.axis.motor
+        motor.release()
+        motor.step_to(now_us)
+        self._follow_inputs()
+        return NEVER if motor.resting else now_us + TICK_US
 
     def start(self) -> None:
         """Switch off."""
-        self.faults.forget()
-        self.connection.lost.clear()
+        self._faults.clear()
+        self._lost.clear()
         self.automaton.restart()
-        self.controlword = self.parameters.number(indices.CONTROLWORD)
+        self._view.controlword = self.parameters.number(indices.CONTROLWORD)
         self.parameters.write(indices.SUPPORTED_MODES, self._supported)
         self._stale = True
         self._change_mode()
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
         """Remember that the connection is lost."""
-        self.connection.lose(code)
+        if code in COMMUNICATION_ERRORS:
+            self._lost.add(code)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
         """Remember that it is there again."""
-        self.connection.lost.discard(code)
+        self._lost.discard(code)
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Take NMT Stop for a lost connection."""
@@ -226,69 +198,122 @@ class Ds402(Application):
             self.communication_error()
 
     def communication_error(self) -> None:
-        """Act as 6007h says."""
-        self.connection.abort()
+        """Act as 6007h says, while the motor has power."""
+        if self.state not in MOVING:
+            return
+        match self.parameters.number(indices.ABORT_CONNECTION):
+            case AbortConnection.FAULT:
+                self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
+            case AbortConnection.DISABLE_VOLTAGE:
+                self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+            case AbortConnection.QUICK_STOP:
+                self.automaton.enter(DriveState.QUICK_STOP_ACTIVE)
+            case _:  # no action, or what a manufacturer might mean
+                return
+        self.request()
 
     def on_execute(self, now_us: int) -> None:
-        """Measure, watch, make a step, command the motor, tell."""
-        self.motor.step_to(now_us)
+        """Measure, watch, make a step, command the motor, show actual values."""
+        self.axis.motor.step_to(now_us)
         self._look()
-        for code in self.supervision.find(now_us):
+        for code in self.supervision.step(now_us, powered=self.automaton.powered):
             self.fault(code)
         self.limited = False
-        settled = self.automaton.run(now_us)
+        settled = self.automaton.run(self._operate, now_us)
         if self.automaton.powered:
-            self.axis.command(self.control)
+            self.axis.command()
         else:
             self.axis.release()
-        self.fresh = False
-        self.telling.tell()
+        self._view.fresh = False
+        self.actual_values.update(self)
         self._sleep(now_us, settled and not self.supervision.waiting)
+
+    def _note(self, code: int) -> None:
+        """Have a fault that the master knows already."""
+        self._faults.append(code)
+        self.parameters.write(indices.ERROR_CODE, code)
+        self.automaton.react(code)
+        self.request()
+
+    def _reset_faults(self) -> None:
+        """Leave Fault if no cause is there that has left a code: transition 15."""
+        present = self.supervision.present(powered=self.automaton.powered)
+        if not self._lost.union(present).isdisjoint(self._faults):
+            return
+        for code in self._faults:
+            self.node.emergency_clear(code)
+        self._faults.clear()
+        self.parameters.write(indices.ERROR_CODE, 0)
+        self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+
+    def _begin_mode(self, *, enabled: bool = False) -> None:
+        """Begin the chosen mode anew."""
+        self.mode = self.modes[self.mode_number](self._view)
+        self.mode.enter(enabled=enabled)
+
+    def _operate(self, now_us: int) -> bool:
+        """Run one control period of the mode, or brake if that leads beyond a limit."""
+        mode, axis = self.mode, self.axis
+        axis.control = mode.control
+        position, velocity = axis.reference.position, axis.reference.velocity
+        settled = mode.step(now_us)
+        self.limited = mode.limited
+        code = self.limits.reached() if mode.minds_limits else None
+        if code is None:
+            return settled
+        self.limited = True
+        axis.reference.place(position, velocity)
+        if self.limits_are_faults:
+            self.fault(code)
+        return self.stopping.brake(Ramp.QUICK_STOP)
 
     def _look(self) -> None:
         """Follow configuration, physical inputs and the shaft."""
         self._configure()
-        if self.inputs.changed:
-            self.inputs.changed = False
-            self._inputs_changed()
+        self._follow_inputs()
         if self.switches.by_angle:
-            self.switches.look(self.motor.shaft_deg)
+            self.switches.look(self.axis.motor.shaft_deg)
         self.axis.wrap()
 
     def _configure(self) -> None:
         if self._stale:
             self._stale = False
-            self.motor.step_to(self.node.now_us)
-            self.settings = read_settings(self.parameters, self.motor.counts_per_turn)
-            self.axis.configure(self.settings)
+            motor = self.axis.motor
+            motor.step_to(self.node.now_us)
+            self.axis.configure(read_settings(self.parameters, motor.counts_per_turn))
 
-    def _inputs_changed(self) -> None:
+    def _follow_inputs(self) -> None:
         inputs = self.inputs
+        if not inputs.changed:
+            return
+        inputs.changed = False
         self.switches.set(inputs)
         wired = (
             (terminals.SHORT_CIRCUIT, ErrorCode.OVER_CURRENT),
             (terminals.ENCODER_UNPLUGGED, self.encoder_error),
         )
-        self._wired = tuple(code for name, code in wired if inputs[name])
+        self.supervision.wired = tuple(code for name, code in wired if inputs[name])
         if self._servo is not None:
             terminals.load(self._servo, inputs)
 
     def _sleep(self, now_us: int, settled: bool) -> None:
         """Come back in the next tick, or each second while the winding cools, or never."""
-        if not (settled and self.motor.resting):
+        motor = self.axis.motor
+        if not (settled and motor.resting):
             self.schedule(now_us + TICK_US)
-        elif self._winding_dc != self.motor.winding_dc:
-            self._winding_dc = self.motor.winding_dc
+        elif self._winding_dc != motor.winding_dc:
+            self._winding_dc = motor.winding_dc
             self.schedule(now_us + COOLING_US)
 
     def _controlled(self, entry: Entry) -> None:
         """Obey a new controlword, with what was configured before it."""
         self._configure()
-        before, self.controlword = self.controlword, self.parameters.number(indices.CONTROLWORD)
-        rising, falling = self.controlword & ~before, before & ~self.controlword
-        command = command_of(self.controlword)
+        before = self._view.controlword
+        self._view.controlword = controlword = self.parameters.number(indices.CONTROLWORD)
+        rising, falling = controlword & ~before, before & ~controlword
+        command = command_of(controlword)
         if self.state is DriveState.FAULT and rising & Controlword.FAULT_RESET:
-            self.faults.reset((*self.supervision.present(), *self.connection.lost))
+            self._reset_faults()
         elif command is not None:
             self.automaton.obey(command)
         if self.enabled:
@@ -307,18 +332,18 @@ class Ds402(Application):
             self.mode_number = number
             self.parameters.write(indices.MODES_OF_OPERATION_DISPLAY, number)
             if self.enabled:
-                self.begin_mode()
+                self._begin_mode(enabled=True)
         self.request()
 
     def _sync(self, counter: int) -> None:
-        self.fresh = True
+        self._view.fresh = True
         if self.enabled:
             self.request()
 
-    def _refresh(self, entry: Entry) -> None:
-        self.fresh = True
+    def _target_written(self, entry: Entry) -> None:
+        self._view.fresh = True
         self.request()
 
-    def _outdate(self, entry: Entry) -> None:
+    def _configuration_written(self, entry: Entry) -> None:
         self._stale = True
         self.request()

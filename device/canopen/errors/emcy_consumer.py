@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.device.canopen.core.cob_id_rules import check_emcy_cob_id, is_valid
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.twin import Listeners
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.emcy import Emcy
@@ -33,7 +34,7 @@ class EmcyConsumer(Service):
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.latest: dict[int, Emcy] = {}
-        self.on_emcy: list[Callable[[int, Emcy], None]] = []
+        self.on_emcy: Listeners[Callable[[int, Emcy], None]] = Listeners()
         self._entries = [
             entry
             for node_id in range(1, MAX_NODES + 1)

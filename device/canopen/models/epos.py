@@ -11,12 +11,11 @@ from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.ds402.actual_values import MEASURES, Measure, statusword_of
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.ds402.modes import maxon, modes
 from tickrig.device.canopen.ds402.modes.mode import Mode
-from tickrig.device.canopen.ds402.objects.telling import MEASURES, Measure, Multiplexer
-from tickrig.device.canopen.ds402.state.faults import ErrorCode
-from tickrig.device.canopen.ds402.state.statusword import statusword_of
+from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
 from tickrig.device.canopen.ds402.state.supervision import Bounds
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
@@ -89,10 +88,10 @@ class Epos(Ds402):
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = {**modes.MODES, **maxon.MODES}
-    measures: ClassVar[Mapping[Multiplexer, Measure]] = {
+    measures: ClassVar[Mapping[int, Measure]] = {
         **MEASURES,
-        (0x6041, 0): lambda drive: statusword_of(drive) | 0x0100 | 0x8000 * drive.axis.homed,
-        (0x6078, 0): lambda drive: drive.motor.current_ma,
+        0x6041: lambda drive: statusword_of(drive) | 0x0100 | 0x8000 * drive.axis.homed,
+        0x6078: lambda drive: drive.axis.motor.current_ma,
     }
     bounds: ClassVar[Bounds] = Bounds(supply_mv=(10_000, 30_000))
     encoder_error = ErrorCode.POSITION_SENSOR

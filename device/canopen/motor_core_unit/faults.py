@@ -62,6 +62,14 @@ class Fault:
     gone: Callable[[Signs], bool]
     after_us: int = 0
 
+    def __reduce__(self) -> tuple[Callable[[str], Fault], tuple[str]]:
+        """Stand in a pickle by its name."""
+        return _fault, (self.name,)
+
+
+def _fault(name: str) -> Fault:
+    return next(fault for fault in FAULTS if fault.name == name)
+
 
 SUPPLY_MV: Final = (10_000, 66_000)
 """10 V (NEDO report, Table 6), and a tenth above its 60 V."""

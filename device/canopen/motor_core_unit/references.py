@@ -55,9 +55,9 @@ class References:
     def start(self) -> None:
         """Know of no failure."""
         self.failed = False
-        told = PdoConsumer.of(self._node).on_rpdo
-        if self._came not in told:
-            told.append(self._came)
+        listeners = PdoConsumer.of(self._node).on_rpdo
+        if self._came not in listeners:
+            listeners.append(self._came)
 
     @property
     def number(self) -> int:

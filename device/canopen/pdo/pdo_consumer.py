@@ -44,7 +44,7 @@ class PdoConsumer(Service):
         if window is not None:
             self._window_changed(window)
             window.watch(self._window_changed)
-        node.on_sync.append(self._sync)
+        node.sync_handlers.append(self._sync)
 
     @property
     def window_is_over(self) -> bool:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.abort import SdoAbort, whole_number
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.mpdo import DISPATCHING_LISTS, SCANNER_LISTS
 from tickrig.device.canopen.pdo.pdo_packing import Slot, total_bits
-from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, whole_number
+from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import (

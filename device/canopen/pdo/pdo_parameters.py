@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.abort import SdoAbort, whole_number
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry, OnEntry
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
@@ -128,13 +128,6 @@ class PdoParameters:
         can_id = cob_id & CAN_ID_MASK
         if is_restricted(can_id) or (self.valid and can_id != self.can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
-
-
-def whole_number(value: Value) -> int:
-    """Return a value that must be an integer; SdoAbort if the dictionary says otherwise."""
-    if not isinstance(value, int):
-        raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
-    return value
 
 
 def _absent(entry: Entry) -> bytes:

@@ -45,7 +45,7 @@ class PdoProducer(Service):
         self._timed: tuple[TpdoMode, ...] = ()
         self._counters: list[int] = []
         self._due_us = NEVER
-        node.on_sync.append(self._sync)
+        node.sync_handlers.append(self._sync)
 
     def request(self, number: int) -> None:
         """Let an event happen to a TPDO (254, 255: sent; 0: sent with the next SYNC)."""

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
-from tickrig.device.canopen.ds402.state.state import DriveState
+from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.sim_network import SimNetwork

@@ -8,6 +8,7 @@ from operator import attrgetter
 from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.immutable import Immutable
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
 """What a string or domain holds unless its description says less: all that SDO can carry."""
@@ -73,7 +74,7 @@ class ObjectDescription(NamedTuple):
     code: ObjectCode = ObjectCode.VAR
 
 
-class EntryDescription:
+class EntryDescription(Immutable):
     """What never changes of a variable, or of one element of an array or record (CiA 306).
 
     Args:

@@ -1,22 +1,78 @@
-"""Cyclic synchronous modes: a master gives a target with each SYNC (CiA 402-2)."""
+"""Position modes with a latched set-point, and cyclic synchronous velocity (CiA 402-2)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Final
+from abc import abstractmethod
+from typing import ClassVar, Final
 
-from tickrig.device.canopen.ds402.modes.mode import Mode
-from tickrig.device.canopen.ds402.modes.taken_target import TakenTarget
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.motion.reference import STEP_S, Control
+from tickrig.device.canopen.ds402.motion.stopping import Ramp
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.state.state import Statusword
-
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.ds402.state.automaton import Statusword
 
 STEP_US: Final = 1_000
 
 
-class CyclicPosition(TakenTarget):
+class LatchedSetPoint(Mode):
+    """Follows a set-point that is latched until somebody writes another one.
+
+    When it begins it brakes; meanwhile the object of the set-point shows the reference:
+    nothing moves before the master says so.
+
+    Attributes:
+        index: object of the target.
+        sub: its sub-index.
+        offset: object that is added to it, 0 for none.
+    """
+
+    halts = False
+    index: ClassVar[int]
+    sub: ClassVar[int] = 0
+    offset: ClassVar[int] = 0
+
+    def __init__(self, drive: DriveView) -> None:
+        super().__init__(drive)
+        self._latched: int | None = None
+
+    def enter(self, *, enabled: bool) -> None:
+        """Latch the present position."""
+        self._latch()
+
+    def run(self, now_us: int) -> bool:
+        """Brake, or follow."""
+        if self._latched is not None:
+            if self.number(self.index, self.sub) == self._latched:
+                return self._brake()
+            self._latched = None
+        return self.follow(now_us)
+
+    @abstractmethod
+    def follow(self, now_us: int) -> bool:
+        """Make a step towards the set-point; see `Mode.step`."""
+
+    def target(self) -> float:
+        """Return the target in counts, within the software limits."""
+        position = self.number(self.index, self.sub) + self._offset
+        return self.take(self.drive.limits.position(self.axis.counts_near(position)))
+
+    @property
+    def _offset(self) -> int:
+        return self.number(self.offset) if self.offset else 0
+
+    def _latch(self) -> None:
+        present = self.axis.position_of(self.reference.position)
+        self.drive.parameters.write(self.index, present - self._offset, self.sub)
+        self._latched = self.number(self.index, self.sub)
+
+    def _brake(self) -> bool:
+        deceleration = self.settings.deceleration
+        stands = self.reference.ramp(0.0, deceleration, deceleration)
+        self._latch()
+        return stands
+
+
+class CyclicPosition(LatchedSetPoint):
     """Goes to the target position within an interpolation period, on a straight line.
 
     A SYNC begins a line, and so does another target without SYNC. At the end of
@@ -25,11 +81,11 @@ class CyclicPosition(TakenTarget):
     Not emulated: extrapolation when SYNC is late; the torque offset.
     """
 
-    tells_following_error = True
+    shows_following_error = True
     index = indices.TARGET_POSITION
     offset = indices.POSITION_OFFSET
 
-    def __init__(self, drive: Ds402) -> None:
+    def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
         self.flags, self._left = Statusword.MODE_12, 0
         self._goal = self._ahead = 0.0
@@ -46,19 +102,59 @@ class CyclicPosition(TakenTarget):
         return False
 
     def _begin(self) -> None:
-        drive = self.drive
-        self._left = max(1, drive.settings.interpolation_us // STEP_US)
-        offset = drive.parameters.number(indices.VELOCITY_OFFSET)
-        self._goal, self._ahead = self.target(), offset * drive.settings.units.per_velocity
+        settings = self.settings
+        self._left = max(1, settings.interpolation_us // STEP_US)
+        offset = self.number(indices.VELOCITY_OFFSET)
+        self._goal, self._ahead = self.target(), offset * settings.units.per_velocity
 
     def _step(self) -> None:
-        drive, reference = self.drive, self.reference
-        velocity = (self._goal - reference.position) / (self._left * STEP_S)
-        most = drive.settings.max_velocity
-        if abs(velocity) > most:
-            velocity = most if velocity > 0 else -most
-            drive.limited = True
+        reference = self.reference
+        wanted = (self._goal - reference.position) / (self._left * STEP_S)
+        velocity = self.take(self.drive.limits.velocity(wanted))
         reference.place(reference.position + velocity * STEP_S, velocity + self._ahead)
+
+
+class InterpolatedPosition(CyclicPosition):
+    """Goes to the data record 60C1h:01 within an interpolation period, on a straight line.
+
+    It does so while bit 4 of the controlword is set; bit 12 of the statusword says
+    that it does. Otherwise it brakes with the profile deceleration. A SYNC begins
+    a line, and so does another record without SYNC. Bit 10: the line has ended.
+
+    Not emulated: a buffer of records (60C4h); sub-modes beside 0 (60C0h).
+    """
+
+    halts = True
+    shows_following_error = False
+    index = indices.INTERPOLATION_DATA
+    sub = 1
+    offset = 0
+
+    def __init__(self, drive: DriveView) -> None:
+        super().__init__(drive)
+        self._active = False
+
+    def start(self) -> None:
+        """Interpolate from now on."""
+        self._active = True
+
+    def stop(self) -> None:
+        """Interpolate no longer."""
+        self._active = False
+
+    def run(self, now_us: int) -> bool:
+        """Follow the line, or brake."""
+        if not self._active:
+            self._left, self.flags = 0, Statusword(0)
+            return self.drive.stopping.brake(Ramp.SLOW_DOWN)
+        settled = super().run(now_us)
+        self.flags = Statusword.MODE_12 | (Statusword.TARGET_REACHED if settled else 0)
+        return settled
+
+    def halt(self, now_us: int) -> bool:
+        """Brake as 605Dh says; the next record begins a line."""
+        self._left, self.flags = 0, self.flags & ~Statusword.MODE_12
+        return super().halt(now_us)
 
 
 class CyclicVelocity(Mode):
@@ -71,26 +167,25 @@ class CyclicVelocity(Mode):
     control: ClassVar[Control] = Control.VELOCITY
     halts = False
 
-    def __init__(self, drive: Ds402) -> None:
+    def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
         self._slope = 0.0
 
-    def enter(self) -> None:
+    def enter(self, *, enabled: bool) -> None:
         """Take the present velocity for the target, unless the drive is just being enabled."""
-        if self.drive.enabled:
+        if enabled:
             self.drive.parameters.write(indices.TARGET_VELOCITY, self._present)
 
     @property
     def _present(self) -> int:
-        drive = self.drive
-        velocity = round(self.reference.velocity / drive.settings.units.per_velocity)
-        return velocity - drive.parameters.number(indices.VELOCITY_OFFSET)
+        velocity = round(self.reference.velocity / self.settings.units.per_velocity)
+        return velocity - self.number(indices.VELOCITY_OFFSET)
 
     def run(self, now_us: int) -> bool:
         """Follow the ramp."""
-        drive, settings = self.drive, self.drive.settings
-        wanted = drive.target_velocity(drive.parameters.number(indices.VELOCITY_OFFSET))
-        if drive.fresh or not self._slope:
+        settings = self.settings
+        wanted = self.target_velocity(self.number(indices.VELOCITY_OFFSET))
+        if self.drive.fresh or not self._slope:
             away = abs(wanted - self.reference.velocity)
             self._slope = away * 1_000_000 / settings.interpolation_us or 1.0
         reached = self.reference.ramp(

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from tickrig.device.canopen.ds402.modes.homing_methods import METHODS, Switch
-from tickrig.device.canopen.ds402.modes.homing_search import HomingSearch, Phase
-from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.modes.homing_search import (
+    METHODS,
+    HomingMethod,
+    HomingSearch,
+    Phase,
+    Switch,
+)
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.profile_position import SLOWEST, STEEPEST
-from tickrig.device.canopen.ds402.motion.course import Course, began_us
-from tickrig.device.canopen.ds402.motion.trapezoid import Limits, Path, to_position, to_velocity
+from tickrig.device.canopen.ds402.motion.path_follower import PathFollower, began_us
+from tickrig.device.canopen.ds402.motion.trapezoid import Path, PathLimits, to_position, to_velocity
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.state.state import Statusword
-
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
-
-NO_METHOD: Final = METHODS[37]
-"""Stands for none: it looks for no switch and does not move."""
+from tickrig.device.canopen.ds402.state.automaton import Statusword
 
 
 class Stage(Enum):
@@ -55,26 +54,26 @@ class Homing(Mode):
 
     minds_limits = False
 
-    def __init__(self, drive: Ds402) -> None:
+    def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
-        self._course = Course(self.reference)
-        self._stage = Stage.ATTAINED if drive.axis.homed else Stage.IDLE
-        self._method, self._search = NO_METHOD, HomingSearch(NO_METHOD, Switch(0))
-        self._counts, self._velocity = drive.motor.counts, 0.0
+        self._path = PathFollower(self.reference)
+        self._stage = Stage.ATTAINED if self.axis.homed else Stage.IDLE
+        self._search: HomingSearch | None = None
+        self._counts, self._velocity = self.axis.motor.counts, 0.0
         self._home: float | None = None
 
     def start(self) -> None:
         """Begin a homing."""
-        method = METHODS.get(self.drive.parameters.number(indices.HOMING_METHOD))
-        self._counts, self._home = self.drive.motor.counts, None
-        self.drive.axis.homed = False
+        method = METHODS.get(self.number(indices.HOMING_METHOD))
+        self._counts, self._home = self.axis.motor.counts, None
+        self.axis.homed = False
         self._end(Stage.FAILED if method is None else Stage.SEARCHING)
-        self._method = method or NO_METHOD
-        self._search = HomingSearch(self._method, self._switches)
+        if method is not None:
+            self._search = HomingSearch(method, self._switches)
 
     def stop(self) -> None:
         """Interrupt a homing in progress."""
-        if self._stage is Stage.SEARCHING:
+        if self._search is not None:
             self._end(Stage.IDLE)
 
     def halt(self, now_us: int) -> bool:
@@ -85,53 +84,54 @@ class Homing(Mode):
 
     def run(self, now_us: int) -> bool:
         """Search; at the end brake, or go to the home position."""
-        if self._stage is Stage.SEARCHING:
-            self._look()
-        if self._stage is Stage.SEARCHING:
-            self._steer(began_us(now_us))
-        elif not self._course.kept:
-            self._course.begin(self._last_path(began_us(now_us)))
-        ended = self._course.follow(now_us) and self._stage is not Stage.SEARCHING
+        if self._search is not None:
+            self._look(self._search)
+        if self._search is not None:
+            self._steer(self._search, began_us(now_us))
+        elif not self._path.kept:
+            self._path.begin(self._last_path(began_us(now_us)))
+        ended = self._path.follow(now_us) and self._search is None
         self.flags = FLAGS[self._stage]
-        if ended and self.drive.axis.stands:
+        if ended and self.axis.stands:
             self.flags |= Statusword.TARGET_REACHED
         return ended
 
     def _end(self, stage: Stage) -> None:
-        self._stage = stage
-        self._course.leave()
+        self._stage, self._search = stage, None
+        self._path.leave()
 
-    def _look(self) -> None:
+    def _look(self, search: HomingSearch) -> None:
         """Look at switches and index pulse, and what follows from them."""
-        before, self._counts = self._counts, self.drive.motor.counts
-        pulse = index_pulse(before, self._counts, self.drive.motor.counts_per_turn)
-        search, velocity = self._search, self.reference.velocity * self.drive.axis.forward
+        before, self._counts = self._counts, self.axis.motor.counts
+        pulse = index_pulse(before, self._counts, self.axis.motor.counts_per_turn)
+        velocity = self.reference.velocity * self.axis.forward
         if not search.ended:
             moving, crawling = (velocity > 0) - (velocity < 0), abs(velocity) <= self._speeds[1]
             search.step(self._switches, moving, crawling=crawling, index=pulse is not None)
         if search.phase is Phase.FOUND:
-            self._attain(self._counts if pulse is None or not self._method.by_index else pulse)
+            method = search.method
+            self._attain(method, self._counts if pulse is None or not method.by_index else pulse)
         elif search.phase is Phase.FAILED:
             self._end(Stage.FAILED)
 
-    def _attain(self, counts: int) -> None:
-        """Call a place the home position."""
-        self.drive.axis.place_home(self.drive.parameters.number(indices.HOME_OFFSET), counts)
-        self._home = float(counts) if self._method.approach else None
+    def _attain(self, method: HomingMethod, counts: int) -> None:
+        """Take a place for the home position."""
+        self.axis.place_home(self.number(indices.HOME_OFFSET), counts)
+        self._home = float(counts) if method.approach else None
         self._end(Stage.ATTAINED)
 
-    def _steer(self, now_us: int) -> None:
+    def _steer(self, search: HomingSearch, now_us: int) -> None:
         """Go where the search wants to go."""
-        speed = self._speeds[self._search.slow]
-        wanted = self._search.direction * self.drive.axis.forward * speed
-        if wanted != self._velocity or not self._course.kept:
+        speed = self._speeds[search.slow]
+        wanted = search.direction * self.axis.forward * speed
+        if wanted != self._velocity or not self._path.kept:
             self._velocity = wanted
-            self._course.begin(to_velocity(now_us, self._course.motion, wanted, self._limits))
+            self._path.begin(to_velocity(now_us, self._path.motion, wanted, self._limits))
 
     def _last_path(self, now_us: int) -> Path:
         if self._home is None:
-            return to_velocity(now_us, self._course.motion, 0.0, self._limits)
-        return to_position(now_us, self._course.motion, self._home, self._limits)
+            return to_velocity(now_us, self._path.motion, 0.0, self._limits)
+        return to_position(now_us, self._path.motion, self._home, self._limits)
 
     @property
     def _switches(self) -> Switch:
@@ -140,14 +140,14 @@ class Homing(Mode):
     @property
     def _speeds(self) -> tuple[float, float]:
         """Counts per second in the search for a switch, and for the home position."""
-        settings = self.drive.settings
+        settings = self.settings
         fast, slow = settings.homing_speeds
         return min(settings.max_velocity, fast), min(settings.max_velocity, slow)
 
     @property
-    def _limits(self) -> Limits:
-        acceleration = min(STEEPEST, self.drive.settings.homing_acceleration)
-        return Limits(max(SLOWEST, self._speeds[0]), acceleration, acceleration)
+    def _limits(self) -> PathLimits:
+        acceleration = min(STEEPEST, self.settings.homing_acceleration)
+        return PathLimits(max(SLOWEST, self._speeds[0]), acceleration, acceleration)
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:

@@ -1,11 +1,73 @@
-"""The search for home: which way to go, by what the switches say."""
+"""The search for home: the methods as a table, and which way to go by the switches (CiA 402-2)."""
 
 from __future__ import annotations
 
-from enum import Enum, auto
-from typing import Final
+from enum import Enum, IntFlag, auto
+from typing import Final, NamedTuple
 
-from tickrig.device.canopen.ds402.modes.homing_methods import LIMIT, HomingMethod, Switch
+
+class Switch(IntFlag):
+    """The switches of an axis, by their bits in 60FDh."""
+
+    NEGATIVE_LIMIT = 1
+    POSITIVE_LIMIT = 2
+    HOME = 4
+
+
+class HomingMethod(NamedTuple):
+    """Where home is and how it is looked for.
+
+    Attributes:
+        switch: whose edge is looked for, None if no edge is.
+        first: direction of the search when the switch is not active.
+        approach: direction in which the edge, then the index pulse, is crossed at last.
+        active: whether the switch is active behind the edge, seen in that direction.
+        turns: whether the search turns round at the limit switch of its first direction.
+        by_index: whether home is the next index pulse behind the edge.
+    """
+
+    switch: Switch | None
+    first: int
+    approach: int
+    active: bool
+    turns: bool
+    by_index: bool
+
+
+_NEGATIVE: Final = Switch.NEGATIVE_LIMIT
+_POSITIVE: Final = Switch.POSITIVE_LIMIT
+_HOME: Final = Switch.HOME
+
+_EDGES: Final = {
+    17: (_NEGATIVE, -1, +1, False, False),
+    18: (_POSITIVE, +1, -1, False, False),
+    19: (_HOME, +1, -1, False, False),
+    20: (_HOME, +1, +1, True, False),
+    21: (_HOME, -1, +1, False, False),
+    22: (_HOME, -1, -1, True, False),
+    23: (_HOME, +1, -1, False, True),
+    24: (_HOME, +1, +1, True, True),
+    25: (_HOME, +1, -1, True, True),
+    26: (_HOME, +1, +1, False, True),
+    27: (_HOME, -1, +1, False, True),
+    28: (_HOME, -1, -1, True, True),
+    29: (_HOME, -1, +1, True, True),
+    30: (_HOME, -1, -1, False, True),
+}
+"""Methods that end at an edge, as rows of `HomingMethod`; 16 less goes on to the index pulse."""
+
+METHODS: Final[dict[int, HomingMethod]] = {
+    **{number - 16: HomingMethod(*edge, by_index=True) for number, edge in _EDGES.items()},
+    **{number: HomingMethod(*edge, by_index=False) for number, edge in _EDGES.items()},
+    33: HomingMethod(None, -1, -1, active=False, turns=False, by_index=True),
+    34: HomingMethod(None, +1, +1, active=False, turns=False, by_index=True),
+    35: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
+    37: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
+}
+"""By the number in 6098h; 35 and 37 take the present position."""
+
+LIMIT: Final = {-1: Switch.NEGATIVE_LIMIT, 0: Switch(0), +1: Switch.POSITIVE_LIMIT}
+"""The limit switch ahead, by direction."""
 
 BOTH_LIMITS: Final = Switch.NEGATIVE_LIMIT | Switch.POSITIVE_LIMIT
 
@@ -30,12 +92,13 @@ class HomingSearch:
     only while the axis moves as demanded.
 
     Attributes:
+        method: what is looked for.
         phase: what it is about.
         direction: where to go, -1 or +1; 0 for nowhere.
     """
 
     def __init__(self, method: HomingMethod, switches: Switch) -> None:
-        self._method, self._before = method, switches
+        self.method, self._before = method, switches
         self.direction = method.first
         self.phase = Phase.SEEK if method.switch else self._behind_the_edge()
         if not self.ended:
@@ -65,7 +128,7 @@ class HomingSearch:
         if switches & BOTH_LIMITS == BOTH_LIMITS or wrong_limit:
             self.phase = Phase.FAILED
             return
-        switch = self._method.switch or Switch(0)
+        switch = self.method.switch or Switch(0)
         as_demanded = moving == self.direction
         crossed = as_demanded and bool(switch & (switches ^ before))
         self._follow(bool(switch & switches), crossed, crawling, as_demanded and index)
@@ -73,7 +136,7 @@ class HomingSearch:
             self._meet_limit()
 
     def _follow(self, active: bool, crossed: bool, crawling: bool, pulse: bool) -> None:
-        method = self._method
+        method = self.method
         match self.phase:
             case Phase.SEEK if active:
                 self._turn(Phase.LEAVE if method.active else Phase.APPROACH)
@@ -90,15 +153,15 @@ class HomingSearch:
 
     def _turn(self, phase: Phase) -> None:
         self.phase = phase
-        approach = self._method.approach
+        approach = self.method.approach
         self.direction = -approach if phase is Phase.LEAVE else approach
 
     def _behind_the_edge(self) -> Phase:
-        return Phase.INDEX if self._method.by_index else Phase.FOUND
+        return Phase.INDEX if self.method.by_index else Phase.FOUND
 
     def _meet_limit(self) -> None:
         """Turn round once, if the method does; give up otherwise."""
-        turns = self._method.turns and self.direction == self._method.first
+        turns = self.method.turns and self.direction == self.method.first
         if self.phase is Phase.SEEK and turns:
             self.direction = -self.direction
         else:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.device.canopen.ds402.modes.cyclic import LatchedSetPoint
 from tickrig.device.canopen.ds402.modes.mode import Mode
-from tickrig.device.canopen.ds402.modes.taken_target import TakenTarget
 from tickrig.device.canopen.ds402.motion.reference import Control
 
 CURRENT_SETTING: Final = 0x2030
@@ -15,7 +15,7 @@ VELOCITY_SETTING: Final = 0x206B
 SETTINGS: Final = (CURRENT_SETTING, POSITION_SETTING, VELOCITY_SETTING)
 
 
-class PositionSetting(TakenTarget):
+class PositionSetting(LatchedSetPoint):
     """Position mode, -1: 2062h in position units.
 
     That bit 8 of the controlword does nothing in these modes is our decision.
@@ -39,19 +39,17 @@ class VelocitySetting(Mode):
     control = Control.VELOCITY
     halts = False
 
-    def enter(self) -> None:
+    def enter(self, *, enabled: bool) -> None:
         """Take the present velocity, unless the drive is just being enabled."""
-        drive = self.drive
-        if drive.enabled:
-            present = round(self.reference.velocity / drive.settings.units.per_velocity)
-            drive.parameters.write(VELOCITY_SETTING, present)
+        if enabled:
+            present = round(self.reference.velocity / self.settings.units.per_velocity)
+            self.drive.parameters.write(VELOCITY_SETTING, present)
 
     def run(self, now_us: int) -> bool:
         """Turn as fast as the setting value."""
-        drive, reference = self.drive, self.reference
-        value = drive.parameters.number(VELOCITY_SETTING)
-        wanted = drive.limits.velocity(value * drive.settings.units.per_velocity)
-        reference.place(reference.position, wanted)
+        wanted = self.number(VELOCITY_SETTING) * self.settings.units.per_velocity
+        velocity = self.take(self.drive.limits.velocity(wanted))
+        self.reference.place(self.reference.position, velocity)
         return True
 
 
@@ -65,18 +63,16 @@ class CurrentSetting(Mode):
     control = Control.CURRENT
     halts = False
 
-    def enter(self) -> None:
+    def enter(self, *, enabled: bool) -> None:
         """Take the present current, unless the drive is just being enabled."""
-        drive = self.drive
-        if drive.enabled:
-            present = round(1_000 * self.reference.current_a) * drive.axis.forward
-            drive.parameters.write(CURRENT_SETTING, present)
+        if enabled:
+            present = round(1_000 * self.reference.current_a) * self.axis.forward
+            self.drive.parameters.write(CURRENT_SETTING, present)
 
     def run(self, now_us: int) -> bool:
         """Have the current of the setting value."""
-        drive = self.drive
-        wanted_a = drive.parameters.number(CURRENT_SETTING) / 1_000 * drive.axis.forward
-        self.reference.current_a = drive.limits.current(wanted_a)
+        wanted_a = self.number(CURRENT_SETTING) / 1_000 * self.axis.forward
+        self.reference.current_a = self.take(self.drive.limits.current(wanted_a))
         return True
 
 

@@ -2,41 +2,82 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
+from tickrig.device.canopen.ds402.motion.axis import Axis
+from tickrig.device.canopen.ds402.motion.limits import Clamped, Limits
 from tickrig.device.canopen.ds402.motion.reference import Control
-from tickrig.device.canopen.ds402.state.state import Controlword, Statusword
+from tickrig.device.canopen.ds402.motion.stopping import Stopping
+from tickrig.device.canopen.ds402.motion.switches import Switches
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.objects.parameters import Parameters
+from tickrig.device.canopen.ds402.objects.settings import Settings
+from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
 
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+
+@dataclass(slots=True, kw_only=True)
+class DriveView:
+    """What a mode of operation sees of its drive.
+
+    Attributes:
+        parameters: the objects.
+        axis: motor, reference, settings and zero.
+        switches: limit switches and home switch.
+        limits: what the axis may do.
+        stopping: brakes as the option codes say.
+        controlword: as it was written last.
+        fresh: a SYNC came or a target changed since the last step.
+    """
+
+    parameters: Parameters
+    axis: Axis
+    switches: Switches
+    limits: Limits
+    stopping: Stopping
+    controlword: int = 0
+    fresh: bool = False
 
 
 class Mode:
     """No mode: the motor comes to a standstill and is held there.
 
-    A mode moves `drive.reference`, which is that of the mode before when it begins,
-    and says in `flags` what it has to tell. The drive then commands the motor.
+    A mode moves the reference of the axis, which is that of the mode before when it
+    begins; the drive then commands the motor.
+
+    Args:
+        drive: what it sees of the drive.
 
     Attributes:
         control: the loop that the motor works with.
         halts: bit 8 of the controlword stops it.
         minds_limits: limit switches and software limits stop it; homing looks itself.
-        tells_following_error: bit 13 says that the motor does not follow.
-        drive: where settings, targets and the motor are.
+        shows_following_error: bit 13 says that the motor does not follow.
         flags: its bits in the statusword: 10, 12, 13 and what else it owns.
+        limited: a limit cut something in the last step (bit 11 of the statusword).
     """
 
     control: ClassVar[Control] = Control.POSITION
     halts: ClassVar[bool] = True
     minds_limits: ClassVar[bool] = True
-    tells_following_error: ClassVar[bool] = False
+    shows_following_error: ClassVar[bool] = False
 
-    def __init__(self, drive: Ds402) -> None:
-        self.drive, self.reference = drive, drive.reference
-        self.flags = Statusword(0)
+    def __init__(self, drive: DriveView) -> None:
+        self.drive, self.axis, self.reference = drive, drive.axis, drive.axis.reference
+        self.number = drive.parameters.number
+        self.flags, self.limited = Statusword(0), False
 
-    def enter(self) -> None:
-        """Begin: the drive is enabled, or the mode is chosen while it is."""
+    @property
+    def settings(self) -> Settings:
+        """The present configuration."""
+        return self.axis.settings
+
+    def enter(self, *, enabled: bool) -> None:
+        """Begin.
+
+        Args:
+            enabled: the mode was chosen in Operation enabled; or else the drive is being enabled.
+        """
 
     def start(self) -> None:
         """Act on the rising edge of bit 4 of the controlword, in Operation enabled."""
@@ -44,21 +85,64 @@ class Mode:
     def stop(self) -> None:
         """Act on its falling edge."""
 
+    def step(self, now_us: int) -> bool:
+        """Run one control period of the mode, or of a halt.
+
+        Returns:
+            True if the mode is idle until its inputs change.
+        """
+        self.limited = False
+        halted = self.halts and self.drive.controlword & Controlword.HALT
+        return self.halt(now_us) if halted else self.run(now_us)
+
     def run(self, now_us: int) -> bool:
-        """Make a step of a millisecond; say whether nothing is left to do."""
+        """Run one control period; see `step`."""
         return self.halt(now_us)
 
     def halt(self, now_us: int) -> bool:
-        """Make a step to a standstill, as 605Dh says; say whether it stands."""
-        stands = self.drive.stopping.halt()
-        self.flags = self.flags | Statusword.TARGET_REACHED if stands else self._moving
+        """Brake as 605Dh says; see `step`."""
+        stands = self.drive.stopping.by(indices.HALT_OPTION)
+        self.flags &= ~Statusword.TARGET_REACHED
+        if stands:
+            self.flags |= Statusword.TARGET_REACHED
         return stands
 
-    @property
-    def halted(self) -> bool:
-        """Whether bit 8 of the controlword is set."""
-        return bool(self.drive.controlword & Controlword.HALT)
+    def take(self, demand: Clamped) -> float:
+        """Return what is left of a demand; the statusword shows whether a limit cut it."""
+        self.limited |= demand.clamped
+        return demand.value
 
-    @property
-    def _moving(self) -> Statusword:
-        return self.flags & ~Statusword.TARGET_REACHED
+    def target_velocity(self, offset: int = 0) -> float:
+        """Return 60FFh and an offset in counts per second, within the limits."""
+        wanted = self.number(indices.TARGET_VELOCITY) + offset
+        return self.take(self.drive.limits.velocity(wanted * self.settings.units.per_velocity))
+
+    def target_current(self, offset: int = 0) -> float:
+        """Return 6071h and an offset in amperes, within the limits."""
+        per_mille = (self.number(indices.TARGET_TORQUE) + offset) * self.axis.forward
+        wanted_a = per_mille * self.settings.rated_current_a / 1_000
+        return self.take(self.drive.limits.current(wanted_a))
+
+
+class Window:
+    """Tells whether something has been inside for long enough: windows and thresholds.
+
+    Attributes:
+        waiting: it is inside, and the time runs.
+    """
+
+    __slots__ = ("_since_us", "waiting")
+
+    def __init__(self) -> None:
+        self.waiting = False
+        self._since_us: int | None = None
+
+    def holds(self, now_us: int, inside: bool, for_us: int) -> bool:
+        """Take what is so now. Returns: whether it has been inside for `for_us`."""
+        if not inside:
+            self._since_us, self.waiting = None, False
+            return False
+        if self._since_us is None:
+            self._since_us = now_us
+        self.waiting = now_us - self._since_us < for_us
+        return not self.waiting

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.device.canopen.ds402.modes.cyclic import CyclicPosition, CyclicVelocity
+from tickrig.device.canopen.ds402.modes.cyclic import (
+    CyclicPosition,
+    CyclicVelocity,
+    InterpolatedPosition,
+)
 from tickrig.device.canopen.ds402.modes.homing import Homing
-from tickrig.device.canopen.ds402.modes.interpolated_position import InterpolatedPosition
 from tickrig.device.canopen.ds402.modes.mode import Mode
 from tickrig.device.canopen.ds402.modes.profile_position import ProfilePosition
-from tickrig.device.canopen.ds402.modes.profile_velocity import ProfileVelocity
-from tickrig.device.canopen.ds402.modes.torque import CyclicTorque, ProfileTorque
+from tickrig.device.canopen.ds402.modes.velocity_and_torque import (
+    CyclicTorque,
+    ProfileTorque,
+    ProfileVelocity,
+)
 
 MODES: Final[dict[int, type[Mode]]] = {
     0: Mode,

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from tickrig.device.canopen.ds402.modes.mode import Mode
-from tickrig.device.canopen.ds402.motion.course import Course, began_us
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
+from tickrig.device.canopen.ds402.motion.path_follower import PathFollower, began_us
 from tickrig.device.canopen.ds402.motion.trapezoid import (
-    Limits,
     Path,
+    PathLimits,
     RampShape,
     to_position,
     to_velocity,
 )
-from tickrig.device.canopen.ds402.motion.window import Window
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.state.state import Controlword, Statusword
-
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
-    from tickrig.device.canopen.ds402.objects.settings import Settings
+from tickrig.device.canopen.ds402.objects.settings import Settings
+from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
 
 SLOWEST: Final = 1.0
 """Counts per second: a profile has to end some time."""
@@ -41,7 +37,7 @@ class SetPoint:
     """
 
     target: float
-    limits: Limits
+    limits: PathLimits
     end_velocity: float
     cut: bool
 
@@ -60,11 +56,11 @@ class ProfilePosition(Mode):
     Not emulated: 60F2h positioning option code; more than one waiting set-point.
     """
 
-    tells_following_error = True
+    shows_following_error = True
 
-    def __init__(self, drive: Ds402) -> None:
+    def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
-        self._course, self._near = Course(self.reference), Window()
+        self._path, self._near = PathFollower(self.reference), Window()
         self._present: SetPoint | None = None
         self._waiting: SetPoint | None = None
         self._last = self.reference.position
@@ -87,14 +83,14 @@ class ProfilePosition(Mode):
 
     def run(self, now_us: int) -> bool:
         """Follow the path; at its end take the next set-point."""
-        if not self._course.kept:
-            self._course.begin(self._plan(began_us(now_us)))
-        if self._course.follow(now_us):
+        if not self._path.kept:
+            self._path.begin(self._plan(began_us(now_us)))
+        if self._path.follow(now_us):
             if self._waiting is None:
                 self._arrived = True
             else:
                 self._go(self._waiting)
-        self._tell(now_us)
+        self._show(now_us)
         return self._arrived and self.reference.velocity == 0 and not self._near.waiting
 
     def halt(self, now_us: int) -> bool:
@@ -106,43 +102,42 @@ class ProfilePosition(Mode):
     def _go(self, point: SetPoint) -> None:
         """Go to a set-point from here."""
         self._present, self._waiting, self._arrived = point, None, False
-        self._course.leave()
+        self._path.leave()
 
     def _pass_by(self, present: SetPoint, following: SetPoint) -> None:
         """Do not stop at the present set-point, if the way goes on in its direction."""
         onward = (following.target - present.target) * (present.target - self.reference.position)
         if onward > 0:
             self._present = replace(present, end_velocity=present.limits.velocity)
-            self._course.leave()
+            self._path.leave()
 
     def _set_point(self) -> SetPoint:
-        drive, settings = self.drive, self.drive.settings
-        position = drive.parameters.number(indices.TARGET_POSITION)
-        if drive.controlword & Controlword.RELATIVE:
+        settings, position = self.settings, self.number(indices.TARGET_POSITION)
+        if self.drive.controlword & Controlword.RELATIVE:
             target = self._last + position * settings.units.per_position
         else:
-            target = drive.axis.counts_of(position)
-        self._last = drive.axis.clamp(target)
-        number = drive.parameters.number(indices.MOTION_PROFILE)
+            target = self.axis.counts_of(position)
+        self._last, cut = self.drive.limits.position(target)
+        number = self.number(indices.MOTION_PROFILE)
         shape = RampShape.SIN2 if number == RampShape.SIN2 else RampShape.LINEAR
         limits = profile_limits(settings, shape)
-        return SetPoint(self._last, limits, settings.end_velocity, self._last != target)
+        return SetPoint(self._last, limits, settings.end_velocity, cut)
 
     def _plan(self, now_us: int) -> Path:
-        start, point = self._course.motion, self._present
+        start, point = self._path.motion, self._present
         if point is None:
-            return to_velocity(now_us, start, 0.0, profile_limits(self.drive.settings))
+            return to_velocity(now_us, start, 0.0, profile_limits(self.settings))
         return to_position(now_us, start, point.target, point.limits, point.end_velocity)
 
-    def _tell(self, now_us: int) -> None:
-        drive, point = self.drive, self._present
+    def _show(self, now_us: int) -> None:
+        settings, point = self.settings, self._present
         goal = self.reference.position if point is None else point.target
-        away = abs(drive.motor.counts - round(goal))
+        away = abs(self.axis.motor.counts - round(goal))
         passed = point is not None and point.end_velocity > 0
-        near = self._arrived and (passed or away <= drive.settings.position_window)
-        reached = self._near.holds(now_us, near, drive.settings.position_window_us)
+        near = self._arrived and (passed or away <= settings.position_window)
+        reached = self._near.holds(now_us, near, settings.position_window_us)
         self.flags = Statusword.TARGET_REACHED if reached else Statusword(0)
-        drive.limited |= point is not None and point.cut
+        self.limited |= point is not None and point.cut
         self._acknowledge()
 
     def _acknowledge(self) -> None:
@@ -152,9 +147,9 @@ class ProfilePosition(Mode):
             self.flags |= Statusword.MODE_12
 
 
-def profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> Limits:
+def profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> PathLimits:
     """Return what 6081h, 6083h and 6084h allow; a profile velocity of 0 is the slowest one."""
-    return Limits(
+    return PathLimits(
         max(SLOWEST, settings.profile_velocity),
         min(STEEPEST, settings.acceleration),
         min(STEEPEST, settings.deceleration),

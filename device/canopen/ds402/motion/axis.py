@@ -18,6 +18,7 @@ class Axis:
     Attributes:
         motor: what moves.
         reference: what the motor is demanded to do, in counts.
+        control: the loop that the motor works with in this tick.
         settings: the present configuration.
         zero: counts of the encoder at position 0 of the user.
         homed: whether a homing has set it.
@@ -25,7 +26,7 @@ class Axis:
 
     def __init__(self, motor: Motor, settings: Settings) -> None:
         self.motor, self.settings = motor, settings
-        self.reference = Reference()
+        self.reference, self.control = Reference(), Control.POSITION
         self.zero, self.homed = 0.0, False
 
     @property
@@ -49,8 +50,13 @@ class Axis:
         low, high = self.settings.software_limits
         return low + self.zero, high + self.zero
 
+    @property
+    def following_error(self) -> float:
+        """Counts from the motor to the reference."""
+        return self.reference.position - self.motor.counts
+
     def is_fast(self, velocity: float) -> bool:
-        """Say whether a velocity in counts per second is more than standstill."""
+        """Return whether a velocity in counts per second is more than standstill."""
         return abs(velocity) > STANDSTILL_TURNS_S * self.motor.counts_per_turn
 
     def position_of(self, counts: float) -> int:
@@ -71,11 +77,6 @@ class Axis:
         away = position - (self.reference.position - self.zero) / unit
         return self.reference.position + ((away + span / 2) % span - span / 2) * unit
 
-    def clamp(self, counts: float) -> float:
-        """Return the nearest counts within the software limits."""
-        low, high = self.ends
-        return max(low, min(high, counts))
-
     def per_mille_of(self, current_a: float) -> int:
         """Return a current in thousandths of the rated one; the user's sign."""
         return round(1_000 * current_a / self.settings.rated_current_a) * self.forward
@@ -88,13 +89,13 @@ class Axis:
         self.zero += turns * (high - low + 1) * unit
 
     def place_home(self, position: int, counts: int) -> None:
-        """Call a place a position of the user: homing is attained."""
+        """Take a place for a position of the user: homing is attained."""
         self.zero = counts - position * self.settings.units.per_position
         self.homed = True
 
-    def command(self, control: Control) -> None:
+    def command(self) -> None:
         """Have the motor do what the reference says; what is not controlled follows it."""
-        motor, reference = self.motor, self.reference
+        motor, reference, control = self.motor, self.reference, self.control
         if control is not Control.CURRENT:
             reference.current_a = motor.current_ma / 1_000
         if control is Control.POSITION:

@@ -2,87 +2,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
+from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
-from tickrig.device.canopen.ds402.motion.stopping import Ramp
-from tickrig.device.canopen.ds402.state.faults import ErrorCode
+from tickrig.device.canopen.ds402.motion.switches import Switches
+from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
 
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+
+class Clamped(NamedTuple):
+    """A demand within the limits.
+
+    Attributes:
+        value: the demand, or the limit that is nearest to it.
+        clamped: whether that is another value than was demanded.
+    """
+
+    value: float
+    clamped: bool
 
 
 class Limits:
-    """Cuts what a mode wants, and stops the motor at the end of its way.
-
-    A pressed limit switch, and a software limit that could not be kept otherwise,
-    stop the motor with the quick stop deceleration; it can be moved back. Each
-    cut sets bit 11 of the statusword. For a drive whose `limits_are_faults`, it is a
-    fault too.
+    """What an axis may do.
 
     Args:
-        drive: the drive.
+        axis: whose settings count.
+        switches: its limit switches.
     """
 
-    def __init__(self, drive: Ds402) -> None:
-        self._drive = drive
+    def __init__(self, axis: Axis, switches: Switches) -> None:
+        self._axis, self._switches = axis, switches
 
-    def velocity(self, wanted: float) -> float:
-        """Return a velocity, cut to the largest one."""
-        most = self._drive.settings.max_velocity
-        return self._cut(wanted, -most, most)
+    def velocity(self, wanted: float) -> Clamped:
+        """Clamp a velocity, in counts per second, to the largest one."""
+        most = self._axis.settings.max_velocity
+        return _clamp(wanted, -most, most)
 
-    def position(self, counts: float) -> float:
-        """Return a position, cut to the software limits."""
-        return self._cut(counts, *self._drive.axis.ends)
+    def position(self, counts: float) -> Clamped:
+        """Clamp a position to the software limits."""
+        return _clamp(counts, *self._axis.ends)
 
-    def current(self, wanted_a: float) -> float:
-        """Return a current, cut to the torque limits of both directions."""
-        settings = self._drive.settings
+    def current(self, wanted_a: float) -> Clamped:
+        """Clamp a current to the torque limits of both directions."""
+        settings = self._axis.settings
         backward, forward = settings.limits_a
         most = settings.max_current_a
-        return self._cut(wanted_a, -min(backward, most), min(forward, most))
+        return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
-    def guard(self, step: Callable[[int], bool], now_us: int) -> bool:
-        """Make a step of a mode, or brake if it leads beyond a limit."""
-        drive, reference = self._drive, self._drive.reference
-        position, velocity = reference.position, reference.velocity
-        settled = step(now_us)
-        code = self._beyond()
-        if code is None:
-            return settled
-        drive.limited = True
-        reference.place(position, velocity)
-        if drive.limits_are_faults:
-            drive.fault(code)
-        return drive.stopping.brake(Ramp.QUICK_STOP)
+    def reached(self) -> ErrorCode | None:
+        """Return what ends the way on which the reference leads, None while it is free.
 
-    def _beyond(self) -> ErrorCode | None:
-        """Return what ends the way on which the reference leads, None while it is free."""
-        drive, reference = self._drive, self._drive.reference
+        That is a pressed limit switch, or a software limit that could not be kept otherwise.
+        """
+        axis, reference = self._axis, self._axis.reference
         towards = reference.velocity
-        if drive.control is Control.CURRENT:
+        if axis.control is Control.CURRENT:
             towards = towards or reference.current_a
         if not towards:
             return None
-        if towards * drive.axis.forward > 0:
-            if drive.switches.positive_limit:
+        if towards * axis.forward > 0:
+            if self._switches.positive_limit:
                 return ErrorCode.POSITIVE_LIMIT
-        elif drive.switches.negative_limit:
+        elif self._switches.negative_limit:
             return ErrorCode.NEGATIVE_LIMIT
-        ends = drive.control is not Control.POSITION and self._room(towards) <= 0
+        ends = axis.control is not Control.POSITION and self._room(towards) <= 0
         return ErrorCode.SOFTWARE_LIMIT if ends else None
 
     def _room(self, towards: float) -> float:
         """Return the counts that are left before the motor has to brake for a software limit."""
-        drive, reference = self._drive, self._drive.reference
-        low, high = drive.axis.ends
+        axis, reference = self._axis, self._axis.reference
+        low, high = axis.ends
         way = high - reference.position if towards > 0 else reference.position - low
-        return way - reference.velocity**2 / (2 * drive.settings.quick_stop_deceleration)
+        return way - reference.velocity**2 / (2 * axis.settings.quick_stop_deceleration)
 
-    def _cut(self, wanted: float, low: float, high: float) -> float:
-        cut = max(low, min(high, wanted))
-        if cut != wanted:
-            self._drive.limited = True
-        return cut
+
+def _clamp(wanted: float, low: float, high: float) -> Clamped:
+    value = max(low, min(high, wanted))
+    return Clamped(value, value != wanted)

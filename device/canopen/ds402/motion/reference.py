@@ -37,7 +37,7 @@ class Reference:
         self.position = self.velocity = self.acceleration = self.current_a = 0.0
 
     def ramp(self, velocity: float, acceleration: float, deceleration: float) -> bool:
-        """Make a step towards a velocity; say whether it is reached.
+        """Make a step towards a velocity. Returns: whether it is reached.
 
         Args:
             velocity: counts per second.

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from enum import IntEnum
 from math import inf
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
 from tickrig.device.canopen.ds402.objects import indices
-
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.ds402.objects.parameters import Parameters
 
 
 class Ramp(IntEnum):
@@ -27,43 +26,44 @@ STAYING: Final = 4
 
 
 class Stopping:
-    """Slows the reference down.
+    """Slows the reference of an axis down.
 
     Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
 
     Args:
-        drive: whose reference it is.
+        axis: whose reference it is.
+        parameters: have the option codes.
     """
 
-    def __init__(self, drive: Ds402) -> None:
-        self._drive = drive
+    def __init__(self, axis: Axis, parameters: Parameters) -> None:
+        self._axis, self._parameters = axis, parameters
 
     @property
     def stays(self) -> bool:
         """Whether a quick stop ends in Quick stop active."""
-        return self._drive.parameters.number(indices.QUICK_STOP_OPTION) > STAYING
+        return self._parameters.number(indices.QUICK_STOP_OPTION) > STAYING
 
     def quick_stop(self) -> bool:
-        """Make a step as 605Ah says; say whether the motor stands."""
-        return self.brake(self._drive.parameters.number(indices.QUICK_STOP_OPTION) % STAYING)
-
-    def halt(self) -> bool:
-        """Make a step as 605Dh says; say whether the motor stands."""
-        return self.brake(self._drive.parameters.number(indices.HALT_OPTION))
+        """Make a step as 605Ah says. Returns: whether the motor stands."""
+        return self.brake(self._parameters.number(indices.QUICK_STOP_OPTION) % STAYING)
 
     def by(self, index: int) -> bool:
-        """Make a step as another option code says; say whether the motor stands."""
-        return self.brake(self._drive.parameters.number(index))
+        """Make a step as another option code says. Returns: whether the motor stands."""
+        return self.brake(self._parameters.number(index))
 
     def brake(self, ramp: int) -> bool:
-        """Make a step of a ramp; say whether the motor stands, or has not to be slowed down."""
-        drive, settings = self._drive, self._drive.settings
+        """Make a step of a ramp.
+
+        Returns:
+            True if the motor stands, or has not to be slowed down.
+        """
+        axis, settings = self._axis, self._axis.settings
         if ramp == Ramp.NONE:
             return True
-        if drive.control is Control.CURRENT:
-            drive.control = Control.VELOCITY
+        if axis.control is Control.CURRENT:
+            axis.control = Control.VELOCITY
         deceleration = {
             Ramp.SLOW_DOWN: settings.deceleration,
             Ramp.QUICK_STOP: settings.quick_stop_deceleration,
         }.get(Ramp(ramp), inf)
-        return drive.reference.ramp(0.0, deceleration, deceleration) and drive.axis.stands
+        return axis.reference.ramp(0.0, deceleration, deceleration) and axis.stands

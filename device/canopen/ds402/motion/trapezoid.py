@@ -34,7 +34,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class PathLimits:
     """What a path may use, all greater than 0.
 
     Attributes:
@@ -58,7 +58,7 @@ class Leg(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Ramp:
+class RampLeg:
     """A leg at its place in time and way."""
 
     end_s: float
@@ -117,7 +117,7 @@ class Path:
         ramps = []
         for leg in legs:
             change, end_s = leg.velocity - velocity, end_s + leg.duration_s
-            ramps.append(Ramp(end_s, leg.duration_s, position, velocity, change, shape))
+            ramps.append(RampLeg(end_s, leg.duration_s, position, velocity, change, shape))
             position += (velocity + leg.velocity) / 2 * leg.duration_s
             velocity = leg.velocity
         self._ramps = [ramp for ramp in ramps if ramp.duration_s > 0.0]
@@ -138,7 +138,7 @@ class Path:
         return (now_us - self.began_us) / US_PER_S >= self.end_s
 
 
-def to_velocity(now_us: int, start: Motion, velocity: float, limits: Limits) -> Path:
+def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
     """Plan a change of velocity; it is not cut to the velocity limit.
 
     A change of direction brakes to standstill first, and accelerates then.
@@ -148,7 +148,7 @@ def to_velocity(now_us: int, start: Motion, velocity: float, limits: Limits) -> 
 
 
 def to_position(
-    now_us: int, start: Motion, target: float, limits: Limits, end_velocity: float = 0.0
+    now_us: int, start: Motion, target: float, limits: PathLimits, end_velocity: float = 0.0
 ) -> Path:
     """Plan the fastest way to a position.
 
@@ -168,15 +168,15 @@ def to_position(
     return Path(now_us, start, legs, limits.shape, target)
 
 
-def _effective(limits: Limits) -> Limits:
+def _effective(limits: PathLimits) -> PathLimits:
     """Return limits with the mean slope of a ramp instead of its peak."""
     if limits.shape is RampShape.LINEAR:
         return limits
     mean = 2 / pi
-    return Limits(limits.velocity, limits.acceleration * mean, limits.deceleration * mean)
+    return PathLimits(limits.velocity, limits.acceleration * mean, limits.deceleration * mean)
 
 
-def _ramps(velocity: float, wanted: float, limits: Limits) -> list[Leg]:
+def _ramps(velocity: float, wanted: float, limits: PathLimits) -> list[Leg]:
     if velocity * wanted < 0.0:
         return [*_ramps(velocity, 0.0, limits), *_ramps(0.0, wanted, limits)]
     speeds_up = abs(wanted) > abs(velocity)
@@ -184,7 +184,7 @@ def _ramps(velocity: float, wanted: float, limits: Limits) -> list[Leg]:
     return [Leg(wanted, abs(wanted - velocity) / slope)]
 
 
-def _legs(velocity: float, distance: float, limits: Limits, end: float) -> list[Leg]:
+def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
     """Return the legs of a way to a position; in which direction it is makes no difference."""
     direction = copysign(1.0, distance or velocity)
     velocity, distance = velocity * direction, distance * direction
@@ -197,7 +197,7 @@ def _legs(velocity: float, distance: float, limits: Limits, end: float) -> list[
     return [Leg(leg.velocity * direction, leg.duration_s) for leg in legs]
 
 
-def _forward(velocity: float, distance: float, limits: Limits, end: float) -> list[Leg]:
+def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
     """Return the legs of a way straight ahead: to the top velocity, along, to the end velocity."""
     up, down = limits.acceleration, limits.deceleration
     slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance))

@@ -1,15 +1,103 @@
-"""The state of a drive at work: who changes it, and what it does (CiA 402-2)."""
+"""The state machine of a drive, and what the drive does in each state (CiA 402-2)."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from enum import Enum, IntEnum, IntFlag, auto
+from typing import Final
 
+from tickrig.device.canopen.ds402.motion.stopping import Stopping
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.state.faults import is_controllable
-from tickrig.device.canopen.ds402.state.state import NEXT_STATE, POWERED, Command, DriveState
+from tickrig.device.canopen.ds402.objects.error_codes import is_controllable
 
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+
+class Controlword(IntFlag):
+    """Bits of 6040h; 4, 5 and 6 belong to the mode of operation."""
+
+    SWITCH_ON = 0x0001
+    ENABLE_VOLTAGE = 0x0002
+    QUICK_STOP = 0x0004  # active at 0
+    ENABLE_OPERATION = 0x0008
+    START = 0x0010  # new set-point, start homing
+    CHANGE_AT_ONCE = 0x0020
+    RELATIVE = 0x0040
+    FAULT_RESET = 0x0080
+    HALT = 0x0100
+    CHANGE_ON_SET_POINT = 0x0200
+
+
+class Statusword(IntFlag):
+    """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
+
+    VOLTAGE_ENABLED = 0x0010
+    WARNING = 0x0080
+    REMOTE = 0x0200
+    TARGET_REACHED = 0x0400
+    INTERNAL_LIMIT = 0x0800
+    MODE_12 = 0x1000  # set-point acknowledge, homing attained, speed is zero, follows the target
+    MODE_13 = 0x2000  # homing error, following error
+    HOMED = 0x8000  # of the manufacturer: the position refers to the home position
+
+
+class DriveState(IntEnum):
+    """State by its bits in the statusword."""
+
+    NOT_READY_TO_SWITCH_ON = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY_TO_SWITCH_ON = 0x21
+    SWITCHED_ON = 0x23
+    OPERATION_ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION_ACTIVE = 0x0F
+    FAULT = 0x08
+
+
+class Command(Enum):
+    """What a controlword asks for; switch on also means disable operation."""
+
+    SHUTDOWN = auto()
+    SWITCH_ON = auto()
+    ENABLE_OPERATION = auto()
+    DISABLE_VOLTAGE = auto()
+    QUICK_STOP = auto()
+
+
+_COMMANDS: Final = (
+    (0x87, 0x06, Command.SHUTDOWN),
+    (0x8F, 0x07, Command.SWITCH_ON),
+    (0x8F, 0x0F, Command.ENABLE_OPERATION),
+    (0x82, 0x00, Command.DISABLE_VOLTAGE),
+    (0x86, 0x02, Command.QUICK_STOP),
+)
+"""Mask, value, command."""
+
+_SOD: Final = DriveState.SWITCH_ON_DISABLED
+_READY: Final = DriveState.READY_TO_SWITCH_ON
+_ON: Final = DriveState.SWITCHED_ON
+_ENABLED: Final = DriveState.OPERATION_ENABLED
+_QUICK_STOP: Final = DriveState.QUICK_STOP_ACTIVE
+
+NEXT_STATE: Final = {
+    (_SOD, Command.SHUTDOWN): _READY,  # transition 2
+    (_READY, Command.SWITCH_ON): _ON,  # 3
+    (_READY, Command.ENABLE_OPERATION): _ENABLED,  # 3, then 4 by itself
+    (_READY, Command.DISABLE_VOLTAGE): _SOD,  # 7
+    (_READY, Command.QUICK_STOP): _SOD,  # 7
+    (_ON, Command.ENABLE_OPERATION): _ENABLED,  # 4
+    (_ON, Command.SHUTDOWN): _READY,  # 6
+    (_ON, Command.DISABLE_VOLTAGE): _SOD,  # 10
+    (_ON, Command.QUICK_STOP): _SOD,  # 10
+    (_ENABLED, Command.SWITCH_ON): _ON,  # 5
+    (_ENABLED, Command.SHUTDOWN): _READY,  # 8
+    (_ENABLED, Command.DISABLE_VOLTAGE): _SOD,  # 9
+    (_ENABLED, Command.QUICK_STOP): _QUICK_STOP,  # 11
+    (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
+    (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
+}
+"""Transitions 0, 1, 13, 14 and 15 are made by the drive, by a fault and by its reset."""
+
+POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
+"""States in which the motor may have torque."""
 
 RAMPS: Final = {
     DriveState.SWITCHED_ON: indices.DISABLE_OPERATION_OPTION,
@@ -18,18 +106,31 @@ RAMPS: Final = {
 """Option codes that say how Operation enabled is left: transitions 5 and 8."""
 
 
+def command_of(controlword: int) -> Command | None:
+    """Return what a controlword asks for, None if it asks for nothing.
+
+    >>> command_of(0x0006), command_of(0x0080)
+    (<Command.SHUTDOWN: 1>, None)
+    """
+    for mask, value, command in _COMMANDS:
+        if controlword & mask == value:
+            return command
+    return None
+
+
 class Automaton:
     """Transitions 5 and 8 are made when the motor stands, if their option says so.
 
     Args:
-        drive: whose state it is.
+        stopping: brakes as the option codes say.
+        begin_mode: begins the chosen mode of operation.
 
     Attributes:
         state: the present state.
     """
 
-    def __init__(self, drive: Ds402) -> None:
-        self._drive = drive
+    def __init__(self, stopping: Stopping, begin_mode: Callable[[], None]) -> None:
+        self._stopping, self._begin_mode = stopping, begin_mode
         self.state = DriveState.NOT_READY_TO_SWITCH_ON
         self._leaving: DriveState | None = None
         self._severe = False
@@ -58,7 +159,7 @@ class Automaton:
     def enter(self, state: DriveState) -> None:
         """Change the state."""
         if state is DriveState.OPERATION_ENABLED:
-            self._drive.begin_mode()
+            self._begin_mode()
         self.state, self._leaving = state, None
 
     def react(self, code: int) -> None:
@@ -70,13 +171,21 @@ class Automaton:
             self._severe = severe
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
-    def run(self, now_us: int) -> bool:
-        """Do what the state does for a step; say whether nothing is left to do."""
+    def run(self, operate: Callable[[int], bool], now_us: int) -> bool:
+        """Run one control period of the present state.
+
+        Args:
+            operate: runs one control period of the mode of operation.
+            now_us: the time.
+
+        Returns:
+            True if nothing is left to do until an input changes.
+        """
         match self.state:
             case DriveState.NOT_READY_TO_SWITCH_ON:
                 self.enter(DriveState.SWITCH_ON_DISABLED)
             case DriveState.OPERATION_ENABLED:
-                return self._operate(now_us)
+                return operate(now_us) if self._leaving is None else self._leave(self._leaving)
             case DriveState.QUICK_STOP_ACTIVE:
                 return self._quick_stop()
             case DriveState.FAULT_REACTION_ACTIVE:
@@ -86,31 +195,28 @@ class Automaton:
         return True
 
     def _must_finish(self, following: DriveState) -> bool:
-        """Say whether a quick stop cannot be left for Operation enabled: transition 16."""
+        """Return whether a quick stop cannot be left for Operation enabled: transition 16."""
         return (
             self.state is DriveState.QUICK_STOP_ACTIVE
             and following is DriveState.OPERATION_ENABLED
-            and not self._drive.stopping.stays
+            and not self._stopping.stays
         )
 
-    def _operate(self, now_us: int) -> bool:
-        leaving = self._leaving
-        if leaving is None:
-            return self._drive.operate(now_us)
-        stands = self._drive.stopping.by(RAMPS[leaving])
+    def _leave(self, leaving: DriveState) -> bool:
+        """Brake, then make transition 5 or 8."""
+        stands = self._stopping.by(RAMPS[leaving])
         if stands:
             self.enter(leaving)
         return stands
 
     def _quick_stop(self) -> bool:
-        stopping = self._drive.stopping
-        stands = stopping.quick_stop()
-        if stands and not stopping.stays:
+        stands = self._stopping.quick_stop()
+        if stands and not self._stopping.stays:
             self.enter(DriveState.SWITCH_ON_DISABLED)
         return stands
 
     def _slow_down(self) -> bool:
-        stands = self._severe or self._drive.stopping.by(indices.FAULT_REACTION_OPTION)
+        stands = self._severe or self._stopping.by(indices.FAULT_REACTION_OPTION)
         if stands:
             self.enter(DriveState.FAULT)
         return stands

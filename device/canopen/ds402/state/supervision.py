@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
-from tickrig.device.canopen.ds402.state.faults import ErrorCode
-
-if TYPE_CHECKING:
-    from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
 
 OPEN_PHASE_SHARE: Final = 0.05
 """Below this share of the current limit no current flows."""
@@ -36,44 +34,51 @@ class Supervision:
     """Finds faults by what the drive measures.
 
     Args:
-        drive: the drive.
+        axis: what is watched.
         bounds: what is sound.
 
     Attributes:
-        has_supply: the supply is not too low (bit 4 of the statusword).
+        wired: faults that the electronics see, as their inputs are now.
         waiting: a time-out runs.
         not_following: the following error is larger than 6065h.
     """
 
-    def __init__(self, drive: Ds402, bounds: Bounds) -> None:
-        self._drive, self.bounds = drive, bounds
+    def __init__(self, axis: Axis, bounds: Bounds) -> None:
+        self._axis, self.bounds = axis, bounds
+        self.wired: tuple[ErrorCode, ...] = ()
         self.waiting = self.not_following = False
-        self.has_supply = True
         self._error_us = self._stall_us = 0
+
+    @property
+    def has_supply(self) -> bool:
+        """Whether the supply is not too low (bit 4 of the statusword)."""
+        return self._axis.motor.supply_mv >= self.bounds.supply_mv[0]
 
     @property
     def warns(self) -> bool:
         """Whether the winding is warm (bit 7 of the statusword)."""
-        return self._drive.motor.winding_dc >= self.bounds.winding_warning_dc
+        return self._axis.motor.winding_dc >= self.bounds.winding_warning_dc
 
-    def present(self) -> list[ErrorCode]:
-        """Return the faults whose cause is there now."""
-        motor, bounds = self._drive.motor, self.bounds
-        supply_mv, (low, high) = motor.supply_mv, bounds.supply_mv
-        found = self._drive.wired_faults()
-        self.has_supply = supply_mv >= low
+    def present(self, *, powered: bool) -> list[ErrorCode]:
+        """Return the faults whose cause is there now; a short circuit needs power to be seen."""
+        motor, bounds = self._axis.motor, self.bounds
+        found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]
         if not self.has_supply:
             found.append(ErrorCode.UNDER_VOLTAGE)
-        if supply_mv > high:
+        if motor.supply_mv > bounds.supply_mv[1]:
             found.append(ErrorCode.OVER_VOLTAGE)
         if motor.winding_dc > bounds.winding_dc:
             found.append(ErrorCode.DRIVE_TEMPERATURE)
         return found
 
-    def find(self, now_us: int) -> list[ErrorCode]:
-        """Return the faults that are there, and those that a motion with power shows."""
-        found, self.waiting = self.present(), False
-        if not self._drive.automaton.powered:
+    def step(self, now_us: int, *, powered: bool) -> list[ErrorCode]:
+        """Watch for one tick.
+
+        Returns:
+            The faults that are there, and those that a motion with power shows.
+        """
+        found, self.waiting = self.present(powered=powered), False
+        if not powered:
             self.not_following = False
             self._error_us = self._stall_us = now_us
             return found
@@ -84,27 +89,27 @@ class Supervision:
         return found
 
     def _loses_reference(self, now_us: int) -> bool:
-        drive = self._drive
-        window = drive.settings.following_error_window
-        controlled = drive.control is Control.POSITION
-        self.not_following = controlled and abs(drive.following_error) > window
+        axis = self._axis
+        controlled = axis.control is Control.POSITION
+        window = axis.settings.following_error_window
+        self.not_following = controlled and abs(axis.following_error) > window
         if not self.not_following:
             self._error_us = now_us
             return False
         self.waiting = True
-        return now_us - self._error_us >= drive.settings.following_error_us
+        return now_us - self._error_us >= axis.settings.following_error_us
 
     def _stalls(self, now_us: int) -> bool:
-        """Say whether the motor has stood for too long although it shall turn."""
-        drive = self._drive
-        shall_turn = drive.motor.current_limited or drive.axis.is_fast(drive.reference.velocity)
-        if drive.control is Control.CURRENT or not (shall_turn and drive.axis.stands):
+        """Return whether the motor has stood for too long although it shall turn."""
+        axis = self._axis
+        shall_turn = axis.motor.current_limited or axis.is_fast(axis.reference.velocity)
+        if axis.control is Control.CURRENT or not (shall_turn and axis.stands):
             self._stall_us = now_us
             return False
         self.waiting = True
         return now_us - self._stall_us >= self.bounds.stall_us
 
     def _stall_code(self) -> ErrorCode:
-        motor = self._drive.motor
+        motor = self._axis.motor
         flows = abs(motor.current_ma) > 1_000 * OPEN_PHASE_SHARE * motor.current_limit_a
         return ErrorCode.MOTOR_BLOCKED if flows else ErrorCode.MOTOR_PHASE

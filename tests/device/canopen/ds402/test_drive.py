@@ -8,7 +8,7 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.ds402.state.state import DriveState
+from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.instant import NEVER
@@ -301,9 +301,9 @@ def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
     bench.write(0x60FF, 2**31 - 1)
     bench.enable(9)
     bench.write(0x6060, 10)
-    bench.drive.reference.current_a = 1e6
-    bench.drive.motor.drive_current(1e6)
-    bench.drive.telling.tell()
+    bench.drive.axis.reference.current_a = 1e6
+    bench.drive.axis.motor.drive_current(1e6)
+    bench.drive.actual_values.update(bench.drive)
     assert bench.read(0x6077) == 2**15 - 1
 
 

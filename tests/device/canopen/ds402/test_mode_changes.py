@@ -45,7 +45,7 @@ def begin(mode: int, *, moving: bool) -> Wheel:
 @pytest.mark.parametrize(("before", "after"), [*permutations(TARGETS, 2)])
 def test_the_reference_goes_on_where_it_was(before: int, after: int, moving: bool) -> None:
     wheel = begin(before, moving=moving)
-    reference = wheel.drive.reference
+    reference = wheel.drive.axis.reference
     position, velocity = reference.position, reference.velocity
     wheel.write(0x6060, after)
     for _ in range(30):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.ds402.state.state import DriveState
+from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.servo.presets import EPOS_WHEEL

@@ -82,10 +82,10 @@ def test_a_power_cut_forgets_home_and_position() -> None:
     wheel.write(0x60FF, 600)
     wheel.enable(3)
     wheel.run(200)
-    before = wheel.drive.motor.counts
+    before = wheel.drive.axis.motor.counts
     wheel.drive.axis.place_home(77, before)
     wheel.slave.reset()
     wheel.run(500)
-    coasted = wheel.drive.motor.counts - before
+    coasted = wheel.drive.axis.motor.counts - before
     assert wheel.read(0x6064) == pytest.approx(coasted, abs=30)  # the first tick is not counted
     assert wheel.read(0x6041) & HOMED == 0

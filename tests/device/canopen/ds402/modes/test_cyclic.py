@@ -29,7 +29,7 @@ def swing(wheel: Wheel, amplitude: int, period_ms: int, cycles: int) -> list[tup
         wheel.write(0x607A, round(amplitude * (1 - cos(phase))))
         wheel.step("080#")
         for _ in range(CYCLE_MS):
-            seen.append((wheel.drive.reference.position, wheel.read(0x6064)))
+            seen.append((wheel.drive.axis.reference.position, wheel.read(0x6064)))
             if len(seen) % CYCLE_MS:
                 wheel.step()
     return seen
@@ -58,9 +58,9 @@ def test_csp_is_where_the_target_was_told_after_a_period(wheel: Wheel) -> None:
     wheel.enable(8)
     wheel.write(0x607A, 200)
     wheel.run(5)
-    assert wheel.drive.reference.position == pytest.approx(100)
+    assert wheel.drive.axis.reference.position == pytest.approx(100)
     wheel.run(5)
-    assert wheel.drive.reference.position == pytest.approx(200)
+    assert wheel.drive.axis.reference.position == pytest.approx(200)
     wheel.run(100)
     assert wheel.read(0x6064) == pytest.approx(200, abs=2)
     assert wheel.read(0x6041) & BIT_12
@@ -76,7 +76,7 @@ def test_csp_adds_its_offset_and_keeps_to_limits(wheel: Wheel) -> None:
     wheel.step()
     assert wheel.read(0x606B) == 450
     wheel.run(50)
-    assert wheel.drive.reference.position == pytest.approx(150)
+    assert wheel.drive.axis.reference.position == pytest.approx(150)
     wheel.write(0x607A, -900)
     wheel.step()
     assert wheel.read(0x6041) & INTERNAL_LIMIT
@@ -218,7 +218,7 @@ def test_maxons_velocity_and_position_are_followed_at_once(wheel: Wheel) -> None
     assert wheel.read(0x6061) == -1
     wheel.write(0x2062, wheel.read(0x6062) + 100)
     wheel.step()
-    assert wheel.drive.following_error == pytest.approx(100, abs=5)
+    assert wheel.drive.axis.following_error == pytest.approx(100, abs=5)
     wheel.run(100)
     assert wheel.read(0x60F4) == pytest.approx(0, abs=2)
 

@@ -8,9 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.canopen.ds402.modes.homing_methods import METHODS, HomingMethod, Switch
-from tickrig.device.canopen.ds402.modes.homing_search import HomingSearch, Phase
-from tickrig.device.canopen.ds402.motion.trapezoid import Limits, Motion, to_velocity
+from tickrig.device.canopen.ds402.modes.homing_search import (
+    METHODS,
+    HomingMethod,
+    HomingSearch,
+    Phase,
+    Switch,
+)
+from tickrig.device.canopen.ds402.motion.trapezoid import Motion, PathLimits, to_velocity
 
 FAST, SLOW, ACCELERATION = 2_000.0, 100.0, 20_000.0
 TICK_WAY = SLOW / 1_000
@@ -58,8 +63,8 @@ class Axis:
         return search.phase, self.motion.position
 
 
-def limits() -> Limits:
-    return Limits(FAST, ACCELERATION, ACCELERATION)
+def limits() -> PathLimits:
+    return PathLimits(FAST, ACCELERATION, ACCELERATION)
 
 
 def next_index(edge: float, direction: int) -> float:

@@ -17,12 +17,12 @@ from tests.device.canopen.ds402.wheel import (
 )
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.device.canopen.ds402.motion.trapezoid import Limits
+from tickrig.device.canopen.ds402.motion.trapezoid import PathLimits
 from tickrig.device.canopen.models import epos
 from tickrig.wire.instant import NEVER
 
 VELOCITY, ACCELERATION, DECELERATION = 3_000, 20_000, 10_000
-LIMITS = Limits(VELOCITY * RPM, ACCELERATION * RPM, DECELERATION * RPM)
+LIMITS = PathLimits(VELOCITY * RPM, ACCELERATION * RPM, DECELERATION * RPM)
 
 NEW, NEW_AT_ONCE, NEW_RELATIVE, NEW_ON_THE_WAY, READY = 0x1F, 0x3F, 0x5F, 0x21F, 0x0F
 HALT = 0x10F

@@ -6,7 +6,7 @@ import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.ds402.state.state import DriveState
+from tickrig.device.canopen.ds402.state.automaton import DriveState
 
 SOD = DriveState.SWITCH_ON_DISABLED
 QUICK_STOP = DriveState.QUICK_STOP_ACTIVE

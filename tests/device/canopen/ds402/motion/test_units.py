@@ -3,9 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.ds402.motion.units import Units
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import read_settings
+from tickrig.device.canopen.ds402.objects.settings import Units, read_settings
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.ds402.state.faults import register_of
-from tickrig.device.canopen.ds402.state.state import DriveState
+from tickrig.device.canopen.ds402.objects.error_codes import register_of
+from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.ds402.state.supervision import Bounds
 
 FAULT = DriveState.FAULT
@@ -134,11 +134,11 @@ def test_a_cooling_winding_is_looked_at_each_second(wheel: Wheel) -> None:
     wheel.set(load_nm=0.0)
     wheel.control(0x00)
     wheel.run(500)
-    before, due_us = wheel.drive.motor.winding_dc, wheel.slave.due_us
+    before, due_us = wheel.drive.axis.motor.winding_dc, wheel.slave.due_us
     assert 0 < due_us - wheel.now_us <= 1_000_000
     wheel.run(1_500)
-    assert wheel.drive.motor.winding_dc < before
-    assert wheel.drive.read("winding_c") == wheel.drive.motor.winding_dc / 10
+    assert wheel.drive.axis.motor.winding_dc < before
+    assert wheel.drive.read("winding_c") == wheel.drive.axis.motor.winding_dc / 10
 
 
 def test_a_lost_heartbeat_ends_in_fault_until_it_is_back(wheel: Wheel) -> None:

@@ -46,11 +46,11 @@ OUTPUTS: Final = {
 }
 
 READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
-    "shaft_deg": lambda drive: drive.motor.shaft_deg,
-    "shaft_deg_s": lambda drive: drive.motor.shaft_deg_s,
+    "shaft_deg": lambda drive: drive.axis.motor.shaft_deg,
+    "shaft_deg_s": lambda drive: drive.axis.motor.shaft_deg_s,
     "position": lambda drive: drive.axis.position,
-    "current_a": lambda drive: drive.motor.current_ma / 1_000,
-    "winding_c": lambda drive: drive.motor.winding_dc / 10,
+    "current_a": lambda drive: drive.axis.motor.current_ma / 1_000,
+    "winding_c": lambda drive: drive.axis.motor.winding_dc / 10,
     "drive_state": lambda drive: drive.state.name.capitalize().replace("_", " "),
     "mode": lambda drive: drive.mode_number,
 }

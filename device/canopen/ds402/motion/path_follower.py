@@ -7,7 +7,7 @@ from tickrig.device.canopen.ds402.motion.reference import Reference
 from tickrig.device.canopen.ds402.motion.trapezoid import Motion, Path
 
 
-class Course:
+class PathFollower:
     """Keeps the reference on a path, as long as nobody else moves it.
 
     The reference that a mode finds is that of the tick before: there a path begins.
@@ -41,7 +41,7 @@ class Course:
         self._left_at = None
 
     def follow(self, now_us: int) -> bool:
-        """Move the reference to where the path is now; say whether the path has ended."""
+        """Move the reference to where the path is now. Returns: whether the path has ended."""
         motion = self._path.at(now_us)
         self._reference.place(*motion)
         self._left_at = motion.position, motion.velocity
@@ -49,5 +49,5 @@ class Course:
 
 
 def began_us(now_us: int) -> int:
-    """Return since when the reference is where a mode finds it in this tick."""
+    """Return since when the reference is where a mode finds it in this tick, in microseconds."""
     return now_us - TICK_US

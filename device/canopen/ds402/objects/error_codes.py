@@ -46,7 +46,7 @@ _REGISTERS: Final = {
 
 
 def is_controllable(code: int) -> bool:
-    """Say whether the motor can be slowed down after a fault."""
+    """Return whether the motor can be slowed down after a fault."""
     return code in CONTROLLABLE or code in COMMUNICATION_ERRORS
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.ds402.modes.homing_methods import METHODS
+from tickrig.device.canopen.ds402.modes.homing_search import METHODS
 from tickrig.device.canopen.ds402.motion.trapezoid import RampShape
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.wire.canopen.datatypes import Value
