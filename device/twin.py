@@ -14,12 +14,29 @@ from enum import Enum
 from io import BytesIO
 from typing import Any, ClassVar, NoReturn, SupportsIndex, TypeVar
 
-from tickrig.wire.immutable import Immutable
-
-__all__ = ["Copyable", "Immutable", "Listeners", "NonCopyable", "twin"]
-
 T = TypeVar("T")
 K = TypeVar("K")
+
+
+class Immutable:
+    """A description that never changes once it is made, as that of a dictionary.
+
+    Copies within the process share it; a pickle has it by value.
+
+    Attributes:
+        shared_by_twins: true; a class of wire/ has this attribute instead of this base.
+    """
+
+    __slots__ = ()
+    shared_by_twins = True
+
+    def __copy__(self: T) -> T:
+        """Return it itself."""
+        return self
+
+    def __deepcopy__(self: T, memo: dict[int, Any]) -> T:
+        """Return it itself."""
+        return self
 
 
 class Copyable:
@@ -129,7 +146,7 @@ class _Pickler(pickle.Pickler):
         self._known = known
 
     def reducer_override(self, item: object) -> Any:
-        if isinstance(item, (Immutable, Enum, type)):
+        if isinstance(item, (Enum, type)) or getattr(type(item), "shared_by_twins", False):
             self.shared.append(item)
         elif id(item) in self._known and item is not _shared:
             self.shared.append(self._known[id(item)])

@@ -21,8 +21,7 @@ PACKAGES = sorted(name for name, path in modules().items() if path.name == "__in
 GRAPH = imports()
 # Circles that are still to be opened: who opens one takes its line away.
 MODULE_CIRCLES: list[list[str]] = []
-ROOM_CIRCLES = {
-}
+ROOM_CIRCLES: dict[str, str] = {}
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=[str(room.relative_to(ROOT)) for room in ROOMS])

@@ -8,7 +8,6 @@ from operator import attrgetter
 from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.immutable import Immutable
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
 """What a string or domain holds unless its description says less: all that SDO can carry."""
@@ -74,7 +73,7 @@ class ObjectDescription(NamedTuple):
     code: ObjectCode = ObjectCode.VAR
 
 
-class EntryDescription(Immutable):
+class EntryDescription:
     """What never changes of a variable, or of one element of an array or record (CiA 306).
 
     Args:
@@ -101,6 +100,7 @@ class EntryDescription(Immutable):
         signed: whether it is a signed integer.
         readable: the bus may read it.
         writable: the bus may write it.
+        shared_by_twins: copies of a slave within the process share it (`device/twin.py`).
         key: index and sub-index in one number.
     """
 
@@ -109,6 +109,7 @@ class EntryDescription(Immutable):
         *("low", "max_bytes", "name", "readable", "relative", "signed", "size", "sub"),
         *("unit", "writable"),
     )
+    shared_by_twins = True
 
     def __init__(  # noqa: PLR0913 - a description, by keyword
         self,
