@@ -357,8 +357,8 @@ def _ignore(at_us: int) -> None:
 
 
 def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
-    """Return the first tick after `now_us` that is not before `due_us`."""
+    """Return the first tick after `now_us` that is not before `due_us`, which may be `NEVER`."""
     first_us = now_us - now_us % tick_us + tick_us
     if due_us <= first_us:
         return first_us
-    return NEVER if due_us >= NEVER else -(-due_us // tick_us) * tick_us
+    return -(-due_us // tick_us) * tick_us

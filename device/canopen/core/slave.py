@@ -87,11 +87,11 @@ class CanopenSlave(Copyable):
         self.admits: Callable[[NmtCommand], bool] = _admits
         self.entered: Callable[[NmtState, NmtState], None] | None = None
         self.time_of_day: TimeOfDay | None = None
-        self.silent_until_us = 0
+        self.silent_until_us: int
         self._powered = False
         self._out: list[CanFrame] = []
-        self._handlers: dict[int, Handler] = {}
-        self._remote_handlers: dict[int, Handler] = {}
+        self._handlers: dict[int, Handler]
+        self._remote_handlers: dict[int, Handler]
         self.accepts: frozenset[int] | None = None
         self.reconfigured_by: frozenset[int] = frozenset()
         self.on_accepts: list[Callable[[], None]] = []
@@ -229,7 +229,7 @@ class CanopenSlave(Copyable):
 
     def _power_on(self) -> None:
         self._powered = True
-        self._out, self._dues = [], [NEVER] * len(self.services)
+        self._out = []
         self.pending_id = self.nonvolatile.node_id or self.configured_id
         self.time_of_day, self.silent_until_us = None, 0
         for service in self.services:

@@ -57,10 +57,11 @@ class Rpdo:
         )
         self.mapping = PdoMapping(dictionary, RPDO_MAPPINGS + offset, Access.RPDO, self.parameters)
         self._text = number.to_bytes(2, "little")
-        self.restart()
         self._unpack: Unpack
         self._pending: bytes | None
-        self._length, self._event_us, self._supervised = 0, 0, False
+        self._length: int
+        self._event_us: int
+        self._supervised: bool
 
     @property
     def reconfigures(self) -> bool:
@@ -83,7 +84,7 @@ class Rpdo:
             return None
         self._unpack, self._length = target
         self._event_us = self.parameters.event_us
-        self._supervised = bool(self._errors) or self._event_us > 0
+        self._supervised = bool(self._errors or self._event_us)
         if self.synchronous:
             return self._keep
         self._pending = None
@@ -164,7 +165,7 @@ class Rpdo:
             if code in self._errors:
                 self._errors.remove(code)
                 self._consumer.node.emergency_clear(code, self._text)
-        self._supervised = bool(self._errors) or self._event_us > 0
+        self._supervised = bool(self._errors or self._event_us)
 
     def _changed(self, entry: Entry) -> None:
         if entry.sub == EVENT_TIMER:

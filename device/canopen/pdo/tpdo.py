@@ -66,10 +66,10 @@ class Tpdo:
         )
         self.mapping = PdoMapping(dictionary, TPDO_MAPPINGS + offset, Access.TPDO, self.parameters)
         self.mode: TpdoMode = Silent(self)
-        self.pack: Pack = bytes
+        self.pack: Pack
         self.entries: list[Entry] = []
         self.wake = producer.wake
-        self._can_id = 0
+        self._can_id: int
         self._watched: list[Entry] = []
 
     def begin(self) -> None:
@@ -89,7 +89,6 @@ class Tpdo:
         """Send no more."""
         for entry in self._watched:
             entry.unwatch(self.mode.request)
-        self._watched.clear()
         self.mode = Silent(self)
 
     def send(self, data: bytes | None = None) -> None:

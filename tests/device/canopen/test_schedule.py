@@ -56,6 +56,13 @@ def test_the_earliest_counts_and_the_last_word_of_a_service(bus: Bus) -> None:
     assert bus.slave.due_us == 9_000
 
 
+def test_a_slave_without_power_is_due_at_once_whatever_its_services_wait_for() -> None:
+    slave = CanopenSlave(Dictionary([]), 5, (NmtSlave, First))
+    for due_us in (0, 5_000):
+        First.of(slave).schedule(due_us)
+    assert slave.due_us == 0
+
+
 def test_services_that_are_due_in_one_tick_are_all_run(bus: Bus) -> None:
     first, second = First.of(bus.slave), Second.of(bus.slave)
     first.schedule(2_000)

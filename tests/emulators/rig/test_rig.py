@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -140,3 +142,75 @@ def test_what_happens_at_the_deadline_is_in_time() -> None:
     echo = Echo(period_us=10_000)
     rig = Rig(Station(echo, SerialLine().a))
     assert rig.run_until(lambda: bool(echo.ticks), timeout_us=10_000)
+
+
+class Gate:
+    """A joint with the outside world that notes when it is opened."""
+
+    def __init__(self, due_us: int) -> None:
+        self.due_us, self.opened = due_us, list[str]()
+
+    def take_in(self, now_us: int, /) -> None:
+        self.opened.append(f"in {now_us}")
+
+    def give_out(self, now_us: int, /) -> None:
+        self.opened.append(f"out {now_us}")
+        self.due_us = NEVER
+
+
+def test_a_bridge_is_served_when_it_is_due_and_at_each_tick() -> None:
+    gate = Gate(due_us=3_300)
+    rig = Rig(Station(Echo(period_us=10_000), SerialLine().a), bridges=[gate])
+    assert rig.next_us == 3_300
+    rig.run_for(10_000)
+    assert gate.opened == ["in 3300", "out 3300", "in 10000", "out 10000"]
+
+
+def test_a_rig_stops_when_a_frame_has_come_to_the_host_that_waits() -> None:
+    wire = CanWire()
+    host, rig = wire.end(), Rig(Station(Node(1, period_us=10_000), wire.end()))
+    rig.run_to(100_000, host)
+    assert 10_000 < rig.now_us < 10_100
+    assert (host.arrived_us, host.poll(rig.now_us)) == (rig.now_us, frames("101#01"))
+
+
+@dataclass
+class Kick:
+    """Lets a node have work at one time."""
+
+    node: Node
+    at_us: int
+    tick_us: int = 1
+    due_us: int = NEVER
+
+    def act(self, now_us: int, /) -> None:
+        if now_us == self.at_us:
+            self.node.answer_us = 0
+
+
+def test_a_device_may_have_work_in_the_first_microsecond_and_in_the_next() -> None:
+    wire = CanWire()
+    node, other = Node(1, tick_us=1, answer_us=1), Node(2, tick_us=1)
+    kick = Kick(other, at_us=1, due_us=1)
+    Rig(Station(node, wire.end()), Station(other, wire.end()), couplings=[kick]).run_to(5)
+    assert (node.ticks, other.ticks) == ([1], [2])
+
+
+def test_a_frame_that_ends_right_before_the_tick_of_another_device_is_heard_at_its_end() -> None:
+    wire = CanWire()
+    node = Node(1, tick_us=1, accepts=frozenset({0x705}))
+    other, host = Node(2, tick_us=1, answer_us=136), wire.end()
+    rig = Rig(Station(node, wire.end()), Station(other, wire.end()))
+    host.send(80, frames("705#7F"))
+    rig.run_to(140)
+    assert (node.ticks, other.ticks) == ([135], [136])
+
+
+def test_of_two_wires_the_second_brings_a_frame_to_the_last_tick_of_a_run() -> None:
+    first, second = CanWire(), CanWire()
+    node, hosts = Node(1, accepts=None), (first.end(), second.end())
+    rig = Rig(Station(Node(2), first.end()), Station(node, second.end()))
+    hosts[0].send(0, frames("123#"))
+    hosts[1].send(1_000 - 55, frames("705#7F"))
+    rig.run_to(1_000)
+    assert node.ticks == [1_000]

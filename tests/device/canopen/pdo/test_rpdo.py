@@ -10,6 +10,7 @@ from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.instant import NEVER
 
 
 @pytest.fixture
@@ -70,6 +71,27 @@ def test_what_waits_for_sync_outlives_only_another_deadline(
     bench.must_write(command)
     bench.step("080#")
     assert outputs(bench) == ((0x11, 0x11) if command[1] == 5 else (0, 0))
+
+
+@pytest.mark.parametrize("pause", [(0x1400, 2, 255), (0x1400, 1, OFF | 0x205)])
+def test_what_waited_for_sync_does_not_come_back(
+    bench: PdoBench, pause: tuple[int, int, int]
+) -> None:
+    bench.set_rpdo1(1)
+    bench.operational()
+    bench.step("205#1111")
+    bench.must_write(pause, (0x1400, 1, OFF | 0x205), (0x1400, 2, 1), (0x1400, 1, 0x205))
+    bench.step("080#")
+    assert outputs(bench) == (0, 0)
+
+
+def test_an_rpdo_that_is_switched_off_is_not_late(bench: PdoBench) -> None:
+    bench.set_rpdo1(255, (5, 100))
+    bench.operational()
+    bench.step("205#0000")
+    bench.must_write((0x1400, 1, OFF | 0x205))
+    bench.run(500)
+    assert bench.emergencies == []
 
 
 def test_leaving_operational_forgets_what_waits_for_sync(bench: PdoBench) -> None:
@@ -161,6 +183,16 @@ def test_the_deadline_runs_from_the_first_frame(bench: PdoBench) -> None:
     assert bench.emergencies == ["8250 10 0100"]
 
 
+def test_an_rpdo_that_is_late_is_not_waited_for_any_more(bench: PdoBench) -> None:
+    bench.set_rpdo1(255, (5, 100))
+    bench.silence_tpdo2()
+    bench.operational()
+    bench.step("205#0000")
+    bench.run(100)
+    assert bench.emergencies == ["8250 10 0100"]
+    assert bench.slave.due_us == NEVER
+
+
 def test_the_earliest_deadline_counts(bench: PdoBench) -> None:
     bench.set_rpdo1(1, (5, 100))
     bench.must_write((0x1401, 5, 50))
@@ -246,6 +278,10 @@ def test_an_rpdo_that_may_write_communication_objects_can_change_what_is_heard()
     assert bench.slave.reconfigured_by == {0x000}
     bench.must_write((0x1400, 1, OFF | 0x205))
     bench.map(0x1600, 0x1017_0010)
+    bench.set_rpdo1(0xFF)
+    assert bench.slave.reconfigured_by == {0x000, 0x205}
+    bench.must_write((0x1400, 1, OFF | 0x205))
+    bench.map(0x1600, 0x2000_0008, 0x1017_0010)
     bench.set_rpdo1(0xFF)
     assert bench.slave.reconfigured_by == {0x000, 0x205}
     bench.set_rpdo1(1)  # it acts with SYNC

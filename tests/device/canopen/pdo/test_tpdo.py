@@ -3,10 +3,13 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.pdo_bench import NO_RTR, OFF, PdoBench
-from tests.device.canopen.reference import R32, RO, TPDO
+from tests.device.canopen.reference import NODE_ID, R32, RO, TPDO, make_dictionary
 from tests.device.canopen.reference import STR as NAME
+from tickrig.device.canopen.bus.sync import Sync
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -291,6 +294,46 @@ def test_a_profile_may_judge_what_an_event_is(bench: PdoBench) -> None:
     producer.request(1)
     producer.request(9)
     assert bench.step() == ["185#0100"]
+
+
+def test_a_tpdo_is_asked_for_by_its_number() -> None:
+    bench = PdoBench()
+    bench.operational()
+    PdoProducer.of(bench.slave).request(1)
+    assert bench.step() == ["185#0000"]
+    PdoProducer.of(bench.slave).request(2)
+    assert bench.step() == ["285#0000000000000000"]
+
+
+def test_what_is_asked_for_before_power_on_is_forgotten() -> None:
+    slave = CanopenSlave(make_dictionary(), NODE_ID, (NmtSlave, Sync, PdoProducer))
+    producer = PdoProducer.of(slave)
+    slave.dictionary[0x1800, 5].value = 10
+    producer.request(1)
+    producer.request_for(slave.dictionary[0x6000, 1])
+    assert [str(frame) for frame in slave.tick(1_000, ())] == ["705#00"]
+    assert slave.due_us == NEVER
+
+
+def test_an_object_that_is_mapped_no_longer_is_no_event(running: PdoBench) -> None:
+    running.must_write((0x1800, 1, OFF | 0x185))
+    running.map(0x1A00, 0x2000_0008)
+    running.must_write((0x1800, 1, NO_RTR | 0x185))
+    assert running.step() == ["185#00"]
+    running.set(0x6000, 1, 1)
+    assert running.run(10) == []
+    running.set(0x2000, 0, 1)
+    assert running.run(10) == ["185#01"]
+
+
+def test_who_wants_to_hear_of_transmissions_is_told_the_objects(running: PdoBench) -> None:
+    sent: list[tuple[int, int]] = []
+    PdoProducer.of(running.slave).on_sent.append(
+        lambda entries: sent.extend((entry.index, entry.sub) for entry in entries)
+    )
+    running.set(0x6000, 1, 1)
+    running.step()
+    assert sent == [(0x6000, 1), (0x6000, 2)]
 
 
 def test_an_event_of_a_cyclic_tpdo_is_none(bench: PdoBench) -> None:
