@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final
@@ -99,24 +98,6 @@ class BusReader:
 
 BusSource = LiveSource[Record]
 """One or more buses: all that comes are frames."""
-
-
-def open_buses(words: Sequence[BusSpec], options: BusOptions) -> BusSource:
-    """Open the buses that are named, or none.
-
-    Raises:
-        Refused: options that python-can does not know.
-        SourceFailed: a bus that cannot be opened.
-    """
-    readers: list[Reader[Record]] = []
-    try:
-        for word in words:
-            readers.append(reader_of(*open_bus(merged(word, options))))
-    except BaseException:
-        for reader in readers:
-            reader.close()
-        raise
-    return BusSource(readers, [word.chosen for word in words])
 
 
 def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:

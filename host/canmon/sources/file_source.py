@@ -16,12 +16,51 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.log_lines import LogLines
 from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024
 """Frames of one poll."""
 
 
-class FileSource:
+class TalliedSource:
+    """A source whose tallies say what was lost or is no frame.
+
+    Attributes:
+        ended: no more will come.
+        failed: why it ended before its time; empty if it did not.
+    """
+
+    ended = False
+    failed = ""
+
+    def tallies(self) -> Iterable[tuple[str, Tally]]:
+        """Return the tally of each file, with its name."""
+        raise NotImplementedError
+
+    @property
+    def lost(self) -> int:
+        """Frames that the recorder or writer says it lost."""
+        return sum(tally.lost for _, tally in self.tallies())
+
+    @property
+    def unread(self) -> int:
+        """Lines and frames that could not be taken."""
+        return sum(tally.unread for _, tally in self.tallies())
+
+    def messages(self) -> list[str]:
+        """Say what was no frame or got lost."""
+        return [text for name, tally in self.tallies() for text in tally.messages(name)]
+
+    def losses(self) -> list[str]:
+        """Say what got lost or could not be taken."""
+        return [text for name, tally in self.tallies() for text in tally.losses(name)]
+
+    def close(self) -> None:
+        """Read no more."""
+        self.ended = True
+
+
+class FileSource(TalliedSource):
     """One or more log files.
 
     Raises:
@@ -37,27 +76,12 @@ class FileSource:
             _check_readable(file)
         streams = [_chosen(file, reader) for file, reader in zip(files, self._readers, strict=True)]
         self._frames = streams[0] if len(streams) == 1 else _merged(streams)
-        self._ended, self._failed = False, ""
 
-    @property
-    def ended(self) -> bool:
-        """Say that all was read."""
-        return self._ended
-
-    @property
-    def lost(self) -> int:
-        """Frames that the recorders say they lost."""
-        return sum(reader.tally.lost for reader in self._readers)
-
-    @property
-    def unread(self) -> int:
-        """Lines and frames that could not be taken."""
-        return sum(reader.tally.unread for reader in self._readers)
-
-    @property
-    def failed(self) -> str:
-        """Why reading ended early."""
-        return self._failed
+    def tallies(self) -> Iterable[tuple[str, Tally]]:
+        """Return the tally of each file, with its name."""
+        return [
+            (name, reader.tally) for name, reader in zip(self._names, self._readers, strict=True)
+        ]
 
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Return the next frames; it never waits."""
@@ -65,23 +89,13 @@ class FileSource:
         try:
             batch.extend(islice(self._frames, BATCH))
         except (OSError, LogError) as error:
-            self._failed = str(error)
-        self._ended = len(batch) < BATCH
+            self.failed = str(error)
+        self.ended = len(batch) < BATCH
         return batch
-
-    def messages(self) -> list[str]:
-        """Say what was no frame or got lost."""
-        named = zip(self._names, self._readers, strict=True)
-        return [word for name, reader in named for word in reader.tally.messages(name)]
-
-    def losses(self) -> list[str]:
-        """Say what got lost or could not be taken."""
-        named = zip(self._names, self._readers, strict=True)
-        return [word for name, reader in named for word in reader.tally.losses(name)]
 
     def close(self) -> None:
         """Read no more."""
-        self._ended = True
+        super().close()
         self._frames = iter(())
 
 
@@ -107,56 +121,27 @@ STDIN: Final = 0
 READ_BYTES: Final = 1 << 16
 
 
-class StdinSource:
+class StdinSource(TalliedSource):
     """A pipe, a terminal or a file that somebody feeds."""
 
     live = True
 
     def __init__(self, descriptor: int = STDIN) -> None:
         self._descriptor, self._lines = descriptor, LogLines()
-        self._ended, self._failed = False, ""
 
-    @property
-    def ended(self) -> bool:
-        """Say that its writer has closed it."""
-        return self._ended
-
-    @property
-    def lost(self) -> int:
-        """Frames that its writer says it lost."""
-        return self._lines.tally.lost
-
-    @property
-    def unread(self) -> int:
-        """Lines and frames that could not be taken."""
-        return self._lines.tally.unread
-
-    @property
-    def failed(self) -> str:
-        """Why reading ended early."""
-        return self._failed
+    def tallies(self) -> Iterable[tuple[str, Tally]]:
+        """Return the tally of what came."""
+        return [("standard input", self._lines.tally)]
 
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Wait for bytes; return the frames of the lines that are whole."""
-        if self._ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
+        if self.ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
             return []
         try:
             data = os.read(self._descriptor, READ_BYTES)
         except OSError as error:
-            data, self._failed = b"", f"standard input: {error.strerror}"
+            data, self.failed = b"", f"standard input: {error.strerror}"
         if data:
             return self._lines.push(data)
-        self._ended = True
+        self.ended = True
         return self._lines.finish()
-
-    def messages(self) -> list[str]:
-        """Say what was no frame or got lost."""
-        return self._lines.tally.messages("standard input")
-
-    def losses(self) -> list[str]:
-        """Say what got lost or could not be taken."""
-        return self._lines.tally.losses("standard input")
-
-    def close(self) -> None:
-        """Read no more; the descriptor is not ours."""
-        self._ended = True

@@ -7,21 +7,16 @@ line of an adapter of its own on each of their wires.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import PurePath
 from typing import Final
 
-from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.live_source import LiveSource, Reader
-from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec
-from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.canmon.sources.source_spec import LineSpec
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.host.monitor.frames.candump_filter import CandumpFilter
-from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
+from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.rtc_lite.frame import LiteChecksum
 
@@ -67,44 +62,3 @@ class LineReader:
     def close(self) -> None:
         """Close the port."""
         self._link.close()
-
-
-def open_lines(
-    words: Sequence[LineSpec], buses: Sequence[BusSpec], options: BusOptions
-) -> LiveSource[AnyRecord]:
-    """Open serial ports, and buses beside them.
-
-    Raises:
-        Refused: options that python-can does not know.
-        SourceFailed: a port or bus that cannot be opened.
-    """
-    readers: list[Reader[AnyRecord]] = []
-    try:
-        for word in words:
-            readers.append(open_port(word))
-        for bus in buses:
-            readers.append(_open_bus(bus, options))
-    except BaseException:
-        for reader in readers:
-            reader.close()
-        raise
-    chosen: list[CandumpFilter | None] = [None] * len(words)
-    return LiveSource(readers, chosen + [bus.chosen for bus in buses])
-
-
-def open_port(word: LineSpec) -> LineReader:
-    """Open a serial port; SourceFailed if that cannot be."""
-    try:
-        return LineReader(word)
-    except LinkClosed as error:
-        raise SourceFailed(str(error)) from None
-
-
-def _open_bus(word: BusSpec, options: BusOptions) -> Reader[AnyRecord]:
-    from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
-        merged,
-        open_bus,
-        reader_of,
-    )
-
-    return reader_of(*open_bus(merged(word, options)))

@@ -8,13 +8,18 @@ from collections.abc import Iterable, Sequence
 from itertools import repeat
 from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import LineRecord
+    import can
+
+    from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec
+    from tickrig.host.cli.can_options import BusOptions
+    from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
 
 QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""
@@ -61,6 +66,9 @@ class LiveSource(Generic[Item]):
         readers: open buses and ports.
         chosen: which frames of each are wanted; None for all.
         queue_frames: frames that are kept.
+
+    Attributes:
+        failed: why a bus is gone.
     """
 
     live = True
@@ -73,7 +81,7 @@ class LiveSource(Generic[Item]):
     ) -> None:
         self._readers, self._queue_frames = readers, queue_frames
         self._queue: deque[Item] = deque()
-        self._came, self._stop, self._overruns, self._failed = threading.Event(), False, 0, ""
+        self._came, self._stop, self._overruns, self.failed = threading.Event(), False, 0, ""
         pairs = list(zip(readers, chosen, strict=False))
         self._stepped = [pair for pair in pairs if pair[0].stepped]
         self._threads = [
@@ -87,7 +95,7 @@ class LiveSource(Generic[Item]):
     @property
     def ended(self) -> bool:
         """Say that a bus is gone, and all that came was fetched."""
-        return (bool(self._failed) or self._stop) and not self._queue
+        return (bool(self.failed) or self._stop) and not self._queue
 
     @property
     def lost(self) -> int:
@@ -98,11 +106,6 @@ class LiveSource(Generic[Item]):
     def unread(self) -> int:
         """Frames that came and could not be taken, as those of CAN FD."""
         return sum(reader.tally.unread for reader in self._readers)
-
-    @property
-    def failed(self) -> str:
-        """Why a bus is gone."""
-        return self._failed
 
     def poll(self, timeout_us: int, /) -> list[Item]:
         """Wait for a first frame, then return all that are there."""
@@ -137,7 +140,7 @@ class LiveSource(Generic[Item]):
             reader.close()
 
     def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
-        while not self._stop and not self._failed:
+        while not self._stop and not self.failed:
             self._take(reader, chosen, WAIT_US)
         self._came.set()
 
@@ -145,7 +148,7 @@ class LiveSource(Generic[Item]):
         try:
             records = reader.read(timeout_us)
         except LinkClosed as error:
-            self._failed = str(error)
+            self.failed = str(error)
             return
         if chosen is not None:
             records = [one for one in records if _passes(chosen, one)]
@@ -160,3 +163,37 @@ class LiveSource(Generic[Item]):
 
 def _passes(chosen: CandumpFilter, one: Record | LineRecord) -> bool:
     return not isinstance(one, Record) or chosen.passes(flagged_id(one))
+
+
+def open_live(
+    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
+) -> tuple[LiveSource[AnyRecord], dict[str, can.BusABC]]:
+    """Open buses and serial ports.
+
+    Returns:
+        The source, and the buses by name, to send on.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: a bus or port that cannot be opened.
+    """
+    opened: dict[str, can.BusABC] = {}
+    readers: list[Reader[AnyRecord]] = []
+    try:
+        for word in buses:
+            from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
+
+            bus, interface, name = bus_source.open_bus(bus_source.merged(word, options))
+            readers.append(bus_source.reader_of(bus, interface, name))
+            opened[name] = bus
+        for line in lines:
+            from tickrig.host.canmon.sources.line_source import LineReader  # noqa: PLC0415 - pyserial
+
+            readers.append(LineReader(line))
+    except BaseException as error:
+        for reader in readers:
+            reader.close()
+        if isinstance(error, LinkClosed):
+            raise SourceFailed(str(error)) from None
+        raise
+    return LiveSource(readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]), opened

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
 import click
 
@@ -47,7 +47,7 @@ class AnySource(Protocol[Taken_co]):
 
     @property
     def ended(self) -> bool:
-        """Say that no more will come."""
+        """Whether no more will come."""
         ...
 
     @property
@@ -119,9 +119,7 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
-    from tickrig.host.canmon.sources.bus_source import open_buses  # noqa: PLC0415 - threads, for buses only
-
-    return open_buses(buses or [BusSpec()], options)
+    return cast("Source", _open_live(buses or [BusSpec()], [], options))  # buses alone: frames
 
 
 def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
@@ -133,9 +131,15 @@ def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
     buses = [word for word in parsed if isinstance(word, BusSpec)]
     if len(buses) + len(lines) < len(parsed):
         raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
-    from tickrig.host.canmon.sources.line_source import open_lines  # noqa: PLC0415 - pyserial
+    return _open_live(buses, lines, options)
 
-    return open_lines(lines, buses, options)
+
+def _open_live(
+    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
+) -> AnySource[AnyRecord]:
+    from tickrig.host.canmon.sources.live_source import open_live  # noqa: PLC0415 - threads
+
+    return open_live(buses, lines, options)[0]
 
 
 def log_path(word: str) -> Path:

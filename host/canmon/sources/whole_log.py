@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.file_source import TalliedSource
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.tally import Tally
 from tickrig.host.monitor.traffic.traffic import Snapshot
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ SMALL_BYTES: Final = 1 << 20
 """Below it a log is read frame by frame sooner than numpy is imported."""
 
 
-class WholeLog:
+class WholeLog(TalliedSource):
     """All of a log file, as a source whose end is reached.
 
     Attributes:
@@ -29,41 +31,23 @@ class WholeLog:
 
     live = False
     ended = True
-    failed = ""
 
     def __init__(self, path: Path, columns: Columns) -> None:
         self._name, self.columns = str(path), columns
 
-    @property
-    def lost(self) -> int:
-        """Frames that its recorder says it lost."""
-        return self.columns.tally.lost
-
-    @property
-    def unread(self) -> int:
-        """Lines and frames that could not be taken."""
-        return self.columns.tally.unread
+    def tallies(self) -> Iterable[tuple[str, Tally]]:
+        """Return the tally of the file."""
+        return [(self._name, self.columns.tally)]
 
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Return nothing: all is in the columns."""
         return []
-
-    def messages(self) -> list[str]:
-        """Say what was no frame or got lost, one line each."""
-        return self.columns.tally.messages(self._name)
-
-    def losses(self) -> list[str]:
-        """Say what got lost or could not be taken."""
-        return self.columns.tally.losses(self._name)
 
     def snapshot(self) -> Snapshot:
         """Return the statistics of all frames."""
         from tickrig.host.monitor.columns.column_traffic import snapshot_of  # noqa: PLC0415 - numpy
 
         return snapshot_of(self.columns)
-
-    def close(self) -> None:
-        """Close nothing: it was read."""
 
 
 def whole_log(words: Sequence[str]) -> WholeLog | None:

@@ -9,13 +9,12 @@ from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
-from tickrig.host.canmon.sources.live_source import LiveSource, Reader
+from tickrig.host.canmon.sources.live_source import open_live
 from tickrig.host.canmon.sources.source import open_any
 from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec, parse_source
 from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Send, Session
+from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.frames.record import AnyRecord
 
 TERMINAL: Final = "/dev/tty"
 
@@ -36,35 +35,12 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
         return Session(open_any(words, options), model)
     if not lines:
         buses = buses or [BusSpec()]
-    return Session(*_open_live(buses, lines, options, model))
+    from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415 - python-can is slow
 
-
-def _open_live(
-    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions, model: Model
-) -> tuple[LiveSource[AnyRecord], Model, dict[str, Send]]:
-    from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415
-    from tickrig.host.canmon.sources.bus_source import (  # noqa: PLC0415
-        merged,
-        open_bus,
-        reader_of,
+    source, opened = open_live(buses, lines, options)
+    return Session(
+        source, model, {name: partial(send_on, bus, name) for name, bus in opened.items()}
     )
-    from tickrig.host.canmon.sources.line_source import open_port  # noqa: PLC0415 - pyserial
-
-    sends: dict[str, Send] = {}
-    readers: list[Reader[AnyRecord]] = []
-    try:
-        for word in buses:
-            bus, interface, name = open_bus(merged(word, options))
-            readers.append(reader_of(bus, interface, name))
-            sends[name] = partial(send_on, bus, name)
-        for line in lines:
-            readers.append(open_port(line))
-    except BaseException:
-        for reader in readers:
-            reader.close()
-        raise
-    chosen = [*(word.chosen for word in buses), *(None for _ in lines)]
-    return LiveSource(readers, chosen), model, sends
 
 
 def _take_pipe() -> int:
