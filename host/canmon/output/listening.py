@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final, TypeVar
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Final, TypeVar
 import click
 
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.screen import Screen
+from tickrig.host.canmon.output.ending import until_interrupted
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
@@ -18,9 +19,9 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.text.values import parse_time_us
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import LineRecord, Record
+    from tickrig.host.monitor.frames.record import AnyRecord
 
-Item = TypeVar("Item")
+Item = TypeVar("Item", bound="AnyRecord")
 
 POLL_US: Final = 20_000
 PATIENCE_US: Final = 5_000_000
@@ -47,6 +48,32 @@ def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
     return next(named, None) if options.bitrate is None else options.bitrate
 
 
+def follow(  # noqa: PLR0913 - how, on a screen and without
+    source: AnySource[Item],
+    words: Sequence[str],
+    take: Callable[[Sequence[Item]], None],
+    span_us: int | None,
+    lines: Lines | None = None,
+    *,
+    press: Callable[[str], None] = lambda key: None,
+) -> None:
+    """Take what comes until the source ends, the time is over or somebody interrupts it.
+
+    Args:
+        source: where frames come from.
+        words: its SOURCE words.
+        take: takes what comes.
+        span_us: for how long; None where nobody said it.
+        lines: what is shown meanwhile of a live source, where there is a terminal.
+        press: acts on keys that are pressed there.
+    """
+    with until_interrupted():
+        if lines is not None and source.live and sys.stdout.isatty():
+            paint(source, take, lines, span_us, press)
+        else:
+            listen(source, take, span_us or patience_us(source, words))
+
+
 def listen(
     source: AnySource[Item], take: Callable[[Sequence[Item]], None], span_us: int | None
 ) -> None:
@@ -69,14 +96,13 @@ def is_over(begin_s: float, span_us: int | None) -> bool:
 PAINT_S: Final = 0.1
 QUIT: Final = "q"
 
-Shown = TypeVar("Shown", bound="Record | LineRecord")
 Lines = Callable[[int, int, int], list[str]]
 """Returns what is shown at a time on a screen with so many columns and lines."""
 
 
 def paint(
-    source: AnySource[Shown],
-    take: Callable[[Sequence[Shown]], None],
+    source: AnySource[Item],
+    take: Callable[[Sequence[Item]], None],
     lines: Lines,
     span_us: int | None,
     press: Callable[[str], None] = lambda key: None,
@@ -90,6 +116,8 @@ def paint(
         span_us: for how long; None for no end.
         press: acts on other keys, and what it does is shown at once.
     """
+    from tickrig.host.canmon.output.screen import Screen  # noqa: PLC0415 - termios, where there is one
+
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
         while not (source.ended or is_over(begin_s, span_us)):

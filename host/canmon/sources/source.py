@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
-
-import click
 
 from tickrig.host.canmon.sources.file_source import FileSource, StdinSource
 from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, LineSpec, parse_source
@@ -17,21 +14,6 @@ from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
-
-SOURCE_HELP = """\b
-SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
-         can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
-         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
-         serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
-         run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4
-         -                         standard input: what candump or canmon dump prints"""
-"""For the help text of a verb that takes SOURCE words."""
-
-
-def explain_sources(command: click.Command) -> None:
-    """Put what a SOURCE may be in the place of `{source}` in a command's help."""
-    command.help = cleandoc(command.help or "").replace("{source}", SOURCE_HELP)
-
 
 Taken_co = TypeVar("Taken_co", covariant=True)
 

@@ -16,9 +16,10 @@ from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
-from tickrig.host.canmon.sources.source import Source, explain_sources, open_source
+from tickrig.host.canmon.sources.source import Source, open_source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.checker import Checker
@@ -98,14 +99,12 @@ RULE_FILE: Final = ".toml"
 NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@rule_options
-@span_option
-@click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report.")
-@click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
-@bus_options
+@source_command(
+    rule_options,
+    span_option,
+    click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
+    click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
+)
 def command(
     *,
     source: Sequence[str],
@@ -247,6 +246,3 @@ def _write(path: Path | None, text: str) -> None:
         path.write_text(text, "utf-8")
     except OSError as error:
         refuse_path("--junit", error)
-
-
-explain_sources(command)

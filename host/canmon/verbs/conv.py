@@ -11,7 +11,7 @@ import click
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.log_file import LogFile
-from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.sources.source import open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
@@ -19,6 +19,7 @@ from tickrig.host.canmon.verbs.decode_options import (
     read_filter,
 )
 from tickrig.host.canmon.verbs.dump import pass_on
+from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.options import PATH
 
 
@@ -27,7 +28,7 @@ from tickrig.host.cli.options import PATH
 @click.argument("log", type=PATH)
 @filter_option
 @decode_options
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@strict_option
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
@@ -58,4 +59,4 @@ def command(  # noqa: PLR0913 - options
     report(frames, strict, meaning.messages())
 
 
-explain_sources(command)
+explained(command)

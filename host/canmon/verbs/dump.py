@@ -16,7 +16,7 @@ from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder, Meant
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
-from tickrig.host.canmon.sources.source import AnySource, explain_sources, open_any
+from tickrig.host.canmon.sources.source import AnySource, open_any
 from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -24,7 +24,8 @@ from tickrig.host.canmon.verbs.decode_options import (
     make_decoder,
     read_filter,
 )
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.dump_line import Stamp
@@ -59,17 +60,15 @@ _ending: Final = add_options(
     click.option(
         "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
     ),
-    click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."),
 )
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@_shown
-@filter_option
-@decode_options
-@_ending
-@bus_options
+@source_command(
+    _shown,
+    filter_option,
+    decode_options,
+    _ending,
+)
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
@@ -144,6 +143,3 @@ def pass_on(
             latest_s = time.monotonic()
         elif time.monotonic() - latest_s >= quiet_s:
             break
-
-
-explain_sources(command)

@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -15,10 +16,11 @@ import click
 
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.output.listening import listen, paint, patience_us, span_option
-from tickrig.host.canmon.sources.source import Source, explain_sources, open_source
+from tickrig.host.canmon.output.listening import follow, span_option
+from tickrig.host.canmon.sources.source import Source, open_source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
 from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
+from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
@@ -135,7 +137,7 @@ SIZE: Final = (100, 28)
 @click.option("--size", metavar="WxH", default="960x400", help="Of a picture; 960x400 pixels.")
 @click.option("--window", metavar="TIME", default="10s", help="Shown of a bus; 10s.")
 @span_option
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
+@strict_option
 @bus_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """Draw curves of SOURCE: in the terminal, or to files.
@@ -168,8 +170,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     frames = whole or open_source([source], BusOptions(**options))
     collector = Collector(words, decoder, MOST if frames.live else 0)
     try:
-        with until_interrupted():
-            _collect(frames, source, collector, request)
+        _collect(frames, source, collector, request)
         _show(collector.series, request)
     finally:
         frames.close()
@@ -181,16 +182,11 @@ def _collect(
 ) -> None:
     """Take what comes; live, paint it where there is a terminal."""
     if isinstance(frames, WholeLog):
-        collector.take_columns(frames.columns)
-    elif frames.live and sys.stdout.isatty():
-        paint(
-            frames,
-            collector.take_all,
-            lambda *at: _live(collector.series, request, *at),
-            request.span_us,
-        )
+        with until_interrupted():
+            collector.take_columns(frames.columns)
     else:
-        listen(frames, collector.take_all, request.span_us or patience_us(frames, [source]))
+        lines = partial(_live, collector.series, request)
+        follow(frames, [source], collector.take_all, request.span_us, lines)
 
 
 def _live(
@@ -217,4 +213,4 @@ def _show(series: Sequence[Series], request: GraphRequest) -> None:
         click.echo("\n".join(line.rstrip() for line in lines))
 
 
-explain_sources(command)
+explained(command)

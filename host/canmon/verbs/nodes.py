@@ -11,11 +11,12 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.ending import report, until_interrupted
-from tickrig.host.canmon.output.listening import listen, paint, patience_us, span_option
-from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.output.ending import report
+from tickrig.host.canmon.output.listening import follow, span_option
+from tickrig.host.canmon.sources.source import open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
@@ -25,13 +26,11 @@ MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@eds_option
-@span_option
-@click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
-@bus_options
+@source_command(
+    eds_option,
+    span_option,
+    click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end."),
+)
 def command(
     *,
     source: Sequence[str],
@@ -59,11 +58,7 @@ def command(
     view = NodesView(read_eds_files(eds))
     frames = open_source(source, BusOptions(**options))
     try:
-        with until_interrupted():
-            if frames.live and sys.stdout.isatty() and not jsonl:
-                paint(frames, view.take, view.painted, span_us)
-            else:
-                listen(frames, view.take, span_us or patience_us(frames, source))
+        follow(frames, source, view.take, span_us, None if jsonl else view.painted)
         with until_unread():
             for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
                 click.echo(line)
@@ -112,6 +107,3 @@ def _columns() -> int:
     from shutil import get_terminal_size  # noqa: PLC0415 - slow, and no pipe wants it
 
     return get_terminal_size().columns
-
-
-explain_sources(command)

@@ -8,11 +8,12 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.ending import report, until_interrupted
-from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
-from tickrig.host.canmon.sources.source import explain_sources, open_source
+from tickrig.host.canmon.output.ending import report
+from tickrig.host.canmon.output.listening import bit_rate_of, follow, span_option
+from tickrig.host.canmon.sources.source import open_source
 from tickrig.host.canmon.sources.whole_log import whole_log
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.host.monitor.views.statistics import (
@@ -26,15 +27,13 @@ from tickrig.host.monitor.views.statistics import (
 )
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@click.option(
-    "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
+@source_command(
+    click.option(
+        "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
+    ),
+    span_option,
+    click.option("--jsonl", is_flag=True, help="One JSON object a row."),
 )
-@span_option
-@click.option("--jsonl", is_flag=True, help="One JSON object a row.")
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
-@bus_options
 def command(
     *,
     source: Sequence[str],
@@ -69,8 +68,7 @@ def command(
             traffic.take(record)
 
     try:
-        with until_interrupted():
-            listen(frames, take, span_us or patience_us(frames, source))
+        follow(frames, source, take, span_us)
     finally:
         frames.close()
     snapshot = log.snapshot() if log else traffic.snapshot()
@@ -90,6 +88,3 @@ def _jsonl(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
     if by == "id":
         return lines + [id_json(row) for row in snapshot.rows]
     return lines + [node_json(row) for row in node_rows(snapshot.rows)]
-
-
-explain_sources(command)

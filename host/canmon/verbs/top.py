@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,16 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.ending import report, until_interrupted
+from tickrig.host.canmon.output.ending import report
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
-from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
-    listen,
-    paint,
-    patience_us,
-    span_option,
-)
-from tickrig.host.canmon.sources.source import explain_sources, open_any
+from tickrig.host.canmon.output.listening import bit_rate_of, follow, span_option
+from tickrig.host.canmon.sources.source import open_any
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -27,7 +20,8 @@ from tickrig.host.canmon.verbs.decode_options import (
     make_decoder,
     read_filter,
 )
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.views.top_model import TopModel
 
 if TYPE_CHECKING:
@@ -36,14 +30,12 @@ if TYPE_CHECKING:
 Take = Callable[["Sequence[AnyRecord]"], None]
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@click.option("-d", "--decode", is_flag=True, help="Show what frames mean instead of bytes.")
-@filter_option
-@decode_options
-@span_option
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
-@bus_options
+@source_command(
+    click.option("-d", "--decode", is_flag=True, help="Show what frames mean instead of bytes."),
+    filter_option,
+    decode_options,
+    span_option,
+)
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
@@ -77,34 +69,20 @@ def command(  # noqa: PLR0913 - options
     chosen, model = read_filter(wanted), TopModel(bit_rate_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
     meaning = FilteredDecoder(None if plain else make_decoder(eds, dbc), chosen)
-    take = model.take if plain else _take_decoded(model, meaning)
+    take: Take = model.take
+    if not plain:
+        take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     log = whole_log(source) if plain else None
     model.press("d" if decode else "")
     frames = log or open_any(source, bus)
-    on_screen = frames.live and sys.stdout.isatty()
+
+    def lines(at_us: int, width: int, height: int) -> list[str]:
+        return model.lines(at_us, frames.lost, width, height, frames.unread)
+
     try:
-        with until_interrupted():
-            if on_screen:
-                paint(
-                    frames,
-                    take,
-                    lambda at_us, width, height: model.lines(
-                        at_us, frames.lost, width, height, frames.unread
-                    ),
-                    span_us,
-                    model.press,
-                )
-            else:
-                listen(frames, take, span_us or patience_us(frames, source))
+        follow(frames, source, take, span_us, lines, press=model.press)
         with until_unread():
             click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
     report(frames, strict, meaning.messages())
-
-
-def _take_decoded(model: TopModel, meaning: FilteredDecoder) -> Take:
-    return lambda records: model.take_decoded(meaning.take(records))
-
-
-explain_sources(command)

@@ -11,15 +11,15 @@ import click
 
 from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.output.ending import report
-from tickrig.host.canmon.sources.source import explain_sources
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     eds_paths,
     read_eds_paths,
     refusing_dbc,
 )
+from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
@@ -29,14 +29,12 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.tui.app import Monitor
 
 
-@click.command(cls=BusCommand)
-@click.argument("source", nargs=-1)
-@click.option(
-    "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
+@source_command(
+    click.option(
+        "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
+    ),
+    decode_options,
 )
-@decode_options
-@click.option("--strict", is_flag=True, help="Exit status 4 if frames were lost or bad.")
-@bus_options
 def command(
     *,
     source: Sequence[str],
@@ -106,6 +104,3 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
     except WorkspaceError as error:
         raise Refused(str(error)) from None
     return Monitor(session, panels, bench)
-
-
-explain_sources(command)
