@@ -6,7 +6,7 @@ from tickrig import SimLink
 from tickrig.device.urg.world import Post, World  # internal
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
 from tickrig.host.motion.geometry import Pose  # internal
-from tickrig.host.motion.options.guard import Guard  # internal
+from tickrig.host.motion.options.collision_guard import CollisionGuard  # internal
 
 SECOND_US = 1_000_000
 
@@ -15,7 +15,7 @@ def main() -> None:
     """Drive 3 m with a post on the way."""
     loop = ClosedLoop(world=World(posts=(Post(2.0, 0.1, 0.2),)))
     (eye,) = loop.range_finders
-    guard = Guard(loop.manager, loop.chain, lambda name: SimLink(loop.rig, eye.line.b))
+    guard = CollisionGuard(loop.manager, loop.chain, lambda name: SimLink(loop.rig, eye.line.b))
     loop.activate("tuned")
     guard.activate()
     loop.run_to(SECOND_US)

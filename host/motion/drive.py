@@ -15,12 +15,12 @@ PERIOD_US: Final = 20_000
 SETTLE_US: Final = 500_000
 """Time for the components to come up, and for a cart to roll on after its goal is reached."""
 
-LOOK: Final = 5
+ERROR_CHECK_PERIODS: Final = 5
 """Samples from one look for a component in Error to the next."""
 
-PATIENCE: Final = 3
+TIMEOUT_FACTOR: Final = 3
 """Times the least time that a way may take, and half a minute."""
-PATIENCE_S: Final = 30
+TIMEOUT_EXTRA_S: Final = 30
 
 OnSample = Callable[[Sample], None]
 
@@ -74,7 +74,7 @@ def drive(
     Args:
         connection: its components are active.
         points: one is a goal.
-        watch: told each sample.
+        watch: called with each sample.
         timeout_us: when to give up; three times the least time and half a minute if left out.
 
     Raises:
@@ -84,12 +84,12 @@ def drive(
     finished = entered.finished
     entered.replace(*points)
     run = MotionRun(points[-1])
-    until_us = start_us + (timeout_us or _patience_us(connection, points))
+    until_us = start_us + (timeout_us or _timeout_us(connection, points))
     while connection.now_us < until_us:
         connection.run_to(min(connection.now_us + PERIOD_US, until_us))
         run.samples.append(sample(connection, (connection.now_us - start_us) / 1e6))
         watch(run.samples[-1])
-        if len(run.samples) % LOOK == 0 and connection.chain.in_error:
+        if len(run.samples) % ERROR_CHECK_PERIODS == 0 and connection.chain.in_error:
             break
         if entered.finished > finished and run.reached_s is None:
             run.reached_s = run.duration_s
@@ -97,9 +97,9 @@ def drive(
     return run
 
 
-def _patience_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
+def _timeout_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
     least_s = least_time_s(plan(connection.chain.odometry.pose, points))
-    return round((PATIENCE * least_s + PATIENCE_S) * 1e6)
+    return round((TIMEOUT_FACTOR * least_s + TIMEOUT_EXTRA_S) * 1e6)
 
 
 def sample(connection: BaseConnection, time_s: float) -> Sample:
@@ -110,8 +110,8 @@ def sample(connection: BaseConnection, time_s: float) -> Sample:
     return Sample(time_s, connection.pose, follower.twist, line)
 
 
-def expect(chain: MotionChain, response_s: float) -> None:
-    """Let the set `tuned` expect a base's time constant, and one period and a half of delay."""
+def set_latency(chain: MotionChain, response_s: float) -> None:
+    """Tune the set `tuned` to a base: its time constant in s, and one and a half periods."""
     latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
     for component in (chain.navigation, chain.path_follower):
         component.configuration.set("latency", latency, "tuned")

@@ -131,15 +131,15 @@ def way_time_s(way: float, speed: float, acceleration: float) -> float:
     return way / speed + speed / acceleration
 
 
-def least_time_s(relays: Sequence[Pose], can: MotionLimits | None = None) -> float:
+def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> float:
     """Return the least time along a list of `omni_to_2wd.plan`.
 
     >>> round(least_time_s([Pose(), Pose(), Pose(3.0), Pose(3.0, 0.0, 0.3)]), 2)
     12.06
     """
-    can = can or MotionLimits()
+    limits = limits or MotionLimits()
     return sum(
-        way_time_s(here.distance(there), can.v, can.acceleration)
-        + way_time_s(abs(wrap(there.heading - here.heading)), can.w, can.angular_acceleration)
+        way_time_s(here.distance(there), limits.v, limits.acceleration)
+        + way_time_s(abs(wrap(there.heading - here.heading)), limits.w, limits.angular_acceleration)
         for here, there in pairwise(relays)
     )

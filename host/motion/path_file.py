@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import sound
+from tickrig.host.motion.ports import plausible
 
 FARTHEST_M: Final = 1_000
 """A goal farther than this from the start is a slip of the pen: it takes an hour."""
@@ -38,7 +38,7 @@ def _point(place: str, words: list[str]) -> Pose:
         numbers = [float(word) for word in words]
     except ValueError:
         numbers = []
-    if len(numbers) not in (2, 3) or not sound(*numbers):
+    if len(numbers) not in (2, 3) or not plausible(*numbers):
         text = " ".join(words)
         raise ValueError(f"{place}: {text!r} is not x y in metres, and a heading in radians")
     if not within_reach(point := Pose(*numbers)):

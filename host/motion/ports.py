@@ -32,8 +32,8 @@ def newest(port: InPort[T]) -> T | None:
     return latest
 
 
-def sound(*numbers: float) -> bool:
-    """Return whether these are numbers of a cart: not NaN, infinite or beyond `MOST`."""
+def plausible(*numbers: float) -> bool:
+    """Return whether these can be numbers of a cart: not NaN, infinite or beyond `MOST`."""
     for number in numbers:  # noqa: SIM110 - all() takes twice as long
         if not -MOST <= number <= MOST:
             return False
@@ -41,13 +41,13 @@ def sound(*numbers: float) -> bool:
 
 
 def to_pose(data: Pose2D) -> Pose | None:
-    """Return a pose, its heading in -pi..pi; None if a number is not `sound`."""
+    """Return a pose, its heading in -pi..pi; None if a number is not `plausible`."""
     x, y, heading = data.position.x, data.position.y, data.heading
-    return Pose(x, y, wrap(heading)) if sound(x, y, heading) else None
+    return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
 
 
 def newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
-    """Return the pose that arrived last; None if nothing arrived, or a number is not `sound`."""
+    """Return the pose that arrived last; None without one, or if a number is not `plausible`."""
     latest = newest(port)
     return None if latest is None else to_pose(latest.data)
 

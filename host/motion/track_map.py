@@ -15,7 +15,7 @@ HEIGHT: Final = 16
 MARGIN: Final = 0.08
 """Share of the larger side that is left free all round."""
 SMALLEST_M: Final = 0.5
-EVERY: Final = 10
+DRAW_EVERY: Final = 10
 """Samples from one drawing to the next."""
 _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
@@ -67,7 +67,7 @@ class TrackMap:
 
 
 class LiveMap:
-    """Told each sample, it draws the map and a line of numbers below it.
+    """Receives each sample; draws the map and a line of numbers below it.
 
     Args:
         track: what is drawn.
@@ -81,7 +81,7 @@ class LiveMap:
     def watch(self, sample: Sample) -> None:
         """Take a sample; draw if it is time."""
         self._track.add(sample.pose)
-        if self._count % EVERY == 0:
+        if self._count % DRAW_EVERY == 0:
             self._draw(sample)
         self._count += 1
 

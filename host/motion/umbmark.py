@@ -1,4 +1,4 @@
-"""UMBmark: squares both ways tell the systematic errors of an odometry, and mend them.
+"""UMBmark: systematic errors of an odometry, measured by squares both ways, and corrected.
 
 Source: Borenstein and Feng, Measurement and Correction of Systematic Odometry Errors in
 Mobile Robots, IEEE Transactions on Robotics and Automation 12 (6), 1996.
@@ -83,7 +83,7 @@ def run_umbmark(
         true_pose: measures where the cart is at the end of a run.
         runs: how many each way.
         side_m: of the squares; UMBmark has 4 m.
-        watch: told each sample.
+        watch: called with each sample.
 
     Raises:
         TimeoutError: a square that did not end.

@@ -36,7 +36,11 @@ class ComponentProfile(ModuleSpec):
 
 
 class RtComponent(ComponentAction):
-    """A component; subclasses override callbacks, and make their ports in the constructor.
+    """An RT component: life cycle, ports and configuration (OMG RTC 1.0, LightweightRTObject).
+
+    A subclass has a `spec`, makes its ports and parameters in the constructor
+    (`add_port`, `configuration.bind`), and overrides the callbacks that it needs
+    (`on_activated`, `on_execute`, ...). A `Manager` creates components and runs them.
 
     Not emulated: composite components, and states per execution context beside
     that of the life cycle.
@@ -45,11 +49,12 @@ class RtComponent(ComponentAction):
         instance_name: unique in a system, such as `ConsoleIn0`.
 
     Attributes:
-        spec: what is the same for all components of the class.
-        alive: between `initialize` and `finalize`.
-        configuration: its configuration sets.
+        spec: what is the same for all components of the class; each subclass sets it.
+        instance_name: as above.
+        alive: True between `initialize` and `finalize`.
+        configuration: its configuration sets; one of them is active.
         ports: by name, in the order in which they were added.
-        contexts: execution contexts it takes part in.
+        contexts: execution contexts it takes part in; the first decides its state.
         own_contexts: those that end with it.
     """
 

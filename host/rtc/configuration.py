@@ -21,7 +21,7 @@ class Configuration:
     Attributes:
         active_id: the set whose values hold, or will at the next update.
         changed: whether an update has something to do.
-        on_update: told the ID of the active set after its values took effect.
+        on_update: called with the ID of the active set after its values took effect.
     """
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.options.guard import Guard
+from tickrig.host.motion.options.collision_guard import CollisionGuard
 from tickrig.host.urg.client import UrgClient
 
 SCANS = 100
@@ -47,7 +47,7 @@ def with_eyes(name: str, world: World) -> None:
     for _ in range(RUNS):
         loop = ClosedLoop(world=world)
         line = loop.range_finders[0].line.b
-        guard = Guard(
+        guard = CollisionGuard(
             loop.manager, loop.chain, lambda name, loop=loop, line=line: SimLink(loop.rig, line)
         )
         loop.activate("tuned")

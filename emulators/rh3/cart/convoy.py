@@ -12,7 +12,7 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import Cart, ClosedLoop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.follower import Follower
-from tickrig.host.motion.ports import newest, sound, to_pose_2d
+from tickrig.host.motion.ports import newest, plausible, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -25,7 +25,7 @@ WATCHDOG_US: Final = 500_000
 
 
 class OmniCart(RtComponent):
-    """Takes IIS velocities with all three parts, and tells its pose, which is the true one.
+    """Takes IIS velocities with all three parts, and writes its pose, which is the true one.
 
     A velocity with a number that is none means stop.
 
@@ -63,7 +63,7 @@ class OmniCart(RtComponent):
         """Go on for a period."""
         if (latest := newest(self.velocity)) is not None:
             numbers = (latest.data.vx, latest.data.vy, latest.data.va)
-            self._wanted = Velocity(*numbers) if sound(*numbers) else Velocity()
+            self._wanted = Velocity(*numbers) if plausible(*numbers) else Velocity()
             self._heard_us = ec.now_us
         elif ec.now_us - self._heard_us > WATCHDOG_US:
             self._wanted = Velocity()

@@ -12,24 +12,24 @@ import click
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.cart.options import (
     MotionOptions,
-    demand_arrival,
+    require_arrival,
     stopping_at_the_end,
     watched,
 )
-from tickrig.emulators.rh3.cart.squares import Size, play_squares
+from tickrig.emulators.rh3.cart.squares import SquarePlan, run_squares
 from tickrig.emulators.rh3.cart.track_plot import write_track
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.drive import drive
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.path_file import FARTHEST_M, read_path, within_reach
-from tickrig.host.motion.ports import sound
+from tickrig.host.motion.ports import plausible
 from tickrig.host.motion.run_report import limits_of, table
 from tickrig.host.motion.umbmark import SIDE_M
 
 
 def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
     """Drive to a pose, in metres and radians."""
-    if not sound(x, y, theta):
+    if not plausible(x, y, theta):
         raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
     if not within_reach(goal := Pose(x, y, theta)):
         raise Refused(f"{x:g} {y:g} {theta:g} is beyond {FARTHEST_M} m")
@@ -53,7 +53,7 @@ def go_round(
     """Drive squares both ways, `runs` times or as often as is of use."""
     checked = _checked(options)
     by_chance = checked.device is not None or checked.base.noise
-    play_squares(checked, Size(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
+    run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
 
 
 def _checked(options: dict[str, Any]) -> MotionOptions:
@@ -72,7 +72,7 @@ def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
     began = connection.chain.odometry.pose
     with watched(options, [began, *points]) as watcher, stopping_at_the_end(connection):
         run = drive(connection, points, watcher.watch)
-        demand_arrival(connection, run)
+        require_arrival(connection, run)
     for line in table(run, began, points, limits_of(connection.chain)):
         click.echo(line)
     if options.plot is not None:

@@ -33,7 +33,7 @@ INTERRUPTED: Final = 130
 """Exit status after Ctrl-C."""
 
 
-class Ended(Exception):  # noqa: N818 - no error
+class RunStopped(Exception):  # noqa: N818 - no error
     """Somebody ended the run."""
 
 
@@ -80,7 +80,7 @@ class MotionOptions:
             refuse_path("odometry-conf", error)
         start(connection, self.set_id)
         if connection.chain.in_error:
-            raise Refused(connection.chain.ref_hard.trouble)
+            raise Refused(connection.chain.ref_hard.error_reason)
         return connection
 
     def _connection(self) -> BaseConnection:
@@ -123,7 +123,7 @@ class SerialBaseConnection:
 
 
 class RunWatcher:
-    """Draws samples if they are to be drawn, and raises `Ended` when a signal has come."""
+    """Draws samples if they are to be drawn, and raises `RunStopped` when a signal has come."""
 
     def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
         self._ended = self._asking = False
@@ -138,23 +138,23 @@ class RunWatcher:
 
     @contextmanager
     def asking(self) -> Iterator[None]:
-        """Ask somebody something: no samples come; `Ended` if that was the answer."""
+        """Ask somebody something: no samples come; `RunStopped` if that was the answer."""
         self._asking = True
         try:
             yield
         except (click.Abort, KeyboardInterrupt):
-            raise Ended from None
+            raise RunStopped from None
         finally:
             self._asking = False
         if self._ended:  # click.pause passes Ctrl-C over
-            raise Ended
+            raise RunStopped
 
     def watch(self, sample: Sample) -> None:
         """Take a sample."""
         if self._map is not None:
             self._map.watch(sample)
         if self._ended:
-            raise Ended
+            raise RunStopped
 
 
 @contextmanager
@@ -164,7 +164,7 @@ def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatch
     with stopped_by_signals(watcher.end):
         try:
             yield watcher
-        except Ended:
+        except RunStopped:
             click.echo("stopped", err=True)
             raise SystemExit(INTERRUPTED) from None
 
@@ -178,9 +178,9 @@ def stopping_at_the_end(connection: BaseConnection) -> Iterator[BaseConnection]:
         stop(connection)
 
 
-def demand_arrival(connection: BaseConnection, run: MotionRun) -> None:
+def require_arrival(connection: BaseConnection, run: MotionRun) -> None:
     """End with a line and exit status 1 if the goal was not reached."""
     if connection.chain.in_error:
-        raise click.ClickException(connection.chain.ref_hard.trouble)
+        raise click.ClickException(connection.chain.ref_hard.error_reason)
     if run.reached_s is None:
         raise click.ClickException(f"not there after {run.duration_s:.1f} s")

@@ -15,7 +15,7 @@ from tickrig.host.motion.geometry import Pose, Wheels
 from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
 
 
-class Size(NamedTuple):
+class SquarePlan(NamedTuple):
     """How many squares each way, and how large."""
 
     runs: int
@@ -34,13 +34,13 @@ class Squares:
     Args:
         options: the options.
         size: how many, and how large.
-        watcher: told each sample.
+        watcher: receives each sample.
 
     Attributes:
         latest: the connection of the latest square.
     """
 
-    def __init__(self, options: MotionOptions, size: Size, watcher: RunWatcher) -> None:
+    def __init__(self, options: MotionOptions, size: SquarePlan, watcher: RunWatcher) -> None:
         self._options, self._size, self._watcher = options, size, watcher
         self.latest: BaseConnection | None = None
 
@@ -55,8 +55,8 @@ class Squares:
                 self._watcher.watch,
             )
         except TimeoutError as error:
-            trouble = self.latest.chain.ref_hard.trouble if self.latest else ""
-            raise click.ClickException(trouble or str(error)) from None
+            error_reason = self.latest.chain.ref_hard.error_reason if self.latest else ""
+            raise click.ClickException(error_reason or str(error)) from None
 
     def stop(self) -> None:
         """Stop the cart."""
@@ -82,8 +82,8 @@ class Squares:
         return Pose(x_mm / 1e3, y_mm / 1e3)
 
 
-def play_squares(options: MotionOptions, size: Size, save: Path | None) -> None:
-    """Drive, calibrate, drive again, and tell."""
+def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
+    """Drive squares, calibrate, drive them again, and print how both went."""
     with watched(options, size.corners) as watcher:
         squares = Squares(options, size, watcher)
         try:
@@ -94,8 +94,8 @@ def play_squares(options: MotionOptions, size: Size, save: Path | None) -> None:
         finally:
             squares.stop()
     click.echo("              before   after")
-    _tell("E_max,syst", before.most_m, after.most_m)
-    _tell("return, most", max(before.returns_m), max(after.returns_m))
+    _print_row("E_max,syst", before.most_m, after.most_m)
+    _print_row("return, most", max(before.returns_m), max(after.returns_m))
     text = _conf(corrected)
     click.echo(text, nl=False)
     if save is not None:
@@ -105,7 +105,7 @@ def play_squares(options: MotionOptions, size: Size, save: Path | None) -> None:
             refuse_path("save", error)
 
 
-def _tell(what: str, before_m: float, after_m: float) -> None:
+def _print_row(what: str, before_m: float, after_m: float) -> None:
     click.echo(f"{what:<12} {before_m * 1e3:7.1f} {after_m * 1e3:7.1f} mm")
 
 

@@ -73,7 +73,7 @@ class Navigation(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Take a new list, judge a new pose, tell the state."""
+        """Take a new list, judge a new pose, write the state."""
         now = Time.from_us(ec.now_us)
         if (way := newest(self.min_path)) is not None:
             self._start(now, way)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose, Wheels, moved, wrap
-from tickrig.host.motion.ports import arrived, sound, to_pose_2d
+from tickrig.host.motion.ports import arrived, plausible, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types import iis
@@ -93,7 +93,7 @@ class Odometry(RtComponent):
         if max(left_id, right_id) >= len(sample.data):
             return
         angles = sample.data[left_id], sample.data[right_id]
-        if not sound(*angles):
+        if not plausible(*angles):
             return
         before, self._before = self._before or angles, angles
         left = (angles[0] - before[0]) * self.left_radius.value

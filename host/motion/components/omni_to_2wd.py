@@ -18,7 +18,7 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
 
-NO_WAY: Final = 1e-6
+LEAST_WAY_M: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""
 
 _LOG: Final = log_of(__name__)
@@ -28,7 +28,7 @@ class OmniTo2WD(RtComponent):
     """Plans for a cart that cannot go sideways; it never goes backward.
 
     A step from one point to the next that is no way is left out. A goal or a path with a
-    number that is none is passed over with a line in the log. FINISH is told when it is
+    number that is none is passed over with a line in the log. FINISH is written when it is
     reached, not while it lasts: what an earlier command left behind answers no later one.
 
     Attributes:
@@ -59,7 +59,7 @@ class OmniTo2WD(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Plan what arrived, and tell of what has finished."""
+        """Plan what arrived, and write what has finished."""
         if (latest := newest(self.current_position)) is not None:
             self._pose = to_pose(latest.data) or self._pose
         for message in arrived(self.goal):
@@ -78,9 +78,9 @@ class OmniTo2WD(RtComponent):
         self._points.append(to_pose(message.data))
         if kind in (START_POINT, INTERMEDIATE_POINT):
             return
-        sound = [point for point in self._points if point is not None]
-        if len(sound) == len(self._points):
-            self._waiting = sound
+        plausible = [point for point in self._points if point is not None]
+        if len(plausible) == len(self._points):
+            self._waiting = plausible
         else:
             self.refused += 1
             _LOG.warning("%s: passed over what is no number: %s", self.instance_name, message)
@@ -114,7 +114,7 @@ def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
     """
     way, here = [start], start
     for point in points:
-        if here.distance(point) > NO_WAY:
+        if here.distance(point) > LEAST_WAY_M:
             heading = here.bearing(point)
             way += [Pose(here.x, here.y, heading), Pose(point.x, point.y, heading)]
             here = point

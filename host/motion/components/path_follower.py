@@ -14,7 +14,7 @@ from tickrig.host.motion.control_laws import (
     steps,
 )
 from tickrig.host.motion.geometry import Pose, Twist, clip, twist_of
-from tickrig.host.motion.ports import newest_pose, sound, write_velocity
+from tickrig.host.motion.ports import newest_pose, plausible, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rh2 import Path, RunMode
@@ -109,7 +109,7 @@ class PathFollower(RtComponent):
         """Take one message, make a step of its mode, command the velocity."""
         if self.target_path.is_new and (path := self.target_path.read()) is not None:
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
-            self.path = path if sound(*numbers) else Path(RunMode.STOP)
+            self.path = path if plausible(*numbers) else Path(RunMode.STOP)
         wanted = self._wanted(self._present(ec))
         self.twist = self._limits(ec).smooth(wanted, self.twist)
         write_velocity(self.velocity, ec, self.twist.v, 0.0, self.twist.w)

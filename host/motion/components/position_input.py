@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import newest, sound, to_pose_2d
+from tickrig.host.motion.ports import newest, plausible, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -108,6 +108,6 @@ def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:
 
 
 def _point(pose: Pose, *ids: int) -> iis.TimedPose2D:
-    if not sound(*pose):
+    if not plausible(*pose):
         raise ValueError(f"a pose has three numbers, got {tuple(pose)}")
     return iis.TimedPose2D(id=ids, data=to_pose_2d(pose))

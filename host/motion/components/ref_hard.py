@@ -13,7 +13,7 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
 from tickrig.host.motion.components.base_texts import fault_text, refusal_text
 from tickrig.host.motion.geometry import Twist, wheel_speeds
-from tickrig.host.motion.ports import newest, sound
+from tickrig.host.motion.ports import newest, plausible
 from tickrig.host.rtc import (
     ExecutionContext,
     InPort,
@@ -31,7 +31,7 @@ from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wid
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 
-MISSES: Final = 5
+MAX_MISSES: Final = 5
 """Requests in a row, unanswered or refused, that are an error.
 
 rh3-control proposes 3; with a fifth of all exchanges lost they come once in ten minutes.
@@ -70,7 +70,7 @@ class RefHardRh3(RtComponent):
     on_state_update, when all others have executed, it sends the speeds of this period. So
     nothing waits, and a command is on the line in the period in which it was made.
 
-    It goes into Error when the base has a fault, refuses or leaves unanswered `MISSES`
+    It goes into Error when the base has a fault, refuses or leaves unanswered `MAX_MISSES`
     requests in a row, or the line is gone; the base then stops by its own watchdog. While the
     bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
     faster than Velocity_limit, both are slowed down alike.
@@ -83,7 +83,7 @@ class RefHardRh3(RtComponent):
 
     Attributes:
         report: what the base said last.
-        trouble: why it went into Error last.
+        error_reason: why it went into Error last.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")
@@ -99,7 +99,7 @@ class RefHardRh3(RtComponent):
             port = self.add_port(ServicePort(port_name))
             port.provide(Provider[RefHard](service, "RefHard", self))
         self._counts, self._angles = (0, 0), [0.0, 0.0]
-        self.trouble = ""
+        self.error_reason = ""
         self._forget()
 
     def _bind(self) -> None:
@@ -175,15 +175,15 @@ class RefHardRh3(RtComponent):
             return self._failed(str(error))
         if answer is not None:
             return self._take(ec, answer)
-        if self._master.misses >= MISSES:
-            return self._failed(f"no answer to {MISSES} requests in a row")
+        if self._master.misses >= MAX_MISSES:
+            return self._failed(f"no answer to {MAX_MISSES} requests in a row")
         return ReturnCode.RTC_OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
         """Send what is to be sent in this period."""
         if (latest := newest(self.velocity)) is not None:
             v, w = latest.data.vx, latest.data.va
-            self._twist = Twist(v, w) if sound(v, w) else Twist()
+            self._twist = Twist(v, w) if plausible(v, w) else Twist()
         if self._master is None or self._master.pending:
             return ReturnCode.RTC_OK
         try:
@@ -215,7 +215,7 @@ class RefHardRh3(RtComponent):
     def _take(self, ec: ExecutionContext, answer: ModbusAnswer) -> ReturnCode:
         if answer.refusal is not None:
             self._refused += 1  # noise may have made another request of it
-            if self._refused >= MISSES:
+            if self._refused >= MAX_MISSES:
                 return self._failed(
                     f"the base refuses {refusal_text(answer.request, answer.refusal)}"
                 )
@@ -243,7 +243,7 @@ class RefHardRh3(RtComponent):
         self._counts = counts
 
     def _failed(self, why: str) -> ReturnCode:
-        self.trouble = why
+        self.error_reason = why
         _LOG.error("%s: %s", self.instance_name, why)
         return ReturnCode.RTC_ERROR
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import ClassVar, Generic, TypeVar, get_args
 
 from tickrig.host.motion.geometry import Pose, positive
-from tickrig.host.motion.ports import arrived, sound, to_pose, to_pose_2d
+from tickrig.host.motion.ports import arrived, plausible, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis, iis_phase1, iis_phase2
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
@@ -92,7 +92,7 @@ class Position2To3(Adapter[iis_phase2.TimedPosition, iis.TimedPose2D]):
 
     def convert(self, value: iis_phase2.TimedPosition) -> iis.TimedPose2D | None:
         """Return the same pose, heading in 0..2 pi; None if a number is none."""
-        if not sound(value.x, value.y, value.theta):
+        if not plausible(value.x, value.y, value.theta):
             return None
         pose = Pose(value.x, value.y, positive(value.theta))
         return iis.TimedPose2D(value.tm, value.id, to_pose_2d(pose), value.error)

@@ -7,7 +7,7 @@ from math import copysign, pi, sqrt
 from typing import ClassVar, Final, NamedTuple
 
 from tickrig.host.motion.geometry import Pose, positive, wrap
-from tickrig.host.motion.ports import newest, newest_pose, sound, to_pose, to_pose_2d
+from tickrig.host.motion.ports import newest, newest_pose, plausible, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -17,7 +17,7 @@ PASSED: Final = 0
 STOPPED: Final = 1
 """`id[0]` of a running state; IIS leaves open how the flag is carried."""
 
-NO_WAY: Final = 1e-3
+LEAST_WAY_M: Final = 1e-3
 """Metres between way points that are no way."""
 
 
@@ -38,7 +38,7 @@ class WayPoint(NamedTuple):
 
 
 class PathInterface(RtComponent):
-    """Tracks paths as IIS has them, and tells which way points were passed.
+    """Tracks paths as IIS has them, and reports which way points were passed.
 
     | rule | here |
     |---|---|
@@ -99,7 +99,7 @@ class PathInterface(RtComponent):
     def _take(self, now: Time, path: iis.TimedPath2DSeq) -> None:
         poses = [pose for data in path.pose if (pose := to_pose(data)) is not None]
         speeds = [velocity.vx for velocity in path.velocity][: len(poses)]
-        if len(poses) < len(path.pose) or not sound(*speeds):
+        if len(poses) < len(path.pose) or not plausible(*speeds):
             return
         speeds += [0.0] * (len(poses) - len(speeds))
         self._forget()
@@ -108,7 +108,7 @@ class PathInterface(RtComponent):
         if not self._fresh:
             self._command(now, RunMode.STOP, Pose())
         for pose in poses[:1]:
-            self._tell(now, pose, PASSED if self._fresh else STOPPED)
+            self._report(now, pose, PASSED if self._fresh else STOPPED)
 
     def _judge(self, now: Time, pose: Pose) -> None:
         if self._fresh:
@@ -132,11 +132,11 @@ class PathInterface(RtComponent):
         self._at += 1
         while self._at < len(self._points):
             target, speed = self._points[self._at]
-            if pose.distance(target) > max(NO_WAY, self.goal_distance.value):
+            if pose.distance(target) > max(LEAST_WAY_M, self.goal_distance.value):
                 heading = pose.bearing(target) + (pi if speed < 0 else 0.0)
                 self._turn(now, Stage.TURN, target._replace(heading=wrap(heading)))
                 return
-            self._tell(now, target, PASSED)
+            self._report(now, target, PASSED)
             self._at += 1
         self._turn(now, Stage.LAST_TURN, self._points[-1].pose)
 
@@ -152,7 +152,7 @@ class PathInterface(RtComponent):
         left = -way * self._line.along(pose) - self.goal_distance.value
         if left < 0:
             self._command(now, RunMode.STOP, Pose())
-            self._tell(now, self._points[self._at].pose, PASSED)
+            self._report(now, self._points[self._at].pose, PASSED)
             self._next(now, pose)
             return
         can = sqrt(2 * self.braking.value * max(0.0, left - self._speed * self.latency.value))
@@ -162,15 +162,15 @@ class PathInterface(RtComponent):
     def _finish(self, now: Time) -> None:
         self._stage = Stage.IDLE
         self._command(now, RunMode.STOP, Pose())
-        self._tell(now, self._points[-1].pose, STOPPED)
+        self._report(now, self._points[-1].pose, STOPPED)
 
     def _command(
         self, now: Time, mode: RunMode, line: Pose, v: float = 0.0, w: float = 0.0
     ) -> None:
-        """Tell the follower; it takes one message a period, so the last one counts."""
+        """Command the follower; it takes one message a period, so the last one counts."""
         self._order = Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now)
 
-    def _tell(self, now: Time, point: Pose, flag: int) -> None:
+    def _report(self, now: Time, point: Pose, flag: int) -> None:
         data = to_pose_2d(point._replace(heading=positive(point.heading)))
         self.running_state.write(iis.TimedPose2D(now, (flag,), data))
 

@@ -23,7 +23,7 @@ class RunningInformation(RtComponent):
     """Makes velocities in the robot's frame out of its poses, and writes one each period.
 
     A pose that is older than `timeout` says nothing any more: the velocity is then 0. Give
-    it an execution context of 100 Hz or more; slower ones are told in the log. `tm` is the
+    it an execution context of 100 Hz or more; slower ones are logged. `tm` is the
     time of the later pose.
     """
 

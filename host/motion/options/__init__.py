@@ -1,1 +1,1 @@
-"""Components around the chain: hands, eyes, and robots that go together."""
+"""Components around the chain: game pads, range finders, and robots that go together."""

@@ -69,14 +69,14 @@ class GamePad(RtComponent):
             hand = self._pad.poll(ec.now_us)
         except LinkError as error:
             return self._failed(ec, error)
-        forward, left, turn = (self._lively(part) for part in hand)
+        forward, left, turn = (self._outside_dead_zone(part) for part in hand)
         pushed = any((forward, left, turn))
         if pushed or self._pushed:
             self._write(ec, StickPosition(forward, left, turn))
         self._pushed = pushed
         return ReturnCode.RTC_OK
 
-    def _lively(self, part: float) -> float:
+    def _outside_dead_zone(self, part: float) -> float:
         return part if abs(part) > self.dead_zone.value else 0.0
 
     def _write(self, ec: ExecutionContext, hand: StickPosition) -> None:

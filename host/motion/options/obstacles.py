@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 from tickrig.host.motion.components.ref_hard import RefHard
 from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Twist
-from tickrig.host.motion.ports import MOST, newest, sound, write_velocity
+from tickrig.host.motion.ports import MOST, newest, plausible, write_velocity
 from tickrig.host.rtc import (
     Consumer,
     ExecutionContext,
@@ -54,7 +54,7 @@ class UrgToObstacles(RtComponent):
 
     def _points(self, scan: RangeData) -> list[Pose2D]:
         first, step, ahead = scan.config.minAngle, scan.config.angularRes, self.sensor_x.value
-        if not sound(first, step):
+        if not plausible(first, step):
             return []
         seen = [(first + n * step, d) for n, d in enumerate(scan.ranges) if 0 < d <= MOST]
         return [Pose2D(Point2D(ahead + d * cos(angle), d * sin(angle))) for angle, d in seen]
@@ -109,10 +109,10 @@ class WatchedDistance:
         self._port.clear()
         self.free, self._heard_us = False, 0
 
-    def look(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
+    def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
         """Take the newest distance; return whether the way is free."""
         latest = newest(self._port)
-        if latest is not None and sound(latest.data):
+        if latest is not None and plausible(latest.data):
             self._heard_us = ec.now_us
             self.free = latest.data > (stop_m if self.free else go_m)
         elif ec.now_us - self._heard_us > timeout_s * 1e6:
@@ -152,12 +152,14 @@ class ObstaclesAvoidance(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Pass the velocity on, as far as the way is free."""
-        free = self._watched.look(
+        free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )
         if (latest := newest(self.arriving)) is not None:
             data = latest.data
-            self._pass(ec, Twist(data.vx, data.va) if sound(data.vx, data.va) else Twist(), free)
+            self._pass(
+                ec, Twist(data.vx, data.va) if plausible(data.vx, data.va) else Twist(), free
+            )
         return ReturnCode.RTC_OK
 
     def _pass(self, ec: ExecutionContext, wanted: Twist, free: bool) -> None:
@@ -203,7 +205,7 @@ class CollisionDetection(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Look, and call."""
-        free = self._watched.look(
+        free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )
         if free == self._stopped:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.motion.ports import newest, sound, write_velocity
+from tickrig.host.motion.ports import newest, plausible, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -34,7 +34,7 @@ class SwitchInput(RtComponent):
         self._forget()
 
     def _forget(self) -> None:
-        self.by_hand = False
+        self.is_manual = False
         self._pushed = Velocity2D()
         self._heard_us = self._let_go_us = 0
 
@@ -49,31 +49,31 @@ class SwitchInput(RtComponent):
         planned = newest(self.automatic)
         self._listen(ec)
         self._switch(ec)
-        if self.by_hand:
+        if self.is_manual:
             self._write(ec, self._pushed)
         elif planned is not None:
-            self._write(ec, _made_sound(planned.data))
+            self._write(ec, _made_plausible(planned.data))
         return ReturnCode.RTC_OK
 
     def _listen(self, ec: ExecutionContext) -> None:
         if (latest := newest(self.joystick)) is not None:
-            self._pushed, self._heard_us = _made_sound(latest.data), ec.now_us
+            self._pushed, self._heard_us = _made_plausible(latest.data), ec.now_us
         elif ec.now_us - self._heard_us > self.stale.value * 1e6:
             self._pushed = Velocity2D()
 
     def _switch(self, ec: ExecutionContext) -> None:
-        pushed, before = self._pushed != Velocity2D(), self.by_hand
+        pushed, before = self._pushed != Velocity2D(), self.is_manual
         if pushed:
-            self.by_hand, self._let_go_us = True, ec.now_us
+            self.is_manual, self._let_go_us = True, ec.now_us
         elif ec.now_us - self._let_go_us > self.hold.value * 1e6:
-            self.by_hand = False
-        if self.by_hand != before:
-            driver = "the joystick" if self.by_hand else "the planner"
+            self.is_manual = False
+        if self.is_manual != before:
+            driver = "the joystick" if self.is_manual else "the planner"
             _LOG.info("%s: %s drives", self.instance_name, driver)
 
     def _write(self, ec: ExecutionContext, data: Velocity2D) -> None:
         write_velocity(self.velocity, ec, data.vx, data.vy, data.va)
 
 
-def _made_sound(data: Velocity2D) -> Velocity2D:
-    return data if sound(data.vx, data.vy, data.va) else Velocity2D()
+def _made_plausible(data: Velocity2D) -> Velocity2D:
+    return data if plausible(data.vx, data.vy, data.va) else Velocity2D()

@@ -24,13 +24,13 @@ class Console:
     Args:
         manager: whose components.
         show: prints a line.
-        tell: prints a line that is for people alone.
+        warn: prints a line that is for people alone.
     """
 
     def __init__(
-        self, manager: Manager, show: Callable[[str], None], tell: Callable[[str], None]
+        self, manager: Manager, show: Callable[[str], None], warn: Callable[[str], None]
     ) -> None:
-        self._manager, self._show, self._tell = manager, show, tell
+        self._manager, self._show, self._warn = manager, show, warn
         self._typed, self._open = LineSplitter(), True
         for component in manager.components:
             if isinstance(component, ConsoleOut):
@@ -50,7 +50,7 @@ class Console:
         except ValueError:
             number = HIGH + 1
         if not LOW <= number <= HIGH:
-            self._tell(f"{word!r} is not a number in {LOW}..{HIGH}")
+            self._warn(f"{word!r} is not a number in {LOW}..{HIGH}")
             return
         for component in self._manager.components:
             if isinstance(component, ConsoleIn):

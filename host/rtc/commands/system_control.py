@@ -25,7 +25,7 @@ class Runner(Protocol):
     """What runs a system: `RealTime`, or the loop of a server that has one.
 
     Attributes:
-        after_tick: told the time after each tick.
+        after_tick: called with the time in us after each tick.
     """
 
     after_tick: list[Callable[[int], None]]

@@ -33,7 +33,7 @@ class ExecutionContext:
         rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
 
     Attributes:
-        now_us: the time it was told last; what callbacks take as the present.
+        now_us: the time of the latest tick; what callbacks take as the present.
         due_us: when the next period begins; `NEVER` while it is stopped.
         rate_hz: periods a second.
         period_us: one period.
@@ -79,7 +79,7 @@ class ExecutionContext:
             return ReturnCode.PRECONDITION_NOT_MET
         self.running = True
         self._plan()
-        self._tell(lambda component: component.on_startup)
+        self._notify(lambda component: component.on_startup)
         return ReturnCode.RTC_OK
 
     def stop(self) -> ReturnCode:
@@ -91,7 +91,7 @@ class ExecutionContext:
         if not self.running:
             return ReturnCode.PRECONDITION_NOT_MET
         self.running, self.due_us = False, NEVER
-        self._tell(lambda component: component.on_shutdown)
+        self._notify(lambda component: component.on_shutdown)
         return ReturnCode.RTC_OK
 
     def close(self) -> None:
@@ -113,7 +113,7 @@ class ExecutionContext:
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         if self.running:
             self._plan()
-        self._tell(lambda component: component.on_rate_changed)
+        self._notify(lambda component: component.on_rate_changed)
         return ReturnCode.RTC_OK
 
     def add_component(self, component: RtComponent) -> ReturnCode:
@@ -228,9 +228,9 @@ class ExecutionContext:
         """Plan the next period."""
         self.due_us = self.now_us - self.now_us % self.period_us + self.period_us
 
-    def _tell(self, callback: Callable[[RtComponent], Callback]) -> None:
+    def _notify(self, callback: Callable[[RtComponent], Callback]) -> None:
         for participant in self._participants:
-            participant.tell(callback(participant.component))
+            participant.notify(callback(participant.component))
 
 
 _PASSES: Final = (Participant.pre, Participant.do, Participant.post)

@@ -59,7 +59,7 @@ class Participant:
         if self.state is not _ERROR:
             self.wanted = _ERROR
 
-    def tell(self, callback: Callback) -> None:
+    def notify(self, callback: Callback) -> None:
         """Run a callback that belongs to no state; if it fails, Error comes next."""
         if self._call(callback) is not _OK:
             self.abort()
@@ -67,7 +67,7 @@ class Participant:
     def pre(self) -> None:
         """First pass of a period: make the move that is wanted."""
         if self.component.configuration.changed:
-            self.tell(self._update_configuration)
+            self.notify(self._update_configuration)
         if (wanted := self.wanted) is not None:
             self.wanted = None
             _MOVES[self.state, wanted](self)
@@ -83,7 +83,7 @@ class Participant:
     def post(self) -> None:
         """Third pass of a period, after the second one of all participants."""
         if self._updates and self.state is _ACTIVE and self.wanted is not _ERROR:
-            self.tell(self.component.on_state_update)
+            self.notify(self.component.on_state_update)
 
     def leave(self) -> None:
         """Leave Active at once, as a component that ends does; the state is Created."""
@@ -97,7 +97,7 @@ class Participant:
 
     def _activate(self) -> None:
         self.state = _ACTIVE
-        self.tell(self.component.on_activated)
+        self.notify(self.component.on_activated)
 
     def _deactivate(self) -> None:
         if self._call(self.component.on_deactivated) is _OK:

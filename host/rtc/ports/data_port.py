@@ -37,18 +37,30 @@ class DataPort(Port[Connector[T]], Generic[T]):
 
 
 class OutPort(DataPort[T]):
-    """Gives values to all its connectors.
+    """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
+
+    Each connector takes each value, and moves it as its `dataport.*` properties say
+    (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
+
+    Args:
+        name: without that of its component, such as `out`.
+        data_type: the struct it carries, such as `TimedLong`; InPorts of the same one fit.
     """
 
     port_type = "DataOutPort"
 
     def write(self, value: T) -> PortStatus:
-        """Write a value to each connector.
+        """Write a value to each connector; nothing waits.
+
+        Args:
+            value: a struct of the port's `data_type`. Its numbers are checked only by connectors
+                with `corba_cdr`.
 
         Returns:
-            PORT_OK if all took it, also if there is none; else what the first that did not says.
+            PORT_OK if all connectors took it, also if there is none; else the status of the
+            first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS.
 
         Raises:
             TypeError: a value of another type.
@@ -64,9 +76,13 @@ class OutPort(DataPort[T]):
 
 
 class InPort(DataPort[T]):
-    """Reads values from its connectors.
+    """A data port that a component reads (OpenRTM-aist 1.x, InPort).
 
     Each connector has a buffer of its own; those made first are read first.
+
+    Args:
+        name: without that of its component, such as `in`.
+        data_type: the struct it carries, such as `TimedLong`; OutPorts of the same one fit.
     """
 
     port_type = "DataInPort"
@@ -77,14 +93,14 @@ class InPort(DataPort[T]):
 
     @property
     def is_new(self) -> bool:
-        """Whether there is a value that was not read."""
+        """Whether `read` returns a value that was not read before."""
         for connector in self.connectors:  # noqa: SIM110 - any() takes twice as long
             if connector.buffer.readable:
                 return True
         return False
 
     def read(self) -> T | None:
-        """Read a value.
+        """Take the next value out of the first buffer that has one; nothing waits.
 
         Returns:
             The value; without a new one that of the last read again, or None if there was

@@ -75,20 +75,20 @@ class ConnectorBase:
         self.profile, self._ports, self.joined = profile, ports, False
 
     def begin(self) -> None:
-        """Give it to both ports, then tell their listeners."""
+        """Give it to both ports, then notify their listeners."""
         self.joined = True
         for port in self._ports:
             port.attach(self)
         for port in self._ports:
-            port.tell(port.on_connect, self.profile)
+            port.notify(port.on_connect, self.profile)
 
     def end(self) -> None:
-        """Take it from both ports, then tell their listeners; ending it twice is no error."""
+        """Take it from both ports, then notify their listeners; ending it twice is no error."""
         joined, self.joined = self.joined, False
         for port in self._ports if joined else ():
             port.detach(self)
         for port in self._ports if joined else ():
-            port.tell(port.on_disconnect, self.profile)
+            port.notify(port.on_disconnect, self.profile)
 
 
 C = TypeVar("C", bound=ConnectorBase)
@@ -103,8 +103,8 @@ class Port(Generic[C]):
     Attributes:
         owner: instance name of its component, empty without one.
         connectors: in the order in which they were made.
-        on_connect: told after a connector was made.
-        on_disconnect: told after a connector ended.
+        on_connect: called with its profile after a connector was made.
+        on_disconnect: called with its profile after a connector ended.
     """
 
     port_type: ClassVar[str]
@@ -145,8 +145,8 @@ class Port(Generic[C]):
         """Have a connector no more."""
         self.connectors = tuple(c for c in self.connectors if c is not connector)
 
-    def tell(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
-        """Tell listeners of a connector; what one raises is logged, and the others are told."""
+    def notify(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
+        """Call listeners with the profile of a connector; what one raises is logged."""
         for listener in tuple(listeners):
             try:
                 listener(profile)

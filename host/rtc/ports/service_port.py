@@ -100,13 +100,13 @@ class ServiceConnector(ConnectorBase):
         self._pairs = pairs
 
     def begin(self) -> None:
-        """Give the consumers their providers, then tell the listeners of both ports."""
+        """Give the consumers their providers, then notify the listeners of both ports."""
         for consumer, provider in self._pairs:
             consumer.take(provider)
         super().begin()
 
     def end(self) -> None:
-        """Take the providers away, then tell the listeners of both ports."""
+        """Take the providers away, then notify the listeners of both ports."""
         for consumer, _ in self._pairs if self.joined else ():
             consumer.take(None)
         super().end()

@@ -62,7 +62,10 @@ class NameService:
 
 
 class Manager(Schedule):
-    """Components with their names, ports and execution contexts (OpenRTM-aist 1.x, Manager).
+    """Creates components, names them, joins their ports and runs them (OpenRTM-aist 1.x, Manager).
+
+    It has no clock: `run_for` and `run_to` pass virtual time, in us; in real time somebody
+    waits for `due_us` and calls `tick` (`RealTime`).
 
     Not emulated: loading of modules from files, and managers that command others. Component
     types are registered, or found by the name that an installed package gives them.

@@ -25,7 +25,7 @@ class Clock(Protocol):
 class RealTime:
     """Runs a schedule by a clock; what is late is made up for, no period is skipped.
 
-    Periods that are late run one after the other, each told the time at which
+    Periods that are late run one after the other, each with the time at which
     it was due. A system that always takes longer than its periods falls behind
     for good, and `worst_late_us` says so.
 
@@ -37,7 +37,7 @@ class RealTime:
         running: False once `stop` was called.
         late_ticks: how many ticks began more than `LATE_US` late.
         worst_late_us: by how much the worst of them was late.
-        after_tick: told the time after each tick.
+        after_tick: called with the time in us after each tick.
     """
 
     def __init__(self, schedule: Schedule, clock: Clock) -> None:

@@ -23,15 +23,15 @@ class ScheduledItem(Protocol):
 
 
 class Schedule:
-    """Runs what is due. It has no clock: `tick` is told the time.
+    """Runs what is due. It has no clock: `tick` takes the time.
 
     In one tick other items go on first, then the execution contexts run in the
-    order in which they were added, then connectors push, then what was put off
-    is done. In virtual time `run_to` ticks; in real time somebody else waits
+    order in which they were added, then connectors push, then what was deferred
+    is called. In virtual time `run_to` ticks; in real time somebody else waits
     for `due_us` and ticks.
 
     Attributes:
-        now_us: the time it was told last.
+        now_us: the time of the latest tick, in us.
     """
 
     def __init__(self) -> None:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Final
 
 from tickrig.host.motion.geometry import Pose, Twist, moved, wheel_speeds
-from tickrig.host.motion.ports import arrived, sound, to_pose_2d
+from tickrig.host.motion.ports import arrived, plausible, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.basic import Time
@@ -96,7 +96,7 @@ class WheeledBase(RtComponent, ABC):
 
     def _take(self, now_us: int, message: TimedVelocity2D) -> None:
         vx, vy, va = message.data.vx, message.data.vy, message.data.va
-        if vy == 0 and sound(vx, va):
+        if vy == 0 and plausible(vx, va):
             self._twist, self._heard_us = Twist(vx, va), now_us
             return
         self.refused += 1

@@ -10,8 +10,8 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.convoy import place
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.options.collision_guard import CollisionGuard
 from tickrig.host.motion.options.game_pad import GamePad
-from tickrig.host.motion.options.guard import Guard
 from tickrig.host.motion.options.pad import StickPosition
 from tickrig.host.motion.options.switch_input import SwitchInput
 
@@ -27,7 +27,7 @@ class Seeing:
         self.loop = ClosedLoop(world=world, dense=dense)
         (self.eye,) = self.loop.range_finders
         line = self.eye.line.b
-        self.guard = Guard(
+        self.guard = CollisionGuard(
             self.loop.manager, self.loop.chain, lambda name: SimLink(self.loop.rig, line)
         )
         self.loop.activate("tuned")
@@ -95,7 +95,7 @@ def test_a_cart_waits_until_another_has_left_its_way() -> None:
     first, second = loop.carts
     place(second, Pose(1.5, 0.0, pi / 2))
     line = loop.range_finders[0].line.b
-    guard = Guard(loop.manager, first.chain, lambda name: SimLink(loop.rig, line))
+    guard = CollisionGuard(loop.manager, first.chain, lambda name: SimLink(loop.rig, line))
     loop.activate("tuned")
     guard.activate()
     loop.run_to(SECOND_US // 2)

@@ -15,7 +15,7 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.control_laws import VelocityLimits
-from tickrig.host.motion.drive import drive, expect, start
+from tickrig.host.motion.drive import drive, set_latency, start
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.motion_run import MotionRun, least_time_s
 
@@ -135,7 +135,7 @@ def test_a_slower_base_stays_within_the_published_range(
 ) -> None:
     """Published: 16..46 mm; 0.2..20 mm, 4 mm up to 0.1 s and 2 periods; `tools/rh3-scan`."""
     loop = ClosedLoop(BaseParameters(response_s=response_s, delay_ms=delay_ms))
-    expect(loop.chain, response_s)
+    set_latency(loop.chain, response_s)
     assert driven(points, set_id, loop).error_m <= most_m
 
 

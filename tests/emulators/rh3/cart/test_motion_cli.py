@@ -17,8 +17,8 @@ from click.testing import CliRunner, Result
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
-from tickrig.emulators.rh3.cart.options import MotionOptions, demand_arrival
-from tickrig.emulators.rh3.cart.squares import Size, play_squares
+from tickrig.emulators.rh3.cart.options import MotionOptions, require_arrival
+from tickrig.emulators.rh3.cart.squares import SquarePlan, run_squares
 from tickrig.host.motion.drive import BaseConnection, drive, start
 from tickrig.host.motion.geometry import Pose
 
@@ -119,7 +119,7 @@ def test_a_person_measures_where_a_real_cart_stands(
 ) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("10\n0\n" * 4))
     options = OnPort("tuned", "/dev/ttyUSB0", 115_200, None, None, False, BaseParameters())
-    play_squares(options, Size(1, 0.3), None)
+    run_squares(options, SquarePlan(1, 0.3), None)
     told = capsys.readouterr().out
     assert told.count("Measured x of the cart from its start, mm") == 4
     assert "return, most    10.0    10.0 mm" in told
@@ -128,17 +128,17 @@ def test_a_person_measures_where_a_real_cart_stands(
 def test_a_square_that_does_not_end_is_told() -> None:
     options = Jammed("tuned", None, 115_200, None, None, False, BaseParameters())
     with pytest.raises(click.ClickException, match=r"fault of the base: stall \(left\)"):
-        play_squares(options, Size(1, 0.3), None)
+        run_squares(options, SquarePlan(1, 0.3), None)
 
 
 def test_a_goal_that_is_not_reached_is_told() -> None:
     connection = Jammed("tuned", None, 115_200, None, None, False, BaseParameters()).begin()
     with pytest.raises(click.ClickException, match=r"fault of the base: stall \(left\)"):
-        demand_arrival(connection, drive(connection, [Pose(1.0)]))
+        require_arrival(connection, drive(connection, [Pose(1.0)]))
     connection = ClosedLoop()
     start(connection)
     with pytest.raises(click.ClickException, match=r"not there after 1\.0 s"):
-        demand_arrival(connection, drive(connection, [Pose(1.0)], timeout_us=1_000_000))
+        require_arrival(connection, drive(connection, [Pose(1.0)], timeout_us=1_000_000))
 
 
 def test_odometry_conf_is_used(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A chain with eyes: it stops before what is in its way, and goes on when that has gone."""
+"""A motion chain that stops before obstacles, and goes on when they have gone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tickrig.host.rtc import Manager
 _LATEST: Final = {"dataport.buffer.length": "8"}
 
 
-class Guard:
+class CollisionGuard:
     """The components between a range finder and the base, in the context of a chain.
 
     PathFollower is joined to ObstaclesAvoidance in the place of RefHardRh3.
