@@ -61,7 +61,7 @@ class Rrc(Copyable):
     _load: LoadAccount = field(init=False)
     _renewed: int = field(default=0, init=False)  # tick of the latest correct command
     _moved: int = field(default=0, init=False)  # tick of the latest transition
-    _due_us: int = field(default=0, init=False)
+    _due_us: int = field(init=False)
     _sent: list[bytes] = field(default_factory=list, init=False)
     _commands: int = field(default=0, init=False)
     _replies: int = field(default=0, init=False)

@@ -58,3 +58,12 @@ def test_a_reset_forgets_what_services_waited_for() -> None:
     assert bus.slave.due_us == bus.now_us + 200_000
     bus.step("000#8205")
     assert bus.slave.due_us == NEVER
+
+
+def test_a_change_of_state_is_told_to_what_belongs_to_the_slave_first() -> None:
+    bus, told = booted(), list[str]()
+    bus.slave.on_state.append(lambda old, new: told.append(f"observer {old.name} {new.name}"))
+    bus.slave.entered = lambda old, new: told.append(f"own {old.name} {new.name}")
+    bus.step("000#0105", "000#0105")
+    own = "PRE_OPERATIONAL OPERATIONAL"
+    assert told == [f"own {own}", f"observer {own}"]

@@ -73,14 +73,18 @@ def test_what_waits_for_sync_outlives_only_another_deadline(
     assert outputs(bench) == ((0x11, 0x11) if command[1] == 5 else (0, 0))
 
 
-@pytest.mark.parametrize("pause", [(0x1400, 2, 255), (0x1400, 1, OFF | 0x205)])
+@pytest.mark.parametrize(
+    "writes",
+    [[(0x1400, 2, 255), (0x1400, 2, 1)], [(0x1400, 1, OFF | 0x205), (0x1400, 1, 0x205)]],
+    ids=["another type", "off and on"],
+)
 def test_what_waited_for_sync_does_not_come_back(
-    bench: PdoBench, pause: tuple[int, int, int]
+    bench: PdoBench, writes: list[tuple[int, int, int]]
 ) -> None:
     bench.set_rpdo1(1)
     bench.operational()
     bench.step("205#1111")
-    bench.must_write(pause, (0x1400, 1, OFF | 0x205), (0x1400, 2, 1), (0x1400, 1, 0x205))
+    bench.must_write(*writes)
     bench.step("080#")
     assert outputs(bench) == (0, 0)
 

@@ -321,6 +321,7 @@ def test_an_object_that_is_mapped_no_longer_is_no_event(running: PdoBench) -> No
     running.must_write((0x1800, 1, NO_RTR | 0x185))
     assert running.step() == ["185#00"]
     running.set(0x6000, 1, 1)
+    assert running.slave.due_us == NEVER
     assert running.run(10) == []
     running.set(0x2000, 0, 1)
     assert running.run(10) == ["185#01"]

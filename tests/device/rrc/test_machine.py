@@ -1,0 +1,63 @@
+"""What a rig asks of the RRC: its period, when it is due, and what can be read."""
+
+from __future__ import annotations
+
+from tests.device.rrc.bench import RrcBench
+from tickrig.device.rrc.machine import Rrc
+from tickrig.wire.instant import NEVER
+
+LAST_TICK_US = NEVER // 10_000 * 10_000
+"""When it is due that waits for nothing."""
+
+
+def test_it_works_every_10_ms_and_begins_at_once() -> None:
+    rrc = Rrc()
+    assert (rrc.tick_us, rrc.due_us) == (10_000, 0)
+
+
+def test_it_is_due_at_once_when_an_input_is_set_or_it_is_reset() -> None:
+    bench = RrcBench().power_on()
+    assert bench.rrc.due_us == LAST_TICK_US
+    bench.set(gauge=1)
+    assert bench.rrc.due_us == 0
+    bench.step()
+    assert bench.rrc.due_us == LAST_TICK_US
+    bench.rrc.reset()
+    assert bench.rrc.due_us == 0
+
+
+def test_it_is_due_when_power_on_ends() -> None:
+    bench = RrcBench().boot()
+    bench.tap("power_button")
+    assert bench.rrc.due_us == 10_000 * (bench.tick + 29)
+
+
+def test_it_is_due_when_the_watchdog_would_trip() -> None:
+    bench = RrcBench().power_on()
+    bench.step("watchdog05")
+    assert bench.rrc.due_us == 10_000 * (bench.tick + 5)
+
+
+def test_it_is_due_in_each_period_while_it_sends_its_status() -> None:
+    bench = RrcBench().power_on()
+    bench.step("statusA1")
+    assert bench.rrc.due_us == 10_000 * (bench.tick + 1)
+    bench.step("poweroff")
+    bench.run(2)
+    assert bench.rrc.due_us > 10_000 * (bench.tick + 1)
+
+
+def test_it_is_due_in_the_next_period_while_lines_wait() -> None:
+    bench = RrcBench().power_on()
+    bench.step("beep01", "beep01", "beep01")
+    assert bench.rrc.due_us == 10_000 * (bench.tick + 1)
+
+
+def test_the_power_of_vr2_can_be_read() -> None:
+    bench = RrcBench()
+    seen = [bench.rrc.read("vr2_power")]
+    bench.power_on()
+    seen.append(bench.rrc.read("vr2_power"))
+    bench.step("poweroff")
+    seen.append(bench.rrc.read("vr2_power"))
+    assert seen == [0, 1, 0]
