@@ -30,9 +30,11 @@ class DictionaryDescription(Immutable):
         entries: sorted by index and sub-index.
         objects: names and kinds by index, sorted.
         places: place among the entries by index << 8 | sub-index.
+        spans: places of all entries of an object, by index.
+        elements: places of the entries from sub-index 1 on without a gap, by index.
     """
 
-    __slots__ = ("entries", "objects", "places")
+    __slots__ = ("elements", "entries", "objects", "places", "spans")
 
     def __init__(
         self, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
@@ -46,6 +48,15 @@ class DictionaryDescription(Immutable):
             entry.index: objects.get(entry.index, ObjectDescription(entry.name))
             for entry in self.entries
         }
+
+        self.spans: dict[int, slice] = {}
+        self.elements: dict[int, slice] = {}
+        for place, entry in enumerate(self.entries):
+            first = self.spans.get(entry.index, slice(place, place)).start
+            self.spans[entry.index] = slice(first, place + 1)
+            first = self.elements.get(entry.index, slice(place, place)).start
+            if entry.sub == place - first + 1:
+                self.elements[entry.index] = slice(first, place + 1)
 
     def __iter__(self) -> Iterator[EntryDescription]:
         """Give all entries, sorted."""
@@ -86,7 +97,7 @@ class Dictionary:
 
     def _describe(self, description: DictionaryDescription) -> None:
         self.description, self._places = description, description.places
-        self._entries = [Entry(each) for each in description.entries]
+        self._entries = list(map(Entry, description.entries))
         self.by_multiplexer: dict[bytes, Entry] = {}
 
     def copy(self) -> Self:
@@ -136,12 +147,16 @@ class Dictionary:
             self.by_multiplexer[multiplexer] = entry
         return entry
 
+    def object(self, index: int) -> list[Entry]:
+        """Return all entries of an object, sorted; none if there is no such object."""
+        span = self.description.spans.get(index)
+        return [] if span is None else self._entries[span]
+
+    def within(self, area: range) -> list[int]:
+        """Return the indices of the objects in an area, sorted."""
+        return [index for index in self.description.spans if index in area]
+
     def elements(self, index: int, most: int = 254) -> list[Entry]:
         """Return the entries of an object from sub-index 1 on, without a gap."""
-        found = []
-        for sub in range(1, most + 1):
-            entry = self.find(index, sub)
-            if entry is None:
-                break
-            found.append(entry)
-        return found
+        places = self.description.elements.get(index)
+        return [] if places is None else self._entries[places][:most]

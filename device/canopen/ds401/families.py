@@ -86,19 +86,19 @@ REAL_ERROR_VALUE: Final = 0x6445
 
 def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
     """Give the numbers that an object holds, each with its sub-index; it may have gaps."""
-    if index in dictionary.objects:
-        for sub in range(1, 255):
-            entry = find_number(dictionary, index, sub)
-            if entry is not None:
-                yield sub, entry
+    for entry in dictionary.object(index):
+        if 1 <= entry.sub <= 254 and _is_number(entry):
+            yield entry.sub, entry
 
 
 def find_number(dictionary: Dictionary, index: int, sub: int) -> Entry | None:
     """Return an entry that is a number, None if there is none."""
     entry = dictionary.find(index, sub)
-    if entry is None or not (entry.data_type.is_integer or entry.data_type is DataType.REAL32):
-        return None
-    return entry
+    return entry if entry is not None and _is_number(entry) else None
+
+
+def _is_number(entry: Entry) -> bool:
+    return entry.data_type.is_integer or entry.data_type is DataType.REAL32
 
 
 def channels(dictionary: Dictionary, objects: AnalogueObjects) -> list[int]:

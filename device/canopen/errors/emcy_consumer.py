@@ -37,8 +37,8 @@ class EmcyConsumer(Service):
         self.on_emcy: Listeners[Callable[[int, Emcy], None]] = Listeners()
         self._entries = [
             entry
-            for node_id in range(1, MAX_NODES + 1)
-            if (entry := node.dictionary.find(EMERGENCY_CONSUMER, node_id)) is not None
+            for entry in node.dictionary.object(EMERGENCY_CONSUMER)
+            if 1 <= entry.sub <= MAX_NODES
         ]
         for entry in self._entries:
             entry.guard = check_emcy_cob_id

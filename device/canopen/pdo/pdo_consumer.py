@@ -35,8 +35,7 @@ class PdoConsumer(Service):
         self.on_rpdo: list[Callable[[int], None]] = []
         self.rpdos = [
             Rpdo(self, index - RPDO_PARAMETERS[0] + 1)
-            for index in node.dictionary.objects
-            if index in RPDO_PARAMETERS
+            for index in node.dictionary.within(RPDO_PARAMETERS)
         ]
         self._synchronous: tuple[Rpdo, ...] = ()
         self._window_us, self._window_end_us, self._due_us = 0, NEVER, NEVER

@@ -53,15 +53,13 @@ class PdoParameters:
         changed: OnEntry,
     ) -> None:
         self._types = types
-        self._entries = {
-            sub: entry
-            for sub in range(COB_ID, SYNC_START + 1)
-            if (entry := dictionary.find(index, sub)) is not None
-        }
+        self._entries: dict[int, Entry] = {}
         check = self._check
-        for entry in self._entries.values():
-            entry.guard = check
-            entry.watch(changed)
+        for entry in dictionary.object(index):
+            if COB_ID <= entry.sub <= SYNC_START:
+                self._entries[entry.sub] = entry
+                entry.guard = check
+                entry.watch(changed)
         if RESERVED in self._entries:
             self._entries[RESERVED].source = _absent
 

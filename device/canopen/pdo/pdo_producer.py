@@ -38,8 +38,7 @@ class PdoProducer(Service):
         self.on_sent: list[Callable[[list[Entry]], None]] = []
         self.tpdos = [
             Tpdo(self, index - TPDO_PARAMETERS[0] + 1)
-            for index in node.dictionary.objects
-            if index in TPDO_PARAMETERS
+            for index in node.dictionary.within(TPDO_PARAMETERS)
         ]
         self._synchronous: tuple[TpdoMode, ...] = ()
         self._timed: tuple[TpdoMode, ...] = ()

@@ -93,7 +93,7 @@ class Rpdo:
     def restart(self) -> None:
         """Know of no error and no frame."""
         self._errors: set[int] = set()
-        self._dam = DamConsumer(self._consumer.node)
+        self._dam: DamConsumer | None = None
         self.stop()
 
     def stop(self) -> None:
@@ -114,6 +114,7 @@ class Rpdo:
     def _target(self) -> _Target | None:
         count = self.mapping.count
         if count == DAM_MPDO:
+            self._dam = self._dam or DamConsumer(self._consumer.node)
             return self._dam.unpack, MAX_PDO_BYTES
         if count == SAM_MPDO:
             return SamConsumer(self._consumer.node.dictionary).unpack, MAX_PDO_BYTES

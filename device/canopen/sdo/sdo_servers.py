@@ -66,7 +66,7 @@ class SdoServers(Service):
         self.default = SdoServer(node, self._wake, limits)
         self._additional = [
             _Additional(SdoServer(node, self._wake, limits), request, response)
-            for index in ADDITIONAL_SERVERS
+            for index in node.dictionary.within(ADDITIONAL_SERVERS)
             if (request := node.dictionary.find(index, CLIENT_TO_SERVER))
             and (response := node.dictionary.find(index, SERVER_TO_CLIENT))
         ]
