@@ -75,7 +75,7 @@ class Dictionary:
 
     Attributes:
         description: names, types, access, limits and defaults.
-        by_multiplexer: entries that an SDO has named, by the three bytes that name them.
+        by_multiplexer: readable entries that an SDO has named, by the three bytes that do.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.device.twin import Immutable
@@ -144,7 +144,8 @@ class Dictionary:
             if entry is None:
                 known = index in self.objects
                 raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
-            self.by_multiplexer[multiplexer] = entry
+            if entry.description.readable:
+                self.by_multiplexer[multiplexer] = entry
         return entry
 
     def object(self, index: int) -> list[Entry]:

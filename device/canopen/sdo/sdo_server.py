@@ -154,7 +154,7 @@ class SdoServer:
         """Take a request while no transfer runs; reading a small value is the short way."""
         if request[0] == _UPLOAD:
             entry = self._entries.get(request[1:4])
-            if entry is not None and entry.description.readable and entry.source is None:
+            if entry is not None and entry.source is None:
                 data = entry.data
                 size = len(data)
                 if 0 < size <= EXPEDITED_BYTES:
