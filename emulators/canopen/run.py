@@ -32,7 +32,7 @@ from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import Line, ScenarioParser, Send
+from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep, Send
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -142,7 +142,7 @@ class CanopenRun(EmulatorRun):
         wire.observers.append(trace.hear)
         return trace
 
-    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
         options = self._options
         if not (options.scenario or options.verbose):
             return None

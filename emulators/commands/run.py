@@ -17,7 +17,7 @@ from tickrig.emulators.bench.control import Control
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import Line, ScenarioParser
+from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
@@ -99,10 +99,10 @@ class EmulatorRun(ABC):
         """Say where it is and how to talk to it."""
 
     @abstractmethod
-    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
         """Have the run written down as far as that is wanted."""
 
-    def _checked(self) -> tuple[list[FaultSpec], tuple[Line, ...]]:
+    def _checked(self) -> tuple[list[FaultSpec], tuple[ScenarioStep, ...]]:
         """Read all that can be wrong before anything is opened."""
         bench, parser = self._dry_run()
         with refused_at("--fault"):

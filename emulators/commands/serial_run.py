@@ -18,7 +18,7 @@ from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.trace import Header
 from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import Line, ScenarioParser
+from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.messages import say
@@ -132,7 +132,7 @@ class SerialRun(EmulatorRun):
         except OSError as error:
             refuse_path("trace", error)
 
-    def _attend(self, bench: RunningEmulator, scenario: tuple[Line, ...]) -> Player | None:
+    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
         options, everything = self._options, bool(self._options.scenario)
         if options.panel or not (everything or options.verbose):
             return None

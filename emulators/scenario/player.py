@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import assert_never
 
@@ -17,24 +15,14 @@ from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.scenario.scenario import (
     Clear,
     End,
-    Expect,
-    Line,
     Press,
     Release,
+    ScenarioStep,
     Send,
     Set,
     Watch,
 )
 from tickrig.host.text.values import format_time
-
-
-@dataclass(frozen=True, slots=True)
-class _Expectation:
-    """A line that is waited for."""
-
-    line: Line
-    expect: Expect
-    pattern: re.Pattern[str]
 
 
 class Player:
@@ -54,19 +42,19 @@ class Player:
     def __init__(
         self,
         emulator: RunningEmulator,
-        scenario: Sequence[Line],
+        scenario: Sequence[ScenarioStep],
         transcript: Transcript,
         *,
         stays: bool = False,
     ) -> None:
         self._emulator, self._transcript = emulator, transcript
-        self._open: list[_Expectation] = []
+        self._open: list[ScenarioStep] = []
         self.met = self.missed = 0
         emulator.log.listeners.append(self._hear)
-        for line in scenario:
-            emulator.event_queue.put(line, line.at_us, partial(self._carry_out, line))
-        if not stays and not any(isinstance(line.action, End) for line in scenario):
-            end_us = max((_end_us(line) for line in scenario), default=0)
+        for step in scenario:
+            emulator.event_queue.put(step, step.at_us or 0, partial(self._carry_out, step))
+        if not stays and not any(isinstance(step.what, End) for step in scenario):
+            end_us = max(((step.at_us or 0) + step.within_us for step in scenario), default=0)
             emulator.event_queue.put(self, end_us, self._end)
 
     def finish(self, now_us: int) -> None:
@@ -75,17 +63,17 @@ class Player:
             self._miss(item, now_us)
             self._emulator.event_queue.drop(item)
 
-    def _carry_out(self, line: Line, now_us: int) -> None:
+    def _carry_out(self, step: ScenarioStep, now_us: int) -> None:
         """Do it; what the device itself refuses counts as missed."""
         try:
-            self._do(line, now_us)
+            self._do(step, now_us)
         except ValueError as error:
             self.missed += 1
-            self._transcript.tell(now_us, "?", f"{line.place}: {error}")
+            self._transcript.tell(now_us, "?", f"{step.place}: {error}")
 
-    def _do(self, line: Line, now_us: int) -> None:
+    def _do(self, step: ScenarioStep, now_us: int) -> None:
         operator = self._emulator.operator
-        match line.action:
+        match step.what:
             case Send(data, shown):
                 self._transcript.send(now_us, data, shown)
             case Set(name, values):
@@ -100,40 +88,30 @@ class Player:
                 operator.clear(name)
             case Watch(names):
                 self._transcript.watch(now_us, *names)
-            case Expect() as expect:
-                self._expect(now_us, expect, line)
+            case None:
+                self._open.append(step)
+                queue = self._emulator.event_queue
+                queue.put(step, now_us + step.within_us, partial(self._miss, step))
             case End():
                 self._end(now_us)
             case _ as never:
                 assert_never(never)
 
-    def _expect(self, now_us: int, expect: Expect, line: Line) -> None:
-        pattern = re.compile(".*".join(map(re.escape, expect.text.split("*"))))
-        item = _Expectation(line, expect, pattern)
-        self._open.append(item)
-        self._emulator.event_queue.put(item, now_us + expect.within_us, partial(self._miss, item))
-
     def _hear(self, heard: WireLine) -> None:
         text = escape(heard.data)
         if heard.mark is Mark.FROM_DEVICE:
-            for item in [item for item in self._open if item.pattern.fullmatch(text)]:
+            for item in [item for item in self._open if item.wanted[0].matches(text)]:
                 self._open.remove(item)
                 self._emulator.event_queue.drop(item)
                 self.met += 1
 
-    def _miss(self, item: _Expectation, now_us: int) -> None:
-        self._open.remove(item)
+    def _miss(self, step: ScenarioStep, now_us: int) -> None:
+        self._open.remove(step)
         self.missed += 1
-        expect, since = item.expect, format_time(item.line.at_us)
-        within = f"within {expect.within_us / 1_000:g} ms of {since}"
-        self._transcript.tell(now_us, "?", f"{item.line.place}: no line {expect.text!r} {within}")
+        text, since = step.wanted[0].text, format_time(step.at_us or 0)
+        within = f"within {step.within_us / 1_000:g} ms of {since}"
+        self._transcript.tell(now_us, "?", f"{step.place}: no line {text!r} {within}")
 
     def _end(self, now_us: int) -> None:
         self.finish(now_us)
         self._emulator.stop()
-
-
-def _end_us(line: Line) -> int:
-    """Return when an action is done with."""
-    waits = line.action.within_us if isinstance(line.action, Expect) else 0
-    return line.at_us + waits

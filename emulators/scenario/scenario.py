@@ -6,21 +6,18 @@ import re
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
 from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.host.text.steps import Condition, Step, StepError, content_lines
 from tickrig.host.text.values import Setting, parse_setting, parse_time_us
 
 Encoder = Callable[[bytes], bytes]
 """Makes a line for the wire of the text that a scenario gives."""
-
-
-class ScenarioError(ValueError):
-    """A scenario that cannot be run; its text says where and why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,32 +70,25 @@ class Watch:
 
 
 @dataclass(frozen=True, slots=True)
-class Expect:
-    """Fail unless the device sends a line in time; `*` stands for any characters."""
-
-    text: str
-    within_us: int
-
-
-@dataclass(frozen=True, slots=True)
 class End:
     """End the run."""
 
 
-Action = Send | Set | Press | Release | FaultSpec | Clear | Watch | Expect | End
+Action = Send | Set | Press | Release | FaultSpec | Clear | Watch | End
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One action of a scenario: when, what, and `FILE:LINE` where it stands."""
+ScenarioStep = Step[Action, str]
+"""An action at a time, or a line of the device that is wanted from then on."""
 
-    at_us: int
-    action: Action
-    place: str
+
+class _Wanted(NamedTuple):
+    """A line of the device that must come in time; `*` stands for any characters."""
+
+    line: Condition[str]
+    within_us: int
 
 
 _LINE: Final = re.compile(r"(\+?)(\S+)\s+(\w+)(?:\s+(.*))?")
-_COMMENT: Final = re.compile(r"(^|\s)#.*")
 _PRESS: Final = re.compile(r"(\S+)(?:\s+for\s+(\S+))?")
 _EXPECT: Final = re.compile(r"(.*\S)\s+within\s+(\S+)")
 
@@ -122,7 +112,7 @@ class ScenarioParser:
         senders: Mapping[str, Sender] | None = None,
     ) -> None:
         self._device, self._operator = device, operator
-        self._verbs: dict[str, Callable[[str], Action]] = {
+        self._verbs: dict[str, Callable[[str], Action | _Wanted]] = {
             **(senders or _line_senders(encoders or {})),
             "set": self._parse_set,
             "press": self._parse_press,
@@ -134,39 +124,41 @@ class ScenarioParser:
             "end": _parse_end,
         }
 
-    def parse(self, text: str, file: str) -> tuple[Line, ...]:
+    def parse(self, text: str, file: str) -> tuple[ScenarioStep, ...]:
         """Read a whole scenario.
 
         Raises:
-            ScenarioError: `FILE:LINE: what came, what is allowed`.
+            StepError: `FILE:LINE: what came, what is allowed`.
         """
-        lines: list[Line] = []
-        for number, raw in enumerate(text.splitlines(), 1):
-            if content := _COMMENT.sub("", raw).strip():
-                place = f"{file}:{number}"
-                try:
-                    lines.append(self._parse_line(content, lines[-1:], place))
-                except ValueError as error:
-                    raise ScenarioError(f"{place}: {error}") from None
-        return tuple(lines)
+        steps: list[ScenarioStep] = []
+        for number, content in content_lines(text):
+            place = f"{file}:{number}"
+            try:
+                steps.append(self._parse_line(content, steps[-1:], place))
+            except ValueError as error:
+                raise StepError(f"{place}: {error}") from None
+        return tuple(steps)
 
-    def _parse_line(self, content: str, above: list[Line], place: str) -> Line:
+    def _parse_line(self, content: str, above: list[ScenarioStep], place: str) -> ScenarioStep:
         match = _LINE.fullmatch(content)
         if match is None:
             raise ValueError(f"{content!r} is not 'TIME ACTION ...', as '1.5s press NAME'")
         plus, time, verb, rest = match.groups()
-        before_us = above[0].at_us if above else 0
+        before_us = above[0].at_us or 0 if above else 0
         at_us = parse_time_us(time) + (before_us if plus else 0)
         if at_us < before_us:
             raise ValueError(f"{time} is earlier than the action above")
-        if above and isinstance(above[0].action, End):
+        if above and isinstance(above[0].what, End):
             raise ValueError(f"{verb} comes after end")
         if verb not in self._verbs:
             raise ValueError(f"no action {verb!r}; known: {', '.join(self._verbs)}")
         action = self._verbs[verb](rest or "")
+        if isinstance(action, _Wanted):
+            line, within_us = action
+            return Step(place=place, at_us=at_us, wanted=(line,), within_us=within_us)
         if isinstance(action, FaultSpec) and action.to_us <= at_us:
             raise ValueError(f"{rest} would have ended before {time}")
-        return Line(at_us, action, place)
+        return Step(place=place, at_us=at_us, what=action)
 
     def _parse_set(self, rest: str) -> Set:
         name, *words = shlex.split(rest) or [""]
@@ -232,11 +224,13 @@ def parse_raw(rest: str) -> Send:
     return Send(data, data)
 
 
-def _parse_expect(rest: str) -> Expect:
+def _parse_expect(rest: str) -> _Wanted:
     match = _EXPECT.fullmatch(rest)
     if match is None:
         raise ValueError(f"expect takes TEXT within DURATION, got {rest!r}")
-    return Expect(match[1], parse_time_us(match[2]))
+    pattern = re.compile(".*".join(map(re.escape, match[1].split("*"))))
+    line = Condition[str](match[1], lambda text: pattern.fullmatch(text) is not None)
+    return _Wanted(line, parse_time_us(match[2]))
 
 
 def _parse_end(rest: str) -> End:

@@ -19,13 +19,13 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence import steps
-from tickrig.host.monitor.sequence.conditions import DecodedCondition
-from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun, event_line
-from tickrig.host.monitor.sequence.steps import Condition
+from tickrig.host.monitor.sequence.conditions import DecodedCondition, FrameCondition
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceRun, event_line, outline
+from tickrig.host.monitor.sequence.sequence_run import Sequence as Steps
 from tickrig.host.monitor.sequence.variables import parse_variable
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
+from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Watch:
         """Decode a frame; conditions are asked about it next."""
         self._latest.take(record, self._decoder.take(record))
 
-    def condition(self, text: str) -> Condition:
+    def condition(self, text: str) -> FrameCondition:
         """Return the condition of a filter expression; ValueError if it is none."""
         return self._latest.condition(text)
 
@@ -90,7 +90,7 @@ def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> 
     watch = Watch(read_eds_files(eds))
     sequence = _read(file, variables, watch)
     if dry_run:
-        click.echo("\n".join(steps.outline(sequence.steps)))
+        click.echo("\n".join(outline(sequence.steps)))
         return
     run = SequenceRun(sequence)
     _carry_out(run, bus, BusOptions(**options), watch, quiet)
@@ -100,7 +100,7 @@ def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> 
         context.exit(FAILED)
 
 
-def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
+def _read(file: Path, words: Sequence[str], watch: Watch) -> Steps:
     try:
         variables = dict(map(parse_variable, words))
         text = file.read_text("utf-8")
@@ -117,7 +117,7 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> steps.Sequence:
         refuse_path("sequence", error)
     except UnicodeDecodeError:
         raise Refused(f"{file} is no text") from None
-    except (SequenceError, ValueError) as error:
+    except (StepError, ValueError) as error:
         raise Refused(str(error)) from None
 
 

@@ -1,54 +1,42 @@
 """What a sequence waits for: frames by a pattern, or decoded frames by a filter.
 
->>> pattern = parse_pattern("585#60?1*")
->>> [pattern.fits(CanFrame.parse(text)) for text in ("585#6041", "585#60F1AA", "585#6042")]
+>>> from tickrig.wire.can import CanFrame
+>>> frames = map(CanFrame.parse, ("585#6041", "585#60F1AA", "585#6042"))
+>>> [parse_pattern("585#60?1*").matches(Record(0, "can0", frame)) for frame in frames]
 [True, True, False]
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence.steps import Condition
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.text.steps import Condition
 
 _NOTATION: Final = re.compile(
     r"([0-9A-Fa-f?]{3}|[0-9A-Fa-f?]{8})#(R[0-8]?|(?:[0-9A-Fa-f?]{2}\.?){0,8}\*?)"
 )
 
 
-@dataclass(frozen=True, slots=True)
-class FramePattern:
-    """A frame in candump notation, with `?` for any hex digit and `*` for any more bytes.
+FrameCondition = Condition[Record]
 
-    Attributes:
-        text: as it was written.
-        regex: what the notation of a frame must be.
+
+def parse_pattern(text: str) -> FrameCondition:
+    """Read a frame in candump notation, with `?` for any hex digit and `*` for any more bytes.
+
+    Raises:
+        ValueError: it is none.
     """
-
-    text: str
-    regex: re.Pattern[str]
-
-    def fits(self, frame: CanFrame | ErrorFrame) -> bool:
-        """Say whether a frame is meant."""
-        return self.regex.fullmatch(str(frame)) is not None
-
-
-def parse_pattern(text: str) -> FramePattern:
-    """Read a pattern; ValueError if it is none."""
     match = _NOTATION.fullmatch(text.strip())
     if match is None:
         raise ValueError(f"{text!r} is not a frame like 705#05, 585#60??????* or 705#R")
     can_id, data = (part.upper().replace(".", "") for part in match.groups())
     body = data.replace("?", "[0-9A-F]").replace("*", "[0-9A-F]*")
     regex = re.compile(f"{can_id.replace('?', '[0-9A-F]')}#{body}")
-    return FramePattern(text.strip(), regex)
+    return Condition(text, lambda record: regex.fullmatch(str(record.frame)) is not None)
 
 
 class DecodedCondition:
@@ -61,7 +49,7 @@ class DecodedCondition:
         """Take a frame; conditions are asked about it next."""
         self._latest = record, decoded
 
-    def condition(self, text: str) -> Condition:
+    def condition(self, text: str) -> FrameCondition:
         """Return the condition of a filter expression; ValueError if it is none."""
         chosen = parse_filter(text)
 

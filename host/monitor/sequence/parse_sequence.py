@@ -4,36 +4,21 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from tickrig.host.monitor.sequence.conditions import parse_pattern
-from tickrig.host.monitor.sequence.steps import (
-    FOREVER,
-    Condition,
-    Expect,
-    Place,
-    Repeat,
-    Send,
-    Sequence,
-    Step,
-    Wait,
-    takes_time,
-)
+from tickrig.host.monitor.sequence.conditions import FrameCondition, parse_pattern
+from tickrig.host.monitor.sequence.sequence_run import FrameStep, Sequence
 from tickrig.host.monitor.sequence.variables import fill_in
+from tickrig.host.text.steps import FOREVER, Place, StepError, content_lines
 from tickrig.host.text.toml_place import line_of
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
-_COMMENT: Final = re.compile(r"(^|\s)#.*")
 _LOOP: Final = re.compile(r"loop\s+([0-9]{1,9}|forever)")
 _FRAME: Final = re.compile(r"\+([0-9]{1,9}(?:\.[0-9]{1,3})?)\s+(\S+)")
-
-
-class SequenceError(ValueError):
-    """A sequence that cannot be carried out; its text says where and why."""
 
 
 def parse_lines(text: str, file: str) -> Sequence:
@@ -43,29 +28,24 @@ def parse_lines(text: str, file: str) -> Sequence:
     all of it three times, `loop forever` until it is stopped; `#` begins a comment.
 
     Raises:
-        SequenceError: `FILE:LINE: what came, what is allowed`.
+        StepError: `FILE:LINE: what came, what is allowed`.
     """
-    steps: list[Step] = []
+    steps: list[FrameStep] = []
     times = 1
-    for number, content in _contents(text):
+    for number, content in content_lines(text):
         try:
             if loop := _LOOP.fullmatch(content):
                 times = _times(loop[1], first=not steps)
             else:
-                steps += _line(content, number)
+                steps.append(_line(content, number))
         except (ValueError, WireError) as error:
-            raise SequenceError(f"{file}:{number}: {error}") from None
+            raise StepError(f"{file}:{number}: {error}") from None
     if not steps:
-        raise SequenceError(f"{file}:1: no frame, as '+10 123#DEADBEEF'")
-    if times == FOREVER and not any(isinstance(step, Wait) and step.wait_us for step in steps):
-        raise SequenceError(f"{file}:1: loop forever takes no time: write +10 before a frame")
-    return Sequence((Repeat((1,), times, tuple(steps)),), partial(_place, file))
-
-
-def _contents(text: str) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(text.splitlines(), 1):
-        if content := _COMMENT.sub("", line).strip():
-            yield number, content
+        raise StepError(f"{file}:1: no frame, as '+10 123#DEADBEEF'")
+    whole = FrameStep(place=(1,), times=times, steps=tuple(steps))
+    if times == FOREVER and not whole.takes_time:
+        raise StepError(f"{file}:1: loop forever takes no time: write +10 before a frame")
+    return Sequence((whole,), partial(_place, file))
 
 
 def _times(word: str, *, first: bool) -> int:
@@ -78,12 +58,12 @@ def _times(word: str, *, first: bool) -> int:
     return times
 
 
-def _line(content: str, number: int) -> list[Step]:
+def _line(content: str, number: int) -> FrameStep:
     match = _FRAME.fullmatch(content)
     if match is None:
         raise ValueError(f"{content!r} is not '+MS ID#DATA', as '+10 123#DEADBEEF', nor 'loop N'")
     frame = CanFrame.parse(match[2])
-    return [Wait((number,), round(float(match[1]) * 1_000)), Send((number,), (frame,))]
+    return FrameStep(place=(number,), at_us=round(float(match[1]) * 1_000), what=(frame,))
 
 
 def _place(file: str, place: Place) -> str:
@@ -129,26 +109,26 @@ class TomlSequence:
         variables: Mapping[str, int] | None = None,
         *,
         resolve: Callable[[str], CanFrame] = CanFrame.parse,
-        condition: Callable[[str], Condition] | None = None,
+        condition: Callable[[str], FrameCondition] | None = None,
     ) -> None:
         self._text, self._file = text, file
         self._given = dict(variables or {})
         self._resolve = resolve
-        self._condition = condition or _pattern
+        self._condition = condition or parse_pattern
         self._variables: dict[str, int] = {}
 
     def parse(self) -> Sequence:
         """Read it.
 
         Raises:
-            SequenceError: `FILE:LINE: what came, what is allowed`.
+            StepError: `FILE:LINE: what came, what is allowed`.
         """
         try:
             top = tomllib.loads(self._text)
         except tomllib.TOMLDecodeError as error:
-            raise SequenceError(self._syntax(str(error))) from None
+            raise StepError(self._syntax(str(error))) from None
         except RecursionError:
-            raise SequenceError(self._syntax("lists in lists in lists (at end)")) from None
+            raise StepError(self._syntax("lists in lists in lists (at end)")) from None
         try:
             self._variables = {**self._vars(top.get("vars", {})), **self._given}
             _check_keys(top, _TOP, ())
@@ -156,7 +136,7 @@ class TomlSequence:
                 raise _Wrong((), "no [[step]]")
             steps = self._steps(top["step"], ("step",))
         except _Wrong as error:
-            raise SequenceError(f"{self._locate(error.path)}: {error}") from None
+            raise StepError(f"{self._locate(error.path)}: {error}") from None
         return Sequence(steps, self._locate)
 
     def _locate(self, place: Place) -> str:
@@ -176,12 +156,12 @@ class TomlSequence:
                 raise _Wrong(("vars", name), f"{name} = {value!r} is no whole number")
         return table
 
-    def _steps(self, value: Any, path: Place) -> tuple[Step, ...]:
+    def _steps(self, value: Any, path: Place) -> tuple[FrameStep, ...]:
         if not isinstance(value, list) or not all(isinstance(step, dict) for step in value):
             raise _Wrong(path, f"{path[-1]} = {value!r:.60} is no list of steps")
         return tuple(self._step(step, (*path, number)) for number, step in enumerate(value))
 
-    def _step(self, step: dict[str, Any], path: Place) -> Step:
+    def _step(self, step: dict[str, Any], path: Place) -> FrameStep:
         verbs = [key for key in step if key in KEYS]
         if len(verbs) != 1:
             came = " and ".join(verbs) or ", ".join(step) or "nothing"
@@ -193,42 +173,49 @@ class TomlSequence:
         except (ValueError, WireError) as error:
             raise _Wrong((*path, verb), str(error)) from None
 
-    def _send(self, step: dict[str, Any], path: Place) -> Send:
-        return Send(path, tuple(map(self._frame, _texts(step["send"], "send"))))
+    def _send(self, step: dict[str, Any], path: Place) -> FrameStep:
+        return FrameStep(place=path, what=tuple(map(self._frame, _texts(step["send"], "send"))))
 
     def _frame(self, text: str) -> CanFrame:
         filled = fill_in(text, self._variables)
         return CanFrame.parse(filled) if "#" in filled else self._resolve(filled)
 
-    def _wait(self, step: dict[str, Any], path: Place) -> Wait:
-        return Wait(path, self._time(step["wait"]))
+    def _wait(self, step: dict[str, Any], path: Place) -> FrameStep:
+        return FrameStep(place=path, at_us=self._time(step["wait"]))
 
-    def _expect(self, step: dict[str, Any], path: Place) -> Expect:
+    def _expect(self, step: dict[str, Any], path: Place) -> FrameStep:
         texts = (fill_in(text, self._variables) for text in _texts(step["expect"], "expect"))
-        conditions = tuple(
-            _pattern(text) if "#" in text else self._condition(text) for text in texts
+        wanted = tuple(
+            parse_pattern(text) if "#" in text else self._condition(text) for text in texts
         )
         within_us = self._time(step.get("within", WITHIN))
         if not within_us:
             raise ValueError("within takes a time above 0")
         on_fail = step.get("on-fail", "stop")
+        steps: tuple[FrameStep, ...] = ()
         if isinstance(on_fail, list):
             steps = self._steps(on_fail, (*path, "on-fail"))
-            return Expect((*path, "expect"), conditions, within_us, False, steps)
-        if on_fail not in ("stop", "go-on"):
+        elif on_fail not in ("stop", "go-on"):
             raise ValueError(f"on-fail is 'stop', 'go-on' or a list of steps, got {on_fail!r}")
-        return Expect((*path, "expect"), conditions, within_us, on_fail == "go-on")
+        return FrameStep(
+            place=(*path, "expect"),
+            wanted=wanted,
+            within_us=within_us,
+            goes_on=on_fail == "go-on",
+            on_fail=steps,
+        )
 
-    def _repeat(self, step: dict[str, Any], path: Place) -> Repeat:
+    def _repeat(self, step: dict[str, Any], path: Place) -> FrameStep:
         times = FOREVER if step["repeat"] == "forever" else step["repeat"]
         if type(times) is not int or (times < 1 and step["repeat"] != "forever"):
             raise ValueError(f"repeat takes 1 or more, or 'forever'; got {step['repeat']!r}")
         if "steps" not in step:
             raise ValueError("repeat has no steps")
         steps = self._steps(step["steps"], (*path, "steps"))
-        if times == FOREVER and not takes_time(steps):
+        repeat = FrameStep(place=path, times=times, steps=steps)
+        if times == FOREVER and not repeat.takes_time:
             raise ValueError("repeat = 'forever' takes no time: add a wait or an expect")
-        return Repeat(path, times, steps)
+        return repeat
 
     def _time(self, value: Any) -> int:
         if not isinstance(value, str):
@@ -236,7 +223,7 @@ class TomlSequence:
         return parse_time_us(value)
 
 
-_Reader = Callable[[TomlSequence, dict[str, Any], Place], Step]
+_Reader = Callable[[TomlSequence, dict[str, Any], Place], FrameStep]
 _READERS: Final[Mapping[str, _Reader]] = {
     "send": TomlSequence._send,
     "wait": TomlSequence._wait,
@@ -256,8 +243,3 @@ def _texts(value: Any, key: str) -> list[str]:
     if not isinstance(texts, list) or not texts or not all(isinstance(t, str) for t in texts):
         raise ValueError(f"{key} takes a text or a list of texts, got {value!r:.60}")
     return texts
-
-
-def _pattern(text: str) -> Condition:
-    pattern = parse_pattern(text)
-    return Condition(text, lambda record: pattern.fits(record.frame))

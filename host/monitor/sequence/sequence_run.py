@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple, assert_never
+from typing import NamedTuple
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence.steps import (
-    FOREVER,
-    Condition,
-    Expect,
-    Repeat,
-    Send,
-    Sequence,
-    Step,
-    Wait,
-)
+from tickrig.host.monitor.sequence.conditions import FrameCondition
+from tickrig.host.text.steps import Place, Step
 from tickrig.host.text.values import format_time
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
+
+FrameStep = Step[Frames, Record]
+"""Sends frames, waits, expects frames, or repeats other steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """Steps, and how a place in them is told.
+
+    Attributes:
+        steps: in their order.
+        locate: returns `FILE:LINE` of a place.
+    """
+
+    steps: tuple[FrameStep, ...]
+    locate: Callable[[Place], str]
 
 
 class EventType(StrEnum):
@@ -41,7 +50,7 @@ class SequenceEvent(NamedTuple):
 
 class _Pause(NamedTuple):
     until_us: int
-    conditions: tuple[Condition, ...] = ()
+    conditions: tuple[FrameCondition, ...] = ()
 
 
 _Play = Generator[_Pause, bool, bool]
@@ -116,28 +125,23 @@ class SequenceRun:
             self.done, self._pause = True, _Pause(NEVER)
             self._note(EventType.END, f"{self.met} met, {self.missed} missed")
 
-    def _all(self, steps: tuple[Step, ...]) -> _Play:
+    def _all(self, steps: tuple[FrameStep, ...]) -> _Play:
         for step in steps:
             if not (yield from self._one(step)):
                 return False
         return True
 
-    def _one(self, step: Step) -> _Play:
-        match step:
-            case Send(_, frames):
-                self._send(frames)
-            case Wait(_, wait_us):
-                yield _Pause(self._at_us + wait_us)
-            case Expect():
-                return (yield from self._expect(step))
-            case Repeat(_, times, steps):
-                count = 0
-                while times == FOREVER or count < times:
-                    if not (yield from self._all(steps)):
-                        return False
-                    count += 1
-            case _ as never:
-                assert_never(never)
+    def _one(self, step: FrameStep) -> _Play:
+        if step.at_us is not None:
+            yield _Pause(self._at_us + step.at_us)
+        self._send(step.what or ())
+        if step.wanted:
+            return (yield from self._expect(step))
+        count = 0
+        while step.steps and (not step.times or count < step.times):
+            if not (yield from self._all(step.steps)):
+                return False
+            count += 1
         return True
 
     def _send(self, frames: Frames) -> None:
@@ -145,9 +149,9 @@ class SequenceRun:
         for frame in frames:
             self._note(EventType.SENT, str(frame))
 
-    def _expect(self, step: Expect) -> _Play:
-        wanted = " and ".join(condition.text for condition in step.conditions)
-        if (yield _Pause(self._at_us + step.within_us, step.conditions)):
+    def _expect(self, step: FrameStep) -> _Play:
+        wanted = " and ".join(condition.text for condition in step.wanted)
+        if (yield _Pause(self._at_us + step.within_us, step.wanted)):
             self.met += 1
             self._note(EventType.MET, wanted)
             return True
@@ -169,3 +173,25 @@ def event_line(note: SequenceEvent) -> str:
     '0.004718 ok 703#05'
     """
     return f"{format_time(note.at_us)} {note.mark} {note.text}"
+
+
+def outline(steps: tuple[FrameStep, ...], depth: int = 0) -> list[str]:
+    """Return the steps as lines for people, indented where they are repeated."""
+    lines = []
+    for step in steps:
+        lines += ["  " * depth + text for text in _texts(step)]
+        lines += outline(step.steps or step.on_fail, depth + 1)
+    return lines
+
+
+def _texts(step: FrameStep) -> Iterator[str]:
+    if step.at_us is not None:
+        yield f"wait {step.at_us / 1_000:g} ms"
+    if step.what:
+        yield "send " + " ".join(map(str, step.what))
+    if step.wanted:
+        wanted = " and ".join(condition.text for condition in step.wanted)
+        then = "go on" if step.goes_on else "stop"
+        yield f"expect {wanted} within {step.within_us / 1_000:g} ms, else {then}"
+    if step.times is not None:
+        yield f"repeat {step.times or 'forever'}"

@@ -10,23 +10,25 @@ from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import (
     End,
-    Expect,
     Press,
-    ScenarioError,
     ScenarioParser,
     Send,
     Set,
 )
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.text.steps import StepError
 
 
 def shout(text: bytes) -> bytes:
     return text.upper() + b"!\n"
 
 
-def parse(text: str, emulator: Emulator) -> tuple[tuple[int, object], ...]:
+def parse(text: str, emulator: Emulator) -> tuple[tuple[int | None, object], ...]:
     parser = ScenarioParser(emulator.device, emulator.operator, {"shout": shout})
-    return tuple((line.at_us, line.action) for line in parser.parse(text, "s.txt"))
+    return tuple(
+        (step.at_us, step.what or (step.wanted[0].text, step.within_us))
+        for step in parser.parse(text, "s.txt")
+    )
 
 
 def play(text: str, *, steps: int = 0, stays: bool = False) -> tuple[list[str], Player]:
@@ -51,15 +53,15 @@ def test_a_scenario_is_read_into_values() -> None:
         1     expect a # within 5ms
         2s    expect a * within 5ms#x
     """.replace("expect a # within", "expect a within")
-    with pytest.raises(ScenarioError, match=r"s\.txt:9: '5ms#x' is not a time"):
+    with pytest.raises(StepError, match=r"s\.txt:9: '5ms#x' is not a time"):
         parse(text, Emulator("lamp", Lamp()))
     assert parse(text.replace("#x", ""), Emulator("lamp", Lamp())) == (
         (100_000, Send(b"aA b\n", b"aA b")),
         (105_000, Set("place", (1, -2))),
         (200_000, Press("key", 1_000_000)),
         (200_000, FaultSpec("flip", 0.5, 1_000_000, 2_000_000)),
-        (1_000_000, Expect("a", 5_000)),
-        (2_000_000, Expect("a *", 5_000)),
+        (1_000_000, ("a", 5_000)),
+        (2_000_000, ("a *", 5_000)),
     )
     assert parse("1 send\n2 end", Emulator("lamp", Lamp()))[0] == (1_000_000, Send(b"\n", b""))
     assert parse("2 end", Emulator("lamp", Lamp())) == ((2_000_000, End()),)
@@ -100,7 +102,7 @@ def test_a_scenario_is_read_into_values() -> None:
     ],
 )
 def test_a_bad_line_says_where_and_what_is_allowed(line: str, error: str) -> None:
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(StepError) as caught:
         parse("\n1 send a\n" + line, Emulator("lamp", Lamp()))
     number = 4 if "\n" in line else 3
     assert str(caught.value).startswith(f"s.txt:{number}: ")

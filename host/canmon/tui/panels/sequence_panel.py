@@ -23,9 +23,14 @@ from tickrig.host.canmon.tui.tasks.sequence_task import (
     texts_settings,
 )
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.monitor.sequence.parse_sequence import SequenceError
-from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceEvent, event_line
-from tickrig.host.monitor.sequence.steps import Sequence, outline
+from tickrig.host.monitor.sequence.sequence_run import (
+    EventType,
+    Sequence,
+    SequenceEvent,
+    event_line,
+    outline,
+)
+from tickrig.host.text.steps import StepError
 from tickrig.host.tui.line_view import Line, LineView, plain
 
 STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
@@ -174,7 +179,7 @@ class SequencePanel(SendingPanel):
         wrong, area = self.query_one("#mistake", Static), self.query_one(TextArea)
         try:
             sequence = self.runner.parse(area.text, self._called())
-        except SequenceError as error:
+        except StepError as error:
             wrong.update(str(error))
             wrong.display = True
             place = _PLACE.match(str(error))

@@ -20,7 +20,7 @@ from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.sequence.conditions import DecodedCondition
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
 from tickrig.host.monitor.sequence.sequence_run import EventType, SequenceEvent, SequenceRun
-from tickrig.host.monitor.sequence.steps import Sequence as Steps
+from tickrig.host.monitor.sequence.sequence_run import Sequence as Steps
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
@@ -105,7 +105,7 @@ class SequenceTask(Task):
         return NEVER if self._run is None else self._run.due_us
 
     def parse(self, text: str, name: str) -> Steps:
-        """Read a sequence, plain lines or TOML; SequenceError if it is none."""
+        """Read a sequence, plain lines or TOML; StepError if it is none."""
         lines = (line.strip() for line in text.splitlines())
         begin = next((line for line in lines if line and not line.startswith("#")), "")
         if begin.startswith(LINES):

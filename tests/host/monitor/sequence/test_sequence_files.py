@@ -7,15 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.sequence.conditions import parse_pattern
-from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.steps import outline
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.monitor.sequence.sequence_run import outline
 from tickrig.host.monitor.sequence.variables import evaluate, fill_in, parse_variable
+from tickrig.host.text.steps import StepError
 from tickrig.wire.can import CanFrame
 
 
 def refused(text: str) -> str:
-    with pytest.raises(SequenceError) as caught:
+    with pytest.raises(StepError) as caught:
         TomlSequence(text, "a.toml").parse()
     return str(caught.value)
 
@@ -71,7 +73,7 @@ def test_a_mistake_is_told_with_its_line(text: str, said: str) -> None:
     ],
 )
 def test_a_mistake_in_a_line_is_told_with_its_number(text: str, said: str) -> None:
-    with pytest.raises(SequenceError, match=r"^a\.seq:") as caught:
+    with pytest.raises(StepError, match=r"^a\.seq:") as caught:
         parse_lines(text, "a.seq")
     assert said in str(caught.value)
 
@@ -191,4 +193,4 @@ def test_what_is_no_variable_is_refused(text: str) -> None:
     ],
 )
 def test_a_pattern_fits_what_it_means(pattern: str, frame: str, fits: bool) -> None:
-    assert parse_pattern(pattern).fits(CanFrame.parse(frame)) is fits
+    assert parse_pattern(pattern).matches(Record(0, "can0", CanFrame.parse(frame))) is fits

@@ -9,9 +9,9 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.sequence.parse_sequence import SequenceError, TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import SequenceRun
-from tickrig.host.monitor.sequence.steps import outline
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.monitor.sequence.sequence_run import SequenceRun, outline
+from tickrig.host.text.steps import StepError
 
 WORDS = ["080#", "{id}", "705#{id:9}", "stop", "go-on", "forever", "10ms", "0s", "", "5.rpdo1 a=1"]
 KEYS = ["send", "wait", "expect", "within", "on-fail", "repeat", "steps", "id", "vars"]
@@ -43,7 +43,7 @@ def carried_out(text: str) -> None:
     """Read it; if it is one, carry it out for a while."""
     try:
         sequence = TomlSequence(text, "a.toml", {"id": 3}).parse()
-    except SequenceError as error:
+    except StepError as error:
         assert re.match(r"a\.toml:\d+: .", str(error))  # noqa: PT017 - either is right
         return
     assert outline(sequence.steps) or not sequence.steps
@@ -67,7 +67,7 @@ def test_any_text_is_told_with_its_line(text: str) -> None:
 def test_any_lines_are_a_sequence_or_told_with_their_number(lines: list[str]) -> None:
     try:
         run = SequenceRun(parse_lines("\n".join(lines), "a.seq"))
-    except SequenceError as error:
+    except StepError as error:
         assert re.match(r"a\.seq:\d+: .", str(error))  # noqa: PT017 - either is right
         return
     for now_us in range(0, 20_000, 1_000):

@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
-from tickrig.host.monitor.sequence.parse_sequence import SequenceError
+from tickrig.host.text.steps import StepError
 
 START = Path(__file__).parents[5] / "examples/sequences/start_drive.toml"
 
@@ -83,5 +83,5 @@ def test_another_one_takes_the_place_of_one_that_runs() -> None:
     ],
 )
 def test_a_mistake_is_told_with_its_line(text: str, reason: str) -> None:
-    with pytest.raises(SequenceError, match=reason):
+    with pytest.raises(StepError, match=reason):
         Runner().start(text)
