@@ -78,7 +78,7 @@ class LiteLifeCycle:
         if command is LiteCommand.ABORT:
             return self._abort_at_once()
         if command in CONTEXT_CALLBACKS:
-            return self._tell(CONTEXT_CALLBACKS[command])
+            return self._notify(CONTEXT_CALLBACKS[command])
         move = TRANSITIONS[command]
         if self.state is not move.begin:
             return LiteStatus.WRONG_STATE
@@ -103,7 +103,7 @@ class LiteLifeCycle:
             self._call("on_deactivated")
         self._call("on_aborting")
 
-    def _tell(self, callback: str) -> LiteStatus:
+    def _notify(self, callback: str) -> LiteStatus:
         if getattr(type(self.component), callback) is getattr(LiteComponent, callback):
             return LiteStatus.UNSUPPORTED
         if self.state in NOT_ALIVE:

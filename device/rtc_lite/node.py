@@ -158,7 +158,7 @@ class RtcLiteNode(Copyable):
             else:
                 answer = self._server.answer(found)
             self._send(now_us, answer, self._life.calls - calls)
-            self._mind_timer(now_us)
+            self._update_timer(now_us)
 
     def _run_timer(self, now_us: int) -> None:
         """Execute if a period has ended and the processor is free."""
@@ -166,7 +166,7 @@ class RtcLiteNode(Copyable):
             calls = self._life.calls
             self._send(now_us, self._server.execute(), self._life.calls - calls)
 
-    def _mind_timer(self, now_us: int) -> None:
+    def _update_timer(self, now_us: int) -> None:
         """Let the timer run in the states in which it has something to do."""
         if self.config.context is LiteContextType.TIMER and self._life.state in TIMED:
             self._timer.run(now_us)

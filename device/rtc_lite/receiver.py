@@ -46,20 +46,20 @@ class LiteReceiver:
     decoder: RequestDecoder
     dropped: int = field(default=0, init=False)
     _waiting: bytes = field(default=b"", init=False)
-    _heard_us: int = field(default=0, init=False)  # when the latest byte came
+    _received_us: int = field(default=0, init=False)  # when the latest byte came
 
     @property
     def due_us(self) -> int:
         """When a frame that has begun is dropped."""
-        return self._heard_us + GAP_US if self.decoder.begun else NEVER
+        return self._received_us + GAP_US if self.decoder.begun else NEVER
 
     def push(self, now_us: int, data: bytes) -> None:
         """Take bytes from the line, as many as there is room for."""
         if not data:
             return
-        if self.decoder.lost and now_us - self._heard_us >= SILENCE_US:
+        if self.decoder.lost and now_us - self._received_us >= SILENCE_US:
             self.decoder.clear()
-        self._heard_us = now_us
+        self._received_us = now_us
         if not self.decoder.lost:
             room = BUFFER_BYTES - len(self._waiting)
             self._waiting += data[:room]

@@ -46,14 +46,14 @@ class _PacketSplitter:
     """Shows packets of RTno without header, length and sum."""
 
     def __init__(self) -> None:
-        self._decoder, self._heard_us = RtnoPacketDecoder(), 0
+        self._decoder, self._received_us = RtnoPacketDecoder(), 0
 
     def split(self, at_us: int, data: bytes) -> list[bytes]:
         out, decoder = list[bytes](), self._decoder
-        if at_us >= self._heard_us + (SILENCE_US if decoder.lost else GAP_US):
+        if at_us >= self._received_us + (SILENCE_US if decoder.lost else GAP_US):
             out += [SHOWN[LiteLinkFault.TIMEOUT]] if decoder.begun else []
             decoder.clear()
-        self._heard_us = at_us
+        self._received_us = at_us
         for found in decoder.packets(data):
             out.append(SHOWN[found] if isinstance(found, LiteLinkFault) else b"".join(found))
         return out
@@ -95,20 +95,20 @@ class MonitoredLink:
 
     def send(self, traffic: bytes, /) -> None:
         """Send, and tell."""
-        self._tell(Mark.TO_DEVICE, traffic)
+        self._report(Mark.TO_DEVICE, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> bytes:
         """Receive, and tell."""
         data = self._link.receive(timeout_us)
-        self._tell(Mark.FROM_DEVICE, data)
+        self._report(Mark.FROM_DEVICE, data)
         return data
 
     def close(self) -> None:
         """Close the link below."""
         self._link.close()
 
-    def _tell(self, mark: Mark, data: bytes) -> None:
+    def _report(self, mark: Mark, data: bytes) -> None:
         for body in self._split[mark](self.now_us, data):
             if self.shown:
                 self._show(f"{mark.value} {escape(body):<12} {_NAMES.get(body[:2], '')}".rstrip())

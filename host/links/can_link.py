@@ -43,12 +43,12 @@ class StampClock:
         self._ahead_us = 0
         self._stamp_us: int | None = None
 
-    def at_us(self, stamp_s: float, looked_us: int, now_us: int) -> int:
+    def at_us(self, stamp_s: float, polled_us: int, now_us: int) -> int:
         """Return when a frame had arrived.
 
         Args:
             stamp_s: what the driver says, in seconds on its clock; 0 if it says nothing.
-            looked_us: when the last look found nothing more.
+            polled_us: when the last look found nothing more.
             now_us: when the frame was read.
         """
         stamp_us = round(stamp_s * 1e6)
@@ -59,7 +59,7 @@ class StampClock:
             least_us = self._ahead_us + (stamp_us - self._stamp_us) // DRIFT
             ahead_us = min(ahead_us, least_us)
         self._stamp_us, self._ahead_us = stamp_us, ahead_us
-        return max(looked_us, stamp_us + ahead_us)
+        return max(polled_us, stamp_us + ahead_us)
 
 
 INTERFACE: Final = "udp_multicast"
@@ -109,7 +109,7 @@ class CanLink:
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
         self._bus, self._name, self._drops, self.lost = bus, name, drops, 0
         self.on_error_state: Callable[[ErrorState], None] | None = None
-        self._stamps, self._looked_us = StampClock(), self.now_us
+        self._stamps, self._polled_us = StampClock(), self.now_us
 
     @classmethod
     def open(cls, channel: str, interface: str, bit_rate: int | None = None) -> CanLink:
@@ -146,25 +146,25 @@ class CanLink:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Wait for a first frame, then return all that are there."""
-        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for a first frame; return a time, and all that had arrived by then.
 
         The time is of before the last look: a process that is stopped behind it knows
         itself late, and takes nobody for silent.
         """
         deadline_us = self.now_us + timeout_us
-        heard: list[tuple[int, CanFrame]] = []
+        received: list[tuple[int, CanFrame]] = []
         while True:
             now_us = self.now_us
-            wait_us = 0 if heard else max(0, deadline_us - now_us)
+            wait_us = 0 if received else max(0, deadline_us - now_us)
             message = self._read(wait_us)
             if message is not None:
-                heard += self._take(message)
+                received += self._take(message)
             elif not wait_us:
-                self._looked_us = now_us
-                return now_us, tuple(heard)
+                self._polled_us = now_us
+                return now_us, tuple(received)
 
     def close(self) -> None:
         """Close the bus."""
@@ -183,7 +183,7 @@ class CanLink:
                 self.on_error_state(state)
         if (frame := to_frame(message)) is None:
             return ()
-        return ((self._stamps.at_us(message.timestamp, self._looked_us, self.now_us), frame),)
+        return ((self._stamps.at_us(message.timestamp, self._polled_us, self.now_us), frame),)
 
 
 def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
@@ -245,14 +245,16 @@ class EchoFreeLink:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Return what others sent; nothing, maybe before its time, if it was all echo."""
-        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Return a time, and what others sent by then."""
-        now_us, heard = self._link.hear(timeout_us)
+        now_us, received = self._link.receive_stamped(timeout_us)
         while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
             self._awaited.popleft()
-        return now_us, tuple((at_us, frame) for at_us, frame in heard if not self._is_echo(frame))
+        return now_us, tuple(
+            (at_us, frame) for at_us, frame in received if not self._is_echo(frame)
+        )
 
     def close(self) -> None:
         """Close the link behind it."""

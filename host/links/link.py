@@ -47,7 +47,7 @@ StampedFrames = tuple[tuple[int, CanFrame], ...]
 class StampedLink(Link[Frames], Protocol):
     """A link to a CAN bus for who judges silence: late reading is no silence of the bus."""
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Wait for a first frame; return a time, and all that had arrived by then.
 
         Raises:

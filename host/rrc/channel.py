@@ -101,7 +101,7 @@ class Channel:
 
     def _listen(self, until_us: int, exchange: Exchange | None = None) -> None:
         """Take what comes next, but wait no longer than `until_us`."""
-        if exchange is None or not exchange.changes_talk:
+        if exchange is None or not exchange.changes_protocol:
             if self._renewal_us <= self._link.now_us:
                 self._put_unawaited(Watchdog(self.matcher.settings.watchdog_10ms))
             until_us = min(until_us, self._renewal_us)

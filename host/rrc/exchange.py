@@ -77,7 +77,7 @@ class Exchange:
         return len(self.lines) > 1
 
     @property
-    def changes_talk(self) -> bool:
+    def changes_protocol(self) -> bool:
         """Whether nothing else may be sent before this is settled."""
         return isinstance(self.command, StableMode | Watchdog)
 

@@ -23,14 +23,14 @@ class PortConnections:
     Args:
         manager: has the ports.
         wanted: connectors to be made.
-        note: told what became of each.
+        notify: told what became of each.
 
     Attributes:
         wanted: those that have not been made.
     """
 
-    def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], note: Notify) -> None:
-        self._manager, self._note = manager, note
+    def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], notify: Notify) -> None:
+        self._manager, self._notify = manager, notify
         self.wanted = list(wanted)
         self._refused = set[str]()
 
@@ -70,16 +70,16 @@ class PortConnections:
         """Tell once of a port that is not there; another boot of its device may bring it."""
         if text not in self._refused:
             self._refused.add(text)
-            self._note(ServerEventType.CONNECTION_REFUSED, 0, text)
+            self._notify(ServerEventType.CONNECTION_REFUSED, 0, text)
 
     def _connect(self, entry: RtConnection) -> None:
         ends = f"{entry.source} to {entry.target}"
         try:
             self._manager.connect(entry.source, entry.target, entry.properties)
         except RtcRefused as error:
-            self._note(ServerEventType.CONNECTION_REFUSED, 0, str(error))
+            self._notify(ServerEventType.CONNECTION_REFUSED, 0, str(error))
         else:
-            self._note(ServerEventType.CONNECTED, 0, ends)
+            self._notify(ServerEventType.CONNECTED, 0, ends)
 
 
 def are_there(manager: Manager, entry: RtConnection) -> bool:
@@ -102,16 +102,16 @@ class PdoLinks:
     Args:
         nodes: by node-ID.
         links: those of the System Definition.
-        note: told what became of each.
+        notify: told what became of each.
 
     Attributes:
         links: all that are wanted.
     """
 
     def __init__(
-        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], note: Notify
+        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], notify: Notify
     ) -> None:
-        self._nodes, self._note = nodes, note
+        self._nodes, self._notify = nodes, notify
         self.links = list(links)
         self._made: dict[PdoLink, int] = {}  # by which CAN-ID
 
@@ -143,7 +143,7 @@ class PdoLinks:
                 try:
                     self._check(link)
                 except ServerRefused as error:
-                    self._note(ServerEventType.LINK_REFUSED, link.target.node, str(error))
+                    self._notify(ServerEventType.LINK_REFUSED, link.target.node, str(error))
                 else:
                     self._make(now_us, link)
 
@@ -175,10 +175,10 @@ class PdoLinks:
             if linked:
                 self._made[link] = cob_id
             kind = ServerEventType.PDO_LINKED if linked else ServerEventType.PDO_UNLINKED
-            self._note(kind, node.entry.id, f"{text}: {cob_id:03X}h")
+            self._notify(kind, node.entry.id, f"{text}: {cob_id:03X}h")
 
         def failed(failure: Failure) -> None:
-            self._note(ServerEventType.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
+            self._notify(ServerEventType.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
         script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
         node.run(now_us, QueuedScript("link", script, done, failed, moves=False))

@@ -22,11 +22,11 @@ class PdoDataFlow:
     Args:
         nodes: by node-ID.
         send: takes CAN-ID and data.
-        note: takes events.
+        notify: takes events.
     """
 
-    def __init__(self, nodes: Mapping[int, ServedNode], send: Send, note: Notify) -> None:
-        self._nodes, self._send, self._note = nodes, send, note
+    def __init__(self, nodes: Mapping[int, ServedNode], send: Send, notify: Notify) -> None:
+        self._nodes, self._send, self._notify = nodes, send, notify
         self._sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
         self._connected: tuple[tuple[ServedNode, PdoSink], ...] = ()
 
@@ -57,7 +57,7 @@ class PdoDataFlow:
         for node, source in routes:
             if len(frame.data) < source.layout.size:
                 text = f"{source.layout.name}: {len(frame.data)} of {source.layout.size} bytes"
-                self._note(ServerEventType.PDO_TOO_SHORT, node.entry.id, text)
+                self._notify(ServerEventType.PDO_TOO_SHORT, node.entry.id, text)
             elif node.proxy is not None and node.proxy.passing:
                 source.receive(now_us, frame.data)
         return bool(routes)
@@ -68,7 +68,7 @@ class PdoDataFlow:
             for port, value in sink.take():
                 if self._send_value(node, sink, port, value) is ReturnCode.BAD_PARAMETER:
                     text = f"{node.entry.name}.{port}: {value}"
-                    self._note(ServerEventType.VALUE_REFUSED, node.entry.id, text)
+                    self._notify(ServerEventType.VALUE_REFUSED, node.entry.id, text)
 
     def put(self, name: str, value: Struct) -> ReturnCode:
         """Send a value past all connectors; see `Server.put`."""

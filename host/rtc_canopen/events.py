@@ -101,7 +101,7 @@ class EventLog:
         """Those that are kept."""
         return tuple(self._events)
 
-    def note(self, at_us: int, kind: ServerEventType, node: int = 0, text: str = "") -> None:
+    def notify(self, at_us: int, kind: ServerEventType, node: int = 0, text: str = "") -> None:
         """Take an event."""
         event = ServerEvent(at_us, kind, node, text)
         self._events.append(event)

@@ -77,8 +77,8 @@ class ServerRunner:
 def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
     """Wait for what is heard or due, tick the server, send; return how late that was, us."""
     due_us = min(server.due_us, until_us)
-    now_us, heard = link.hear(max(0, due_us - link.now_us))
-    if sent := server.tick(now_us, heard):
+    now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
+    if sent := server.tick(now_us, received):
         link.send(sent)
     return max(0, now_us - due_us) if due_us else 0
 

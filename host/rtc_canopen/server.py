@@ -104,10 +104,10 @@ class RtcCanopenServer:
         self._bus_states: list[ErrorState] = []
         self._context = ExecutionContext(definition.master.rate_hz)
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
-        self.links = PdoLinks(self.nodes, definition.pdo_links, self.note)
-        self.connections = PortConnections(self.manager, definition.rt_connections, self.note)
+        self.links = PdoLinks(self.nodes, definition.pdo_links, self.notify)
+        self.connections = PortConnections(self.manager, definition.rt_connections, self.notify)
         self._receiver = FrameDispatcher(self.nodes, definition, self)
-        self._data = PdoDataFlow(self.nodes, self.send, self.note)
+        self._data = PdoDataFlow(self.nodes, self.send, self.notify)
         self._start_order = tuple(self.nodes[node_id] for node_id in definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
@@ -118,7 +118,7 @@ class RtcCanopenServer:
             self._start()
         elif late_us >= LATE_US:
             self._be_late(late_us)
-        self._hear_bus()
+        self._on_bus_states()
         for at_us, frame in rx:
             if not (frame.remote or frame.extended or self._data.receive(at_us, frame)):
                 self._receiver.receive(now_us, at_us, frame)
@@ -175,9 +175,9 @@ class RtcCanopenServer:
         for node in self._start_order:
             node.to_start = True
 
-    def note(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
+    def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take an event."""
-        self.log.note(self.now_us, kind, node, text)
+        self.log.notify(self.now_us, kind, node, text)
 
     def send(self, can_id: int, data: bytes, /) -> None:
         """Send a frame with this tick's traffic."""
@@ -194,7 +194,7 @@ class RtcCanopenServer:
             self._make_proxy(node)
         except RtcRefused as error:  # its name, or that of a port, is there twice
             node.refuse(str(error))
-            self.note(ServerEventType.PROXY_REFUSED, node.entry.id, str(error))
+            self.notify(ServerEventType.PROXY_REFUSED, node.entry.id, str(error))
             return
         node.to_start = node.to_start or self.definition.start.autoactivate
         self.links.make(self.now_us, node.entry.id)
@@ -209,7 +209,7 @@ class RtcCanopenServer:
         self.manager.delete(proxy.instance_name)
         self._states.pop(node.entry.id, None)
         self._data.route()
-        self.note(ServerEventType.PROXY_REMOVED, node.entry.id, proxy.instance_name)
+        self.notify(ServerEventType.PROXY_REMOVED, node.entry.id, proxy.instance_name)
 
     def _node(self, entry: NodeEntry, files: Mapping[str, DeviceFile]) -> ServedNode:
         writes = tuple(write for write in self.definition.sdo if write.node == entry.id)
@@ -225,15 +225,15 @@ class RtcCanopenServer:
         self._heartbeat.start(self.now_us)
         self._sync.start(self.now_us)
         for node in self.nodes.values():
-            node.look(self.now_us)
+            node.search(self.now_us)
 
     def _be_late(self, late_us: int) -> None:
         """Say so, at most once a second, and take no node for silent in that time."""
         self._late_us = max(self._late_us, late_us)
         for node in self.nodes.values():
-            node.unseen(self.now_us, late_us)
+            node.pause(self.now_us, late_us)
         if self.now_us >= self._quiet_us:
-            self.note(ServerEventType.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
+            self.notify(ServerEventType.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
             self._quiet_us, self._late_us = self.now_us + QUIET_US, 0
 
     def _make_proxy(self, node: ServedNode) -> None:
@@ -245,20 +245,20 @@ class RtcCanopenServer:
             if layout.unknown:
                 mapped = ", ".join(f"{m.index:04X}h:{m.sub:02X}" for m in layout.unknown)
                 text = f"{layout.name}: no port has the type of {mapped}"
-                self.note(ServerEventType.PORT_REFUSED, node.entry.id, text)
-        self.note(ServerEventType.PROXY_MADE, node.entry.id, proxy.instance_name)
+                self.notify(ServerEventType.PORT_REFUSED, node.entry.id, text)
+        self.notify(ServerEventType.PROXY_MADE, node.entry.id, proxy.instance_name)
         self._data.watch(node)
 
-    def _hear_bus(self) -> None:
+    def _on_bus_states(self) -> None:
         """See to what the CAN controller reported: bus-off leaves all proxies in Error."""
         states, self._bus_states = self._bus_states, []
         for state in states:
             if state is ErrorState.BUS_OFF:
-                self.note(ServerEventType.BUS_OFF, 0, "the server can neither hear nor send")
+                self.notify(ServerEventType.BUS_OFF, 0, "the server can neither hear nor send")
                 for node in self.nodes.values():
                     node.operations.abort()
             elif state is ErrorState.ACTIVE:
-                self.note(ServerEventType.BUS_ON, 0)
+                self.notify(ServerEventType.BUS_ON, 0)
 
     def _tick_nodes(self) -> None:
         self._nodes_due_us = NEVER
@@ -271,7 +271,7 @@ class RtcCanopenServer:
         for node in self.nodes.values():
             if node.proxy is not None:
                 node.carry_out(self.now_us)
-                self._note_state(node, node.proxy)
+                self._notify_state(node, node.proxy)
 
     def _activate_next(self) -> None:
         """Activate the next node of the start order, if it is to start and is ready."""
@@ -282,14 +282,14 @@ class RtcCanopenServer:
                     node.proxy.contexts[0].activate_component(node.proxy)
                 return
 
-    def _note_state(self, node: ServedNode, proxy: ProxyRtc) -> None:
+    def _notify_state(self, node: ServedNode, proxy: ProxyRtc) -> None:
         before, state = self._states.get(node.entry.id), proxy.state
         if state is before:
             return
         self._states[node.entry.id] = state
         if before is not None:
             text = f"{before.name} to {state.name}"
-            self.note(ServerEventType.STATE_CHANGED, node.entry.id, text)
+            self.notify(ServerEventType.STATE_CHANGED, node.entry.id, text)
         if state is not LifeCycleState.ERROR:
             proxy.ready = False
 

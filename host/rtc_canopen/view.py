@@ -269,7 +269,7 @@ class ServerView:
             node.entry.role,
             node.phase,
             "" if state is None else state.name,
-            NOT_HEARD if state is None else self._server.now_us - node.heard_us,
+            NOT_HEARD if state is None else self._server.now_us - node.received_us,
             node.lost,
             "" if proxy is None else proxy.state.name,
             node.problem,

@@ -9,9 +9,9 @@ from tickrig.host.links.link import Link
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc_lite.conversation import POLL_US, RequestChannel
 from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
+from tickrig.host.rtc_lite.request_channel import POLL_US, RequestChannel
 from tickrig.host.rtc_lite.settings import ProxySettings
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import LiteCommand
@@ -26,24 +26,24 @@ class DeviceWatcher:
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
-        self._talk, self._settings = RequestChannel(link, settings), settings
-        self._ask_us = link.now_us + settings.look_period_us
+        self._channel, self._settings = RequestChannel(link, settings), settings
+        self._next_us = link.now_us + settings.search_period_us
         self._answer_us = link.now_us  # until then an answer may come
 
     @property
     def due_us(self) -> int:
         """When `tick` has something to do, on the clock of the link."""
-        now_us = self._talk.now_us
-        return min(self._ask_us, now_us + POLL_US) if now_us < self._answer_us else self._ask_us
+        now_us = self._channel.now_us
+        return min(self._next_us, now_us + POLL_US) if now_us < self._answer_us else self._next_us
 
     def tick(self) -> bool:
         """Ask, if it is time to; return whether the device has answered."""
-        self._talk.poll()
-        if self._talk.state is None and self._talk.now_us >= self._ask_us:
-            self._talk.post(LiteCommand.STATE)
-            self._answer_us = self._ask_us + self._settings.reply_us
-            self._ask_us += self._settings.look_period_us
-        return self._talk.state is not None
+        self._channel.poll()
+        if self._channel.state is None and self._channel.now_us >= self._next_us:
+            self._channel.send(LiteCommand.STATE)
+            self._answer_us = self._next_us + self._settings.reply_us
+            self._next_us += self._settings.search_period_us
+        return self._channel.state is not None
 
 
 RATE_HZ: Final = 10.0
@@ -81,7 +81,7 @@ class Attachment:
     context: ExecutionContext | None = None
     rate_hz: float = RATE_HZ
     proxy: RtcLiteProxy = field(init=False)
-    _lookout: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
+    _watcher: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
 
     def __post_init__(self) -> None:
         """Make the first proxy, and have the manager tick this."""
@@ -95,16 +95,16 @@ class Attachment:
 
     def tick(self, now_us: int) -> None:
         """Mind the proxy, or look for the device."""
-        if self._lookout is not None:
-            if self._lookout.tick():
+        if self._watcher is not None:
+            if self._watcher.tick():
                 self.manager.defer(self._return)
         else:
-            self._mind(self.proxy)
+            self._attend(self.proxy)
 
     @property
     def _link_due_us(self) -> int:
-        if self._lookout is not None:
-            return self._lookout.due_us
+        if self._watcher is not None:
+            return self._watcher.due_us
         fatal_us = self.proxy.fatal_us
         return self.proxy.due_us if fatal_us is None else fatal_us + self.settings.linger_us
 
@@ -113,7 +113,7 @@ class Attachment:
         proxy = RtcLiteProxy(name, self.link, self.settings, self.listener)
         return self.manager.add(proxy, self.rate_hz, self.context)
 
-    def _mind(self, proxy: RtcLiteProxy) -> None:
+    def _attend(self, proxy: RtcLiteProxy) -> None:
         if not proxy.alive:
             self.manager.remove_item(self)
             return
@@ -126,9 +126,9 @@ class Attachment:
         if not proxy.alive:
             return
         self.manager.delete(proxy.instance_name)
-        self._tell(ProxyEventType.REMOVED, proxy)
+        self._notify(ProxyEventType.REMOVED, proxy)
         if self.settings.rediscover:
-            self._lookout = DeviceWatcher(self.link, self.settings)
+            self._watcher = DeviceWatcher(self.link, self.settings)
         else:
             self.manager.remove_item(self)
 
@@ -136,14 +136,14 @@ class Attachment:
         """Make a new proxy for a device that has answered, and so need not be waited for."""
         self.settings = replace(self.settings, boot_us=0)
         try:
-            self.proxy, self._lookout = self._add_proxy(), None
+            self.proxy, self._watcher = self._add_proxy(), None
         except RtcRefused as error:
             _LOG.info("%s answers, but: %s", self.base_name, error)
-            self._lookout = DeviceWatcher(self.link, self.settings)
+            self._watcher = DeviceWatcher(self.link, self.settings)
         else:
-            self._tell(ProxyEventType.REDISCOVERED, self.proxy)
+            self._notify(ProxyEventType.REDISCOVERED, self.proxy)
 
-    def _tell(self, kind: ProxyEventType, proxy: RtcLiteProxy) -> None:
+    def _notify(self, kind: ProxyEventType, proxy: RtcLiteProxy) -> None:
         notify(self.listener, ProxyEvent(self.link.now_us, kind, proxy.instance_name))
 
 
@@ -172,7 +172,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
         RtcRefused: the device does not start up.
         ValueError: a rate that no execution context can have.
     """
-    place = Attachment(
+    attachment = Attachment(
         manager, link, base_name, settings or ProxySettings(), listener, context, rate_hz
     )
-    return place.proxy
+    return attachment.proxy

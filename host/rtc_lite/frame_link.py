@@ -136,10 +136,10 @@ class RtnoLink(FrameLink):
         if frames is None:
             return None
         for frame in frames:
-            made_up += self._meant(frame)
+            made_up += self._translate(frame)
         return made_up
 
-    def _meant(self, frame: LiteFrame) -> list[LiteFrame]:
+    def _translate(self, frame: LiteFrame) -> list[LiteFrame]:
         if frame.command is LiteCommand.STATE and self._ping:
             number, self._ping = self._ping, b""
             return [frame, LiteFrame(LiteCommand.PING, bytes([LiteStatus.OK]) + number)]

@@ -10,9 +10,9 @@ from tickrig.host.links.link import Link
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
-from tickrig.host.rtc_lite.conversation import RETRIES, RequestChannel
 from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
-from tickrig.host.rtc_lite.relays import PortBridges
+from tickrig.host.rtc_lite.port_bridges import PortBridges
+from tickrig.host.rtc_lite.request_channel import RETRIES, RequestChannel
 from tickrig.host.rtc_lite.settings import ProxySettings
 from tickrig.host.rtc_lite.start_up import DeviceProfile, start_up
 from tickrig.host.text.log import log_of
@@ -80,12 +80,12 @@ class RtcLiteProxy(RtComponent):
     ) -> None:
         super().__init__(instance_name)
         self._settings, self._listener = settings or ProxySettings(), listener
-        self._link, self._talk = link, RequestChannel(link, self._settings)
+        self._link, self._channel = link, RequestChannel(link, self._settings)
         self.device: DeviceProfile | None = None
         self.relays = PortBridges()
         self.fatal_us: int | None = None
         self._failed = False  # a callback failed, so that Error comes next
-        self._untold = False  # an error of which nobody knows whether it is a fatal one
+        self._unreported = False  # an error of which nobody knows whether it is a fatal one
         self._mirrored = -1  # in which ten ticks its state was asked
         self._unanswered = 0  # how often in vain
         self._why: tuple[str, tuple[str, ...]] = "", ()  # it went to Error, and the last frames
@@ -93,12 +93,12 @@ class RtcLiteProxy(RtComponent):
     @property
     def due_us(self) -> int:
         """When `tick` has something to do, on the clock of the link."""
-        return self._talk.due_us
+        return self._channel.due_us
 
     @property
     def device_state(self) -> LiteState | None:
         """State of the device as it said last; None if nobody knows."""
-        return self._talk.state
+        return self._channel.state
 
     @property
     def profile(self) -> ComponentProfile:
@@ -108,13 +108,13 @@ class RtcLiteProxy(RtComponent):
 
     def tick(self) -> None:
         """Send PINGs and look for their answers; a device that is lost leads to Error."""
-        self._talk.tick()
-        if self._talk.watch.lost and self.fatal_us is None:
-            self.fatal_us, self._untold = self._talk.now_us, False
-            before = f"{self._talk.trouble}, and " if self._talk.trouble else ""
+        self._channel.tick()
+        if self._channel.ping_monitor.lost and self.fatal_us is None:
+            self.fatal_us, self._unreported = self._channel.now_us, False
+            before = f"{self._channel.trouble}, and " if self._channel.trouble else ""
             pings = f"none of {self._settings.pings} PINGs was answered"
-            self._why = before + pings, self._talk.frames
-            self._tell(ProxyEventType.FATAL_ERROR)
+            self._why = before + pings, self._channel.frames
+            self._notify(ProxyEventType.FATAL_ERROR)
             for context in self.contexts:
                 context.abort_component(self)
 
@@ -122,9 +122,9 @@ class RtcLiteProxy(RtComponent):
         """Bring the device to Inactive, and make a port of each of its ports."""
         for port in tuple(self.ports.values()):
             self.remove_port(port)
-        self._talk = RequestChannel(self._link, self._settings)
+        self._channel = RequestChannel(self._link, self._settings)
         try:
-            self.device = start_up(self._talk, self._settings.boot_us)
+            self.device = start_up(self._channel, self._settings.boot_us)
             self.relays = PortBridges(self.device.in_ports, self.device.out_ports)
             for port in self.relays.ports:
                 self.add_port(port)
@@ -161,33 +161,33 @@ class RtcLiteProxy(RtComponent):
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Deactivate the device, unless Error comes next: it is aborted then."""
         code = _OK if self._failed else self._command(LiteCommand.DEACTIVATE)
-        self._hand_out()
+        self._write_out_ports()
         return code
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Hand data in, let the device execute, and hand data out."""
-        code = _OK if self._mute else self._hand_in()
+        code = _OK if self._mute else self._write_in_ports()
         if code is _OK:
             code = self._mirror(ec.now_us) if self._by_timer else self._command(LiteCommand.EXECUTE)
-        self._hand_out()
+        self._write_out_ports()
         self._failed = code is not _OK
         return code
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Let the device follow into Error, if it is not there."""
-        self._untold = self.fatal_us is None
-        if self._untold:
-            self._why = self._talk.trouble or "it was told to abort", self._talk.frames
-        self._tell_passive()
+        self._unreported = self.fatal_us is None
+        if self._unreported:
+            self._why = self._channel.trouble or "it was told to abort", self._channel.frames
+        self._notify_passive()
         return self._follow()
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
         """Let the device run on_error; one whose reply was lost is made to follow first."""
-        self._tell_passive()
+        self._notify_passive()
         code = self._follow()
-        if self._talk.state is LiteState.ERROR and not self._by_timer:
+        if self._channel.state is LiteState.ERROR and not self._by_timer:
             code = self._command(LiteCommand.ERROR)
-        self._hand_out()
+        self._write_out_ports()
         return code
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
@@ -197,7 +197,7 @@ class RtcLiteProxy(RtComponent):
             step = None if state is None else _TO_INACTIVE.get(state)
             if step is None or self._command(step) is ReturnCode.RTC_ERROR:
                 break
-        return _OK if self._talk.state is LiteState.INACTIVE else ReturnCode.RTC_ERROR
+        return _OK if self._channel.state is LiteState.INACTIVE else ReturnCode.RTC_ERROR
 
     @property
     def _by_timer(self) -> bool:
@@ -206,10 +206,10 @@ class RtcLiteProxy(RtComponent):
     @property
     def _mute(self) -> bool:
         """Whether a device that executes by itself is left alone until it answers a PING."""
-        return self._by_timer and self._talk.watch.doubted
+        return self._by_timer and self._channel.ping_monitor.doubted
 
     def _command(self, command: LiteCommand, data: bytes = b"") -> ReturnCode:
-        return _code_of(self._talk.ask(command, data))
+        return _code_of(self._channel.request(command, data))
 
     def _optional(self, command: LiteCommand) -> ReturnCode:
         """Ask for a callback that a device may leave out."""
@@ -218,9 +218,9 @@ class RtcLiteProxy(RtComponent):
 
     def _known_state(self) -> LiteState | None:
         """Return the state of the device; ask for it if nobody knows."""
-        if self._talk.state is None:
-            self._talk.ask(LiteCommand.STATE)
-        return self._talk.state
+        if self._channel.state is None:
+            self._channel.request(LiteCommand.STATE)
+        return self._channel.state
 
     def _follow(self) -> ReturnCode:
         if self._known_state() is LiteState.ACTIVE:
@@ -230,40 +230,42 @@ class RtcLiteProxy(RtComponent):
     def _mirror(self, now_us: int) -> ReturnCode:
         """Ask once in 10 ticks whether the device is still Active; up to 3 times in vain."""
         if self._mute or now_us // MIRROR_US == self._mirrored:
-            self._talk.poll()
+            self._channel.poll()
             return _OK
         self._mirrored = now_us // MIRROR_US
-        reply = self._talk.ask(LiteCommand.STATE)
+        reply = self._channel.request(LiteCommand.STATE)
         self._unanswered = 0 if reply else self._unanswered + 1
         if reply is None and self._unanswered <= RETRIES:
             return _OK
         code = _code_of(reply)
-        if code is _OK and self._talk.state is not LiteState.ACTIVE:
-            self._talk.trouble = "the device is no longer Active"
+        if code is _OK and self._channel.state is not LiteState.ACTIVE:
+            self._channel.trouble = "the device is no longer Active"
             return ReturnCode.RTC_ERROR
         return code
 
-    def _hand_in(self) -> ReturnCode:
+    def _write_in_ports(self) -> ReturnCode:
         """Write one new value to each in-port of the device that has one."""
         for data in self.relays.fresh():
             if (code := self._command(LiteCommand.WRITE, data.encode())) is not _OK:
                 return code
         return _OK
 
-    def _hand_out(self) -> None:
+    def _write_out_ports(self) -> None:
         """Write to the OutPorts what has arrived."""
-        pushed, self._talk.pushed = self._talk.pushed, []
+        pushed, self._channel.pushed = self._channel.pushed, []
         for at_us, data in pushed:
             self.relays.give(at_us, data)
 
-    def _tell_passive(self) -> None:
+    def _notify_passive(self) -> None:
         """Tell of an error once it is known that the device is there."""
-        if self._untold and not self._talk.watch.doubted:
-            self._untold = False
-            self._tell(ProxyEventType.PASSIVE_ERROR)
+        if self._unreported and not self._channel.ping_monitor.doubted:
+            self._unreported = False
+            self._notify(ProxyEventType.PASSIVE_ERROR)
 
-    def _tell(self, kind: ProxyEventType) -> None:
-        notify(self._listener, ProxyEvent(self._talk.now_us, kind, self.instance_name, *self._why))
+    def _notify(self, kind: ProxyEventType) -> None:
+        notify(
+            self._listener, ProxyEvent(self._channel.now_us, kind, self.instance_name, *self._why)
+        )
 
 
 def _code_of(reply: LiteReply | None) -> ReturnCode:

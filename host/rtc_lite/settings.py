@@ -20,7 +20,7 @@ class ProxySettings:
         pings: how many are unanswered when a device is lost, 1 or more.
         linger_us: how long a proxy stays in Error after that (DECISION L15).
         rediscover: whether the device is looked for afterwards.
-        look_period_us: how often, 1 us or more.
+        search_period_us: how often, 1 us or more.
 
     Raises:
         ValueError: a number that is too small, or another sum for packets of RTno.
@@ -34,7 +34,7 @@ class ProxySettings:
     pings: int = 4
     linger_us: int = 1_000_000
     rediscover: bool = False
-    look_period_us: int = 1_000_000
+    search_period_us: int = 1_000_000
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -47,7 +47,7 @@ class ProxySettings:
             "ping_period_us",
             "pings",
             "linger_us",
-            "look_period_us",
+            "search_period_us",
         ):
             value, low = getattr(self, name), at_least.get(name, 1)
             if value < low:

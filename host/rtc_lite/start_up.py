@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tickrig.host.links.errors import DeviceRefused, LinkTimeout
-from tickrig.host.rtc_lite.conversation import RequestChannel
+from tickrig.host.rtc_lite.request_channel import RequestChannel
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState
 from tickrig.wire.rtc_lite.messages import LitePortProfile, LiteReply, parse_component_profile
 
@@ -35,7 +35,7 @@ class DeviceProfile:
         }
 
 
-def start_up(talk: RequestChannel, boot_us: int) -> DeviceProfile:
+def start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
     """Bring a device to Inactive, and ask what it is.
 
     Raises:
@@ -43,34 +43,36 @@ def start_up(talk: RequestChannel, boot_us: int) -> DeviceProfile:
         DeviceRefused: a reply that does not lead to Inactive.
         WireError: a profile that cannot be read.
     """
-    talk.listen(boot_us)
-    _demand(LiteCommand.STATE, talk.insist(LiteCommand.STATE))
-    if talk.state is LiteState.ACTIVE:
-        _demand(LiteCommand.DEACTIVATE, talk.ask(LiteCommand.DEACTIVATE))
-    elif talk.state is LiteState.ERROR:
-        _demand(LiteCommand.RESET, talk.ask(LiteCommand.RESET))
-    profile = _ask_profile(talk)
-    if talk.state is LiteState.CREATED:
-        _demand(LiteCommand.INITIALIZE, talk.ask(LiteCommand.INITIALIZE))
-    if talk.state is not LiteState.INACTIVE:
-        state = "unknown" if talk.state is None else talk.state.name
+    channel.listen(boot_us)
+    _demand(LiteCommand.STATE, channel.request_again(LiteCommand.STATE))
+    if channel.state is LiteState.ACTIVE:
+        _demand(LiteCommand.DEACTIVATE, channel.request(LiteCommand.DEACTIVATE))
+    elif channel.state is LiteState.ERROR:
+        _demand(LiteCommand.RESET, channel.request(LiteCommand.RESET))
+    profile = _request_profile(channel)
+    if channel.state is LiteState.CREATED:
+        _demand(LiteCommand.INITIALIZE, channel.request(LiteCommand.INITIALIZE))
+    if channel.state is not LiteState.INACTIVE:
+        state = "unknown" if channel.state is None else channel.state.name
         raise DeviceRefused(f"the state of the device is {state}, not INACTIVE", state)
-    talk.pushed.clear()
+    channel.pushed.clear()
     return profile
 
 
-def _ask_profile(talk: RequestChannel) -> DeviceProfile:
-    reply = _demand(LiteCommand.PROFILE, talk.insist(LiteCommand.PROFILE))
-    told = parse_component_profile(reply.fields)
-    ins, outs = tuple(talk.in_ports), tuple(talk.out_ports)
-    if (len(ins), len(outs)) != (told.in_ports, told.out_ports):
-        counts = f"{told.in_ports} in-ports and {told.out_ports} out-ports"
+def _request_profile(channel: RequestChannel) -> DeviceProfile:
+    reply = _demand(LiteCommand.PROFILE, channel.request_again(LiteCommand.PROFILE))
+    announced = parse_component_profile(reply.fields)
+    ins, outs = tuple(channel.in_ports), tuple(channel.out_ports)
+    if (len(ins), len(outs)) != (announced.in_ports, announced.out_ports):
+        counts = f"{announced.in_ports} in-ports and {announced.out_ports} out-ports"
         raise DeviceRefused(f"{counts} announced, {len(ins)} and {len(outs)} described", "CZ")
-    return DeviceProfile(told.type_name.decode("latin-1"), ins, outs, _ask_context(talk))
+    return DeviceProfile(
+        announced.type_name.decode("latin-1"), ins, outs, _request_context(channel)
+    )
 
 
-def _ask_context(talk: RequestChannel) -> LiteContextType:
-    code = _demand(LiteCommand.CONTEXT, talk.insist(LiteCommand.CONTEXT)).fields[0]
+def _request_context(channel: RequestChannel) -> LiteContextType:
+    code = _demand(LiteCommand.CONTEXT, channel.request_again(LiteCommand.CONTEXT)).fields[0]
     try:
         return LiteContextType(code)
     except ValueError:

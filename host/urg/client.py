@@ -98,7 +98,7 @@ class UrgClient:
                 scans += self._take(reply)
             except WireError:
                 self._spoilt += 1
-        if self._link.now_us - self._heard_us > SILENCE_US * (1 + self._interval):
+        if self._link.now_us - self._received_us > SILENCE_US * (1 + self._interval):
             self.restarts += 1
             self._spoilt = self.garbled
             self._begin()
@@ -110,16 +110,16 @@ class UrgClient:
         self._link.close()
 
     def _begin(self) -> None:
-        self._splitter, self._heard_us = ReplySplitter(), self._link.now_us
-        asked = (Command("TM", LEAVE_ADJUST), Command("QT"), Command("PP"))
+        self._splitter, self._received_us = ReplySplitter(), self._link.now_us
+        commands = (Command("TM", LEAVE_ADJUST), Command("QT"), Command("PP"))
         switch = SWITCH + b"\n"
-        self._link.send(switch + b"".join(command.encode() for command in asked))
+        self._link.send(switch + b"".join(command.encode() for command in commands))
 
     def _take(self, reply: Reply) -> list[UrgScan]:
         command = Command.parse(reply.echo)
         if command.symbol == "PP" and reply.status == status.OK:
             self.kind = Specification.parse(reply.lines)
-            self._heard_us = self._link.now_us
+            self._received_us = self._link.now_us
             self._measure(self.kind)
         if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
             return []
@@ -128,7 +128,7 @@ class UrgClient:
         if self.kind is None:
             return []
         time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
-        self._heard_us = self._link.now_us
+        self._received_us = self._link.now_us
         return [UrgScan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
 
     def _measure(self, kind: Specification) -> None:

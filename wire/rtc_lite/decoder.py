@@ -59,13 +59,13 @@ class LiteDecoder:
         for code in data:
             if not self.lost and (self._frame or code == HEADER[0]):
                 self._frame.append(code)
-                if (found := self._look()) is not None:
+                if (found := self._parse()) is not None:
                     out.append(found)
                     self._frame.clear()
                     self.lost = found is LiteLinkFault.UNKNOWN
         return out
 
-    def _look(self) -> LiteFrame | LiteLinkFault | None:
+    def _parse(self) -> LiteFrame | LiteLinkFault | None:
         """Return what the latest byte completed."""
         frame = self._frame
         if len(frame) < 3:

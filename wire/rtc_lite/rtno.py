@@ -121,13 +121,13 @@ class RtnoPacketDecoder:
             self._packet.append(code)
             if not HEADER.startswith(self._packet[:2]):
                 self._packet.clear()
-            elif (found := self._look()) is not None:
+            elif (found := self._parse()) is not None:
                 out.append(found)
                 self._packet.clear()
                 self.lost = found is LiteLinkFault.UNKNOWN
         return out
 
-    def _look(self) -> RtnoPacket | LiteLinkFault | None:
+    def _parse(self) -> RtnoPacket | LiteLinkFault | None:
         """Return what the latest byte completed."""
         packet = self._packet
         if len(packet) < EMPTY_PACKET_BYTES:

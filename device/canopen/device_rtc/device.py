@@ -41,7 +41,7 @@ class DeviceRtc(Application):
 
     def __init__(self, node: CanopenSlave, slot: int, kind: type[CanopenComponent]) -> None:
         super().__init__(node, slot)
-        self._kind, self._places = kind, kind.profile().placed()
+        self._kind, self._placed = kind, kind.profile().placed()
         self.has_inputs(inputs_of(kind))
         self.life = CanopenLifeCycle(node, self._make)
         self.outputs = outputs_of(self.life.component)
@@ -81,7 +81,7 @@ class DeviceRtc(Application):
         """Make a component and join it to the dictionary."""
         component = self._kind()
         component.inputs = self.inputs
-        for place in self._places:
+        for place in self._placed:
             entries = [self.node.dictionary[place.index, sub] for sub in place.subs]
             component.ports[place.profile.name].join(entries, self._event)
         return component

@@ -55,14 +55,14 @@ class CanopenInPort(CanopenPort[T]):
         """Keep its value in these objects, and hear of each write."""
         super().join(entries, event)
         for entry in entries:
-            entry.written = self._mark
+            entry.written = self._on_written
 
     def read(self) -> T:
         """Return the present value; it is not new any more."""
         self.is_new = False
         return self.value
 
-    def _mark(self, entry: Entry) -> None:
+    def _on_written(self, entry: Entry) -> None:
         self.is_new = True
 
 

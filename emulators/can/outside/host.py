@@ -75,14 +75,14 @@ class CanHost:
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Let time pass until a frame has arrived; return all that are there then."""
-        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Let time pass until a frame has arrived; return the time, and all that are there."""
         first = self.take(timeout_us)
-        heard = () if first is None else (first, *self._inbox)
+        received = () if first is None else (first, *self._inbox)
         self._inbox.clear()
-        return self.now_us, heard
+        return self.now_us, received
 
     def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
         """Let time pass until a frame has arrived; return it with its time, None if none came.

@@ -19,14 +19,14 @@ def rtc_lite(virtual: bool) -> None:
     """
     with loading():
         from tickrig.emulators.rtc_lite.demo.play import run_demo  # noqa: PLC0415
-        from tickrig.emulators.rtc_lite.demo.stage import VirtualSetup, pty_setup  # noqa: PLC0415
+        from tickrig.emulators.rtc_lite.demo.setup import VirtualSetup, pty_setup  # noqa: PLC0415
         from tickrig.host.rtc.states import RtcRefused  # noqa: PLC0415
 
     try:
         if virtual:
             run_demo(VirtualSetup(), click.echo)
             return
-        with warnings_shown(), pty_setup() as stage:
-            run_demo(stage, click.echo)
+        with warnings_shown(), pty_setup() as setup:
+            run_demo(setup, click.echo)
     except (RuntimeError, OSError, LinkError, RtcRefused) as error:
         raise click.ClickException(str(error)) from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from tickrig.emulators.rtc_lite.demo.stage import NODES, DemoSetup
+from tickrig.emulators.rtc_lite.demo.setup import NODES, DemoSetup
 from tickrig.emulators.rtc_lite.frame_log import MonitoredLink
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
@@ -20,7 +20,7 @@ LAST: Final = 42
 PATIENCE_US: Final = 8_000_000
 """The longest that a step of the demonstration may take."""
 
-JOINTS: Final = (
+CONNECTIONS: Final = (
     ("ConsoleIn0.out", "LiteA0.in"),
     ("LiteA0.out", "LiteB0.in"),
     ("LiteB0.out", "ConsoleOut0.in"),
@@ -28,28 +28,28 @@ JOINTS: Final = (
 SETTINGS: Final = ProxySettings(rediscover=True)
 
 
-def run_demo(stage: DemoSetup, echo: Echo) -> None:
+def run_demo(setup: DemoSetup, echo: Echo) -> None:
     """Play it; it takes six seconds of the stage's time.
 
     Raises:
         RuntimeError: something did not come in time.
         RtcRefused: a device does not start up.
     """
-    DemoRun(stage, echo).run()
+    DemoRun(setup, echo).run()
 
 
 class DemoRun:
     """The system on a stage, and what it looks like."""
 
-    def __init__(self, stage: DemoSetup, echo: Echo) -> None:
-        self._stage, self._echo, self._manager = stage, echo, stage.manager
+    def __init__(self, setup: DemoSetup, echo: Echo) -> None:
+        self._setup, self._echo, self._manager = setup, echo, setup.manager
         self._events: list[ProxyEvent] = []
-        self._links = {name: MonitoredLink(link, self._say) for name, link in stage.links.items()}
+        self._links = {name: MonitoredLink(link, self._say) for name, link in setup.links.items()}
         self._start_us = self._zero_us = self._now_us
 
     def run(self) -> None:
         """Give the title of each chapter, then play it."""
-        for name, place in self._stage.places.items():
+        for name, place in self._setup.places.items():
             self._echo(f"{name} is an emulated PIC on {place}.")
         self._echo("Times are seconds.")
         for title in self._chapters():
@@ -101,7 +101,7 @@ class DemoRun:
     def _cut(self) -> None:
         self._links["LiteA"].shown = True
         self._zero_us = self._now_us
-        self._stage.power("LiteA", on=False)
+        self._setup.power("LiteA", on=False)
         self._await(ProxyEventType.FATAL_ERROR)
         self._run_until(lambda: self._states()["LiteA0"] == "ERROR")
         self._show_system()
@@ -112,16 +112,16 @@ class DemoRun:
     def _give_back(self) -> None:
         self._links["LiteA"].shown = True
         self._zero_us = self._now_us
-        self._stage.power("LiteA", on=True)
+        self._setup.power("LiteA", on=True)
         self._await(ProxyEventType.REDISCOVERED)
         self._links["LiteA"].shown = False
         self._show_system()
 
     def _join(self) -> None:
         present = {profile.ports for profile in self._manager.connectors}
-        for joint in JOINTS:
-            if joint not in present:
-                self._manager.connect(*joint)
+        for connection in CONNECTIONS:
+            if connection not in present:
+                self._manager.connect(*connection)
 
     def _activate(self) -> None:
         states = self._states()
@@ -133,7 +133,7 @@ class DemoRun:
         while not done():
             if self._now_us > deadline_us:
                 raise RuntimeError(f"nothing came in {PATIENCE_US // 1_000_000} s")
-            self._stage.step()
+            self._setup.step()
 
     def _await(self, kind: ProxyEventType) -> None:
         self._run_until(lambda: any(event.kind is kind for event in self._events))

@@ -33,7 +33,7 @@ class EditorSession:
         server: the server.
         path: its System Definition.
         link: the bus.
-        furnish: puts more components into each server that is loaded.
+        add_components: puts more components into each server that is loaded.
         listeners: told the events of each server.
 
     Attributes:
@@ -47,11 +47,11 @@ class EditorSession:
         server: RtcCanopenServer,
         path: Path,
         link: StampedLink,
-        furnish: AddComponents = lambda server: None,
+        add_components: AddComponents = lambda server: None,
         listeners: tuple[EventListener, ...] = (),
     ) -> None:
         self.lock, self.path, self._folder = threading.RLock(), path, path.parent
-        self._link, self._furnish, self._listeners = link, furnish, listeners
+        self._link, self._add_components, self._listeners = link, add_components, listeners
         self._leaving: Frames = ()
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "server")
         self._thread: Future[None] | None = None
@@ -82,7 +82,7 @@ class EditorSession:
             OSError: it cannot be read.
         """
         server = open_server(path)
-        self._furnish(server)
+        self._add_components(server)
         server.log.listeners += self._listeners
         with self.lock:
             self._leaving += self.server.stop(self.server.now_us)
@@ -103,9 +103,9 @@ class EditorSession:
         """Wait for what is heard or due, not beyond a time, and let the server do it."""
         link = self._link
         due_us = min(self.server.due_us, until_us)
-        now_us, heard = link.hear(max(0, due_us - link.now_us))
+        now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
         with self.lock:
-            sent = (*self._leaving, *self.server.tick(now_us, heard))
+            sent = (*self._leaving, *self.server.tick(now_us, received))
             self._leaving = ()
         if sent:
             link.send(sent)

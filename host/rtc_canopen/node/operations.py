@@ -81,7 +81,7 @@ class NodeOperations:
     Args:
         entry: the node.
         dialogue: what is said with it.
-        note: takes events.
+        notify: takes events.
 
     Attributes:
         proxy: the RT component, None without.
@@ -91,8 +91,8 @@ class NodeOperations:
         restart: how often it is brought back by itself.
     """
 
-    def __init__(self, entry: NodeEntry, dialogue: Dialogue, note: Notify) -> None:
-        self._entry, self._dialogue, self._note = entry, dialogue, note
+    def __init__(self, entry: NodeEntry, dialogue: Dialogue, notify: Notify) -> None:
+        self._entry, self._dialogue, self._notify = entry, dialogue, notify
         self._life = LIFE_CYCLES[entry.role]
         self.proxy: ProxyRtc | None = None
         self.nmt_state: NmtState | None = None
@@ -107,10 +107,10 @@ class NodeOperations:
 
     def carry_out(self, *, lost: bool) -> None:
         """Say on the bus what was asked for, unless the device is there already."""
-        if self.proxy is None or (asked := self.proxy.take_asked()) is ProxyRequest.NOTHING:
+        if self.proxy is None or (requested := self.proxy.take_request()) is ProxyRequest.NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
-        match asked:
+        match requested:
             case ProxyRequest.ACTIVATE if state is NmtState.OPERATIONAL:
                 self._activated(None)
             case ProxyRequest.ACTIVATE:
@@ -129,7 +129,7 @@ class NodeOperations:
     def follow(self, state: NmtState, *, changed: bool) -> None:
         """Move the proxy to where the device says it is, unless that is about to change."""
         proxy = self.proxy
-        if proxy is None or self._dialogue.moves or proxy.asked is not ProxyRequest.NOTHING:
+        if proxy is None or self._dialogue.moves or proxy.requested is not ProxyRequest.NOTHING:
             return
         if self._stopping:
             self._stopping = state is not NmtState.STOPPED
@@ -138,7 +138,7 @@ class NodeOperations:
         elif STATES[state] is not proxy.state and not proxy.ready:
             if changed:
                 text = f"{state.name} while the proxy is {proxy.state.name}"
-                self._note(ServerEventType.FOREIGN_TRANSITION, self._entry.id, text)
+                self._notify(ServerEventType.FOREIGN_TRANSITION, self._entry.id, text)
             self._move(proxy, STATES[state])
 
     def say(self, command: NmtCommand) -> None:
@@ -170,7 +170,7 @@ class NodeOperations:
     def go_on(self) -> None:
         """Reset a node that was lost and is heard again, if a restart is left."""
         proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
-        if proxy is None or busy or proxy.asked is not ProxyRequest.NOTHING:
+        if proxy is None or busy or proxy.requested is not ProxyRequest.NOTHING:
             return
         if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
             proxy.contexts[0].reset_component(proxy)
@@ -179,12 +179,12 @@ class NodeOperations:
         """Take a restart, and tell; False if none is left."""
         which = self.restart.take(self.now_us)
         kind = ServerEventType.RESTARTED if which else ServerEventType.NOT_RESTARTED
-        self._note(kind, self._entry.id, which or "no restart is left")
+        self._notify(kind, self._entry.id, which or "no restart is left")
         return bool(which)
 
     def fail(self, failure: Failure) -> None:
         """Note what failed, and let the proxy go to Error."""
-        self._note(kind_of(failure), self._entry.id, str(failure))
+        self._notify(kind_of(failure), self._entry.id, str(failure))
         self.abort()
 
     def _run(

@@ -125,14 +125,14 @@ class FrameDispatcher:
     Args:
         nodes: by node-ID.
         definition: what the server was told.
-        house: the server.
+        server: the server.
     """
 
     def __init__(
-        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, house: NodeServer
+        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, server: NodeServer
     ) -> None:
         self._nodes, self._master_id = nodes, definition.master.node
-        self._note, self._send = house.note, house.send
+        self._notify, self._send = server.notify, server.send
         self._objects = ServerObjects(definition)
         self._foreign_us: int | None = None
 
@@ -140,48 +140,50 @@ class FrameDispatcher:
         """Take a data frame that was on the bus at a time."""
         can_id, node = frame.can_id, self._nodes.get(frame.can_id & 0x7F)
         if can_id == NMT_COB_ID:
-            self._hear_command(at_us, frame.data)
+            self._on_nmt_command(at_us, frame.data)
         elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
-            self._hear_master(at_us)
+            self._on_master_heartbeat(at_us)
         elif can_id == REQUEST_COB_ID + self._master_id:
-            self._hear_question(frame.data)
+            self._on_sdo_request(frame.data)
         elif node is None:
             return
         elif can_id in ERROR_CONTROL:
-            node.hear_error_control(now_us, at_us, frame.data)
+            node.on_error_control(now_us, at_us, frame.data)
         elif can_id in SDO_RESPONSES:
             node.receive_sdo(now_us, frame.data)
         elif can_id in EMERGENCY:
-            self._hear_emergency(node, frame.data)
+            self._on_emergency(node, frame.data)
 
-    def _hear_command(self, at_us: int, data: bytes) -> None:
+    def _on_nmt_command(self, at_us: int, data: bytes) -> None:
         if len(data) != 2:
             return
         command, node_id = data
         known = command in tuple(NmtCommand)
         text = NmtCommand(command).name if known else f"{command:02X}h"
-        self._note(ServerEventType.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all")
+        self._notify(
+            ServerEventType.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all"
+        )
         for node in self._nodes.values():
             if node_id in (ALL_NODES, node.entry.id):
-                node.hear_foreign(at_us, command)
+                node.on_foreign_command(at_us, command)
 
-    def _hear_master(self, at_us: int) -> None:
+    def _on_master_heartbeat(self, at_us: int) -> None:
         if self._foreign_us is None or at_us - self._foreign_us >= QUIET_US:
             text = "another node has the node-ID of the server"
-            self._note(ServerEventType.FOREIGN_MASTER, self._master_id, text)
+            self._notify(ServerEventType.FOREIGN_MASTER, self._master_id, text)
         self._foreign_us = at_us
 
-    def _hear_question(self, data: bytes) -> None:
+    def _on_sdo_request(self, data: bytes) -> None:
         if (answer := self._objects.answer(data)) is not None:
             self._send(RESPONSE_COB_ID + self._master_id, answer)
 
-    def _hear_emergency(self, node: ServedNode, data: bytes) -> None:
+    def _on_emergency(self, node: ServedNode, data: bytes) -> None:
         try:
             emcy = Emcy.parse(data)
         except WireError:
             return
         text = f"{emcy.code:04X}h {describe(emcy.code)}, error register {emcy.register:02X}h"
         back = emcy.code == EmcyCode.BUS_OFF_RECOVERED
-        self._note(
+        self._notify(
             ServerEventType.BUS_OFF if back else ServerEventType.EMERGENCY, node.entry.id, text
         )

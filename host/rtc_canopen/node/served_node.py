@@ -12,8 +12,8 @@ from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.host.rtc_canopen.node.boot import boot, probe
+from tickrig.host.rtc_canopen.node.duplicate_detector import DuplicateNodeDetector
 from tickrig.host.rtc_canopen.node.operations import NodeOperations, kind_of
-from tickrig.host.rtc_canopen.node.twin_watch import DuplicateNodeDetector
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
@@ -46,7 +46,7 @@ LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
 class NodeServer(Protocol):
     """What a node needs of its server."""
 
-    def note(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
+    def notify(self, kind: ServerEventType, node: int, text: str = "", /) -> None:
         """Take an event."""
 
     def send(self, can_id: int, data: bytes, /) -> None:
@@ -70,12 +70,12 @@ class ServedNode:
         file: what its EDS says.
         writes: values that are written while it boots.
         remove_us: after how long without heartbeat its proxy is removed.
-        house: the server.
+        server: the server.
 
     Attributes:
         entry, file, writes: as given.
         phase: how far it has come.
-        heard_us: when it was heard last.
+        received_us: when it was heard last.
         lost: its heartbeat is late.
         problem: why it is refused, for people.
         layouts: its PDOs.
@@ -91,17 +91,17 @@ class ServedNode:
         file: DeviceFile,
         writes: tuple[SdoEntry, ...],
         remove_us: int,
-        house: NodeServer,
+        server: NodeServer,
     ) -> None:
-        self.entry, self.file, self.writes, self._house = entry, file, writes, house
+        self.entry, self.file, self.writes, self._server = entry, file, writes, server
         self._remove_us, self._consumer_us = remove_us, 3_000 * entry.heartbeat_ms
         self.dialogue = Dialogue(entry.id, self._send)
-        self.operations = NodeOperations(entry, self.dialogue, house.note)
+        self.operations = NodeOperations(entry, self.dialogue, server.notify)
         self.phase, self.problem = NodePhase.ABSENT, ""
         self.layouts: tuple[PdoLayout, ...] = ()
-        self._twins = DuplicateNodeDetector(1_000 * entry.heartbeat_ms)
-        self.heard_us, self.due_us = 0, NEVER
-        self._looked_us = self._blind_us = 0
+        self._duplicates = DuplicateNodeDetector(1_000 * entry.heartbeat_ms)
+        self.received_us, self.due_us = 0, NEVER
+        self._watched_us = self._blind_us = 0
         self._foreign_reset_us: int | None = None
         self.lost = self.to_start = self._suspected = False
 
@@ -115,11 +115,11 @@ class ServedNode:
         """What it reported last, None before."""
         return self.operations.nmt_state
 
-    def look(self, now_us: int) -> None:
+    def search(self, now_us: int) -> None:
         """Look for it on the bus."""
         self.operations.now_us = now_us
         self.phase, self.lost = NodePhase.ABSENT, False
-        self._twins.forget()
+        self._duplicates.forget()
         job = QueuedScript("probe", probe(), lambda _: self._found(), self._not_booted)
         self.dialogue.start(now_us, job)
         self._plan()
@@ -142,25 +142,25 @@ class ServedNode:
         if self.proxy is not None and self.proxy.state is not LifeCycleState.ERROR:
             was_active = self.proxy.state is LifeCycleState.ACTIVE
         self.to_start |= was_active
-        self._house.note(ServerEventType.RESTARTED, self.entry.id, "by hand")
-        self._house.gone(self)
+        self._server.notify(ServerEventType.RESTARTED, self.entry.id, "by hand")
+        self._server.gone(self)
         self.dialogue.clear()
         operations.begin()
         operations.say(NmtCommand.RESET_NODE)
-        self.look(now_us)
+        self.search(now_us)
 
     def refuse(self, problem: str) -> None:
         """Leave it as it is until it boots again."""
         self.phase, self.problem = NodePhase.REFUSED, problem
 
-    def unseen(self, now_us: int, span_us: int) -> None:
+    def pause(self, now_us: int, span_us: int) -> None:
         """Take note that nobody looked for so long: it may have spoken all the same."""
-        self._looked_us, self._blind_us = now_us, self._blind_us + span_us
+        self._watched_us, self._blind_us = now_us, self._blind_us + span_us
         self.dialogue.defer(span_us)
-        self._twins.forget()
+        self._duplicates.forget()
         self._plan()
 
-    def hear_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
+    def on_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
         """Take a boot-up or heartbeat of a time on the bus; anything else is passed over."""
         try:
             (number,) = data
@@ -169,7 +169,7 @@ class ServedNode:
             return
         operations = self.operations
         changed = state is not operations.nmt_state
-        operations.now_us, operations.nmt_state, self.heard_us = now_us, state, at_us
+        operations.now_us, operations.nmt_state, self.received_us = now_us, state, at_us
         self._blind_us = 0
         self.dialogue.receive_state(now_us, state)
         self._take(state, changed=changed)
@@ -178,14 +178,14 @@ class ServedNode:
     def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take an SDO response."""
         self.operations.now_us = now_us
-        self._twins.answer(data)
+        self._duplicates.answer(data)
         self.dialogue.receive_sdo(now_us, data)
         self._judge()
         self._plan()
 
-    def hear_foreign(self, at_us: int, command: int) -> None:
+    def on_foreign_command(self, at_us: int, command: int) -> None:
         """Take an NMT command of another master."""
-        self._twins.command(command)
+        self._duplicates.command(command)
         if command in RESETS:
             self._foreign_reset_us = at_us
 
@@ -199,7 +199,7 @@ class ServedNode:
         """Do what is due."""
         self.operations.now_us = now_us
         self.dialogue.tick(now_us)
-        if self.phase is NodePhase.LISTENING and now_us >= self._twins.sure_us:
+        if self.phase is NodePhase.LISTENING and now_us >= self._duplicates.sure_us:
             self._boot()
         elif self._deadline_us <= now_us:
             self._lose(now_us)
@@ -221,25 +221,27 @@ class ServedNode:
         """When its heartbeat is late, or its proxy is to be removed."""
         if self.phase not in WATCHED:
             return NEVER
-        since_us = max(self.heard_us, self._looked_us)
+        since_us = max(self.received_us, self._watched_us)
         return since_us + self._consumer_us + (self._remove_us if self.lost else 0)
 
     def _send(self, can_id: int, data: bytes) -> None:
         if can_id == NMT_COB_ID:
-            self._twins.command(data[0])
-        self._house.send(can_id, data)
+            self._duplicates.command(data[0])
+        self._server.send(can_id, data)
 
     def _plan(self) -> None:
         due_us = min(self.dialogue.due_us, self._deadline_us)
         if self.phase is NodePhase.LISTENING:
-            due_us = min(due_us, self._twins.sure_us)
+            due_us = min(due_us, self._duplicates.sure_us)
         if due_us != self.due_us:
             self.due_us = due_us
-            self._house.wake(due_us)
+            self._server.wake(due_us)
 
     def _take(self, state: NmtState, *, changed: bool) -> None:
         """See to a state that was reported just now."""
-        self._twins.hear(self.heard_us, state, listening=self.phase is NodePhase.LISTENING)
+        self._duplicates.receive(
+            self.received_us, state, listening=self.phase is NodePhase.LISTENING
+        )
         if self._judge():
             return
         if state is NmtState.INITIALISING:
@@ -251,9 +253,9 @@ class ServedNode:
             self.operations.follow(state, changed=changed)
 
     def _booted_up(self) -> None:
-        self._house.note(ServerEventType.BOOT_UP, self.entry.id)
-        told_us = self._foreign_reset_us
-        foreign = told_us is not None and self.heard_us - told_us < FOREIGN_RESET_US
+        self._server.notify(ServerEventType.BOOT_UP, self.entry.id)
+        reset_us = self._foreign_reset_us
+        foreign = reset_us is not None and self.received_us - reset_us < FOREIGN_RESET_US
         expected = self.lost or self.operations.resetting or foreign
         if self.phase is NodePhase.READY and not expected:
             self.phase = NodePhase.LISTENING
@@ -272,10 +274,10 @@ class ServedNode:
 
     def _boot(self, first: NmtCommand | None = None) -> None:
         if not self.operations.resetting:
-            self._house.gone(self)
+            self._server.gone(self)
         self.phase, self.problem, self.lost = NodePhase.BOOTING, "", False
         self.operations.begin()
-        self._twins.forget()
+        self._duplicates.forget()
         self.dialogue.clear()
         if first is not None:
             self.operations.say(first)
@@ -284,36 +286,44 @@ class ServedNode:
         self.dialogue.start(self.operations.now_us, job)
 
     def _booted(self, layouts: tuple[PdoLayout, ...]) -> None:
-        self.phase, self.layouts, self.heard_us = NodePhase.READY, layouts, self.operations.now_us
-        self._twins.forget()
+        self.phase, self.layouts, self.received_us = (
+            NodePhase.READY,
+            layouts,
+            self.operations.now_us,
+        )
+        self._duplicates.forget()
         self.operations.booted()
-        self._house.booted(self)
+        self._server.booted(self)
         if self.operations.restart.pending:
             self.operations.begin_restart()
 
     def _not_booted(self, failure: Failure) -> None:
         self.operations.resetting, self.problem = False, str(failure)
-        self._house.note(kind_of(failure), self.entry.id, self.problem)
+        self._server.notify(kind_of(failure), self.entry.id, self.problem)
         if isinstance(failure, SdoTimeout):
-            self._house.gone(self)
-            self.look(self.operations.now_us)
+            self._server.gone(self)
+            self.search(self.operations.now_us)
         else:
             self.phase = NodePhase.REFUSED
 
     def _judge(self) -> bool:
         """See whether it has a twin: then both are stopped; a suspicion is told once."""
-        twins = self._twins
-        if twins.sign and self.phase in LIVING:
-            self._refuse_twin(twins.sign)
+        duplicates = self._duplicates
+        if duplicates.sign and self.phase in LIVING:
+            self._refuse_duplicate(duplicates.sign)
             return True
-        if twins.suspicion and not self._suspected and self.phase in LIVING:
+        if duplicates.suspicion and not self._suspected and self.phase in LIVING:
             self._suspected = True
-            self._house.note(ServerEventType.DUPLICATE_SUSPECTED, self.entry.id, twins.suspicion)
+            self._server.notify(
+                ServerEventType.DUPLICATE_SUSPECTED, self.entry.id, duplicates.suspicion
+            )
         return False
 
-    def _refuse_twin(self, sign: str) -> None:
+    def _refuse_duplicate(self, sign: str) -> None:
         self.phase, self.problem = NodePhase.DUPLICATE, f"two nodes have this node-ID: {sign}"
-        self._house.note(ServerEventType.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}")
+        self._server.notify(
+            ServerEventType.DUPLICATE_NODE, self.entry.id, f"both are stopped: {sign}"
+        )
         self.dialogue.clear()
         self.operations.say(NmtCommand.STOP)
         self.operations.abort()
@@ -321,14 +331,14 @@ class ServedNode:
 
     def _lose(self, now_us: int) -> None:
         if self.lost:
-            self._house.gone(self)
+            self._server.gone(self)
             self.dialogue.clear()
-            self.look(now_us)
+            self.search(now_us)
             return
         self.lost = True
-        text = f"silent for {(now_us - self.heard_us) // 1_000} ms"
+        text = f"silent for {(now_us - self.received_us) // 1_000} ms"
         if self._blind_us:
             text += f"; for {self._blind_us // 1_000} ms of them the server did not look"
-        self._house.note(ServerEventType.HEARTBEAT_LOST, self.entry.id, text)
+        self._server.notify(ServerEventType.HEARTBEAT_LOST, self.entry.id, text)
         self.dialogue.clear()
         self.operations.abort()

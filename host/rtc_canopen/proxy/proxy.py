@@ -41,7 +41,7 @@ class ProxyRtc(RtComponent):
     Attributes:
         sources: TPDOs of the device, whose data go to OutPorts.
         sinks: RPDOs of the device, which take data from InPorts.
-        asked: what the callbacks asked for.
+        requested: what the callbacks asked for.
         passing: between on_activated and on_deactivated: data of the device pass.
         confirmed: the device has reported that it is Operational: data for it pass as well.
         ready: the device is fit to leave Error.
@@ -51,7 +51,7 @@ class ProxyRtc(RtComponent):
 
     def __init__(self, entry: NodeEntry, layouts: tuple[PdoLayout, ...]) -> None:
         super().__init__(entry.name)
-        self.asked, self.ready = ProxyRequest.NOTHING, False
+        self.requested, self.ready = ProxyRequest.NOTHING, False
         self.passing = self.confirmed = False
         named = [(layout, entry.ports.get(layout.name, layout.name)) for layout in layouts]
         fit = [(layout, name) for layout, name in named if layout.fields and not layout.unknown]
@@ -69,31 +69,31 @@ class ProxyRtc(RtComponent):
         """Its state in its execution context; Created if it has none."""
         return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
 
-    def take_asked(self) -> ProxyRequest:
+    def take_request(self) -> ProxyRequest:
         """Take what was asked for."""
-        asked, self.asked = self.asked, ProxyRequest.NOTHING
-        return asked
+        requested, self.requested = self.requested, ProxyRequest.NOTHING
+        return requested
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Let data pass; ask for Operational."""
-        self.asked, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
+        self.requested, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
         for sink in self.sinks:
             sink.clear()
         return OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Let no data pass; ask for Pre-operational."""
-        self.asked, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
+        self.requested, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
         return OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for Stopped, which takes the place of what on_deactivated asked for."""
-        self.asked, self.ready = ProxyRequest.ABORT, False
+        self.requested, self.ready = ProxyRequest.ABORT, False
         return OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for a reset of the device; RTC_OK once it has booted."""
         if self.ready:
             return OK
-        self.asked = ProxyRequest.RESET
+        self.requested = ProxyRequest.RESET
         return ReturnCode.RTC_ERROR

@@ -47,7 +47,7 @@ class WheeledBase(RtComponent, ABC):
         self.velocity = self.add_port(InPort("velocity", TimedVelocity2D))
         self.position = self.add_port(OutPort("pose", TimedPose2D))
         self.refused, self.pose, self._twist = 0, Pose(), Twist()
-        self._heard_us = self._executed_us = 0
+        self._received_us = self._executed_us = 0
 
     @property
     @abstractmethod
@@ -69,7 +69,7 @@ class WheeledBase(RtComponent, ABC):
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin at zero, standing."""
         self.pose, self._twist = Pose(), Twist()
-        self._heard_us = self._executed_us = ec.now_us
+        self._received_us = self._executed_us = ec.now_us
         self.velocity.clear()
         return OK
 
@@ -82,7 +82,7 @@ class WheeledBase(RtComponent, ABC):
         """Command the wheels, and tell where they took it."""
         for message in arrived(self.velocity):
             self._take(ec.now_us, message)
-        if ec.now_us - self._heard_us > 1e6 * self.timeout.value:
+        if ec.now_us - self._received_us > 1e6 * self.timeout.value:
             self._twist = Twist()
         tm, radius = Time.from_us(ec.now_us), self.radius.value
         speeds = wheel_speeds(self._twist, self.tread.value, radius, radius)
@@ -97,7 +97,7 @@ class WheeledBase(RtComponent, ABC):
     def _take(self, now_us: int, message: TimedVelocity2D) -> None:
         vx, vy, va = message.data.vx, message.data.vy, message.data.va
         if vy == 0 and plausible(vx, va):
-            self._twist, self._heard_us = Twist(vx, va), now_us
+            self._twist, self._received_us = Twist(vx, va), now_us
             return
         self.refused += 1
         _LOG.warning("%s: cannot drive %s", self.instance_name, message.data)

@@ -24,8 +24,8 @@ def other() -> Iterator[can.BusABC]:
 def test_frames_go_both_ways(other: can.BusABC) -> None:
     link = CanLink.open("can_link", "virtual", bit_rate=500_000)
     link.send(frames("601#4000100000000000 00000605#R8"))
-    heard = [other.recv(1), other.recv(1)]
-    assert tuple(to_frame(m) for m in heard if m) == frames("601#4000100000000000 00000605#R8")
+    received = [other.recv(1), other.recv(1)]
+    assert tuple(to_frame(m) for m in received if m) == frames("601#4000100000000000 00000605#R8")
     for frame in frames("581#4300100092010000 705#7F"):
         other.send(to_message(frame))
     assert link.receive(1_000_000) == frames("581#4300100092010000 705#7F")

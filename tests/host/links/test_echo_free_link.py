@@ -20,9 +20,9 @@ class EchoingLink:
         self.frames += traffic
 
     def receive(self, timeout_us: int, /) -> Frames:
-        return tuple(frame for _, frame in self.hear(timeout_us)[1])
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         received, self.frames = self.frames, ()
         return self.now_us, tuple((self.now_us, frame) for frame in received)
 

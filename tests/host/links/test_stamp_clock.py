@@ -37,5 +37,5 @@ def test_no_frame_is_of_before_the_last_look_nor_of_the_future(
 ) -> None:
     clock, now_us = StampClock(), 0
     for stamp_s, passed_us in read:
-        looked_us, now_us = now_us, now_us + passed_us
-        assert looked_us <= clock.at_us(stamp_s, looked_us, now_us) <= now_us
+        polled_us, now_us = now_us, now_us + passed_us
+        assert polled_us <= clock.at_us(stamp_s, polled_us, now_us) <= now_us

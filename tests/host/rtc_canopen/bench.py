@@ -41,20 +41,20 @@ class Bench:
 
     Args:
         text: the System Definition.
-        cast: model by node-ID; a second node of the same ID as `id + 1000`.
+        models: model by node-ID; a second node of the same ID as `id + 1000`.
         folder: of the EDS files.
     """
 
     def __init__(
         self,
         text: str = PALETTE_AND_MOTOR,
-        cast: dict[int, str] | None = None,
+        models: dict[int, str] | None = None,
         folder: Path = EDS,
     ) -> None:
-        cast = cast or {16: "f-palette", 32: "motor-core-unit"}
+        models = models or {16: "f-palette", 32: "motor-core-unit"}
         self.wire = CanWire()
         self.log = Log(self.wire)
-        self.devices = {n: node(self.wire, n % 1000, model) for n, model in cast.items()}
+        self.devices = {n: node(self.wire, n % 1000, model) for n, model in models.items()}
         self.rig = Rig(*(Station(device, device.port) for device in self.devices.values()))
         self.definition: SystemDefinition = parse_definition(text)
         self.server = RtcCanopenServer(self.definition, read_files(self.definition, folder))

@@ -18,6 +18,6 @@ def test_listeners_hear_all_and_the_log_keeps_the_latest() -> None:
     log, heard = EventLog(), list[ServerEvent]()
     log.listeners.append(heard.append)
     for at_us in range(KEPT + 5):
-        log.note(at_us, ServerEventType.BOOT_UP, 1)
+        log.notify(at_us, ServerEventType.BOOT_UP, 1)
     assert len(heard) == KEPT + 5
     assert [event.at_us for event in log.events] == list(range(5, KEPT + 5))

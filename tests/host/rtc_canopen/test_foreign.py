@@ -13,9 +13,9 @@ from tickrig.host.rtc_canopen.node.served_node import NodePhase
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 
 
-def running(cast: dict[int, str] | None = None) -> Bench:
-    bench = Bench(cast=cast)
-    if cast:
+def running(models: dict[int, str] | None = None) -> Bench:
+    bench = Bench(models=models)
+    if models:
         for number, device in bench.devices.items():
             device.physical["power_off"].write(int(number > 127))
     bench.boot()
@@ -182,7 +182,7 @@ def test_when_the_twins_are_gone_the_node_is_looked_for_again() -> None:
 
 
 def test_twins_that_boot_together_and_differ_in_their_serial_number_alone_are_found() -> None:
-    bench = Bench(cast={16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
+    bench = Bench(models={16: "f-palette", 32: "motor-core-unit", 1016: "f-palette"})
     bench.devices[1016].slave.dictionary[0x1018, 4].value = 2
     bench.run_ms(500)
     assert bench.events(ServerEventType.DUPLICATE_NODE) == [

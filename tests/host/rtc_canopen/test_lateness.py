@@ -21,9 +21,9 @@ BLAMED = (
 class Unstamped(CanHost):
     """A driver without time stamps: a frame is of when it is read."""
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        now_us, heard = super().hear(timeout_us)
-        return now_us, tuple((now_us, frame) for _, frame in heard)
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        now_us, received = super().receive_stamped(timeout_us)
+        return now_us, tuple((now_us, frame) for _, frame in received)
 
 
 class StoppedInBetween(CanHost):
@@ -31,10 +31,10 @@ class StoppedInBetween(CanHost):
 
     stop_us = 0
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        now_us, heard = super().hear(timeout_us)
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        now_us, received = super().receive_stamped(timeout_us)
         self._rig.run_for(self.stop_us)
-        return now_us, heard
+        return now_us, received
 
 
 def running(text: str = PALETTE_AND_MOTOR) -> Bench:
@@ -124,5 +124,5 @@ def test_a_heartbeat_counts_from_when_it_was_on_the_bus() -> None:
     bench = running()
     stop_server(bench, 180)
     bench.run_ms(0.1)
-    last_us = max(at for at, heard in bench.log.heard if str(heard) == "710#05")
-    assert bench.server.nodes[16].heard_us == last_us
+    last_us = max(at for at, received in bench.log.heard if str(received) == "710#05")
+    assert bench.server.nodes[16].received_us == last_us

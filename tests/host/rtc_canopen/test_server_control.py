@@ -54,7 +54,7 @@ def test_status_tells_of_each_node() -> None:
 
 
 def test_a_node_that_was_never_heard_has_no_age() -> None:
-    bench = Bench(cast={16: "f-palette"})
+    bench = Bench(models={16: "f-palette"})
     control = ServerControl(bench.server, ServerRunner(bench.server, bench.link), "x")
     bench.run_ms(500)
     node = ask(control, "status")["nodes"][1]

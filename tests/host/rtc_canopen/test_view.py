@@ -166,7 +166,7 @@ def test_a_link_can_be_ended_and_another_made() -> None:
 
 
 def test_a_refused_node_can_be_set_up_again() -> None:
-    bench = Bench(cast={16: "f-palette", 32: "f-palette"})
+    bench = Bench(models={16: "f-palette", 32: "f-palette"})
     view = ServerView(bench.server)
     bench.run_until(ServerEventType.WRONG_IDENTITY)
     assert "not 000C0191h" in view.node(32).problem

@@ -67,7 +67,7 @@ class Bench:
     def run_for(self, duration_us: int) -> None:
         self.run_to(self.rig.now_us + duration_us)
 
-    def told(self) -> list[tuple[str, str]]:
+    def announced(self) -> list[tuple[str, str]]:
         """Return what was told: which event, of which proxy."""
         return [(event.kind.value, event.instance_name) for event in self.events]
 

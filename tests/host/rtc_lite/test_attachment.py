@@ -90,7 +90,7 @@ def test_a_line_that_is_gone_is_a_lost_device() -> None:
     bench.run_to(PERIOD_US)
     bench.links[0].close()
     bench.run_for(AWAY_US)
-    assert bench.told() == [("FatalError", "Echo0"), ("Removed", "Echo0")]
+    assert bench.announced() == [("FatalError", "Echo0"), ("Removed", "Echo0")]
     assert bench.manager.due_us < NEVER
 
 
@@ -104,7 +104,7 @@ def test_a_device_that_comes_back_within_the_burst_is_in_error_until_a_reset() -
     bench.run_for(2 * PERIOD_US)
     bench.nodes[0].inputs.set("power_cut", 0)
     bench.run_for(5 * PERIOD_US)
-    assert bench.told() == [("PassiveError", "Echo0")]
+    assert bench.announced() == [("PassiveError", "Echo0")]
     assert bench.states() == {"Echo0": "ERROR"}
     assert bench.nodes[0].read("state") == "Created"
     bench.manager.reset("Echo0")
@@ -127,7 +127,7 @@ def test_a_device_that_answers_but_does_not_start_up_is_looked_for_again() -> No
     assert bench.manager.components == ()
     component.failing.clear()
     bench.run_for(AWAY_US)
-    assert bench.told()[-1] == ("Rediscovered", "Echo0")
+    assert bench.announced()[-1] == ("Rediscovered", "Echo0")
     assert bench.manager.find("localhost/Echo0.rtc") is not None
 
 
@@ -136,10 +136,10 @@ def test_removal_of_a_lost_proxy_that_somebody_deletes_first_is_told_once() -> N
     bench.attach(0, "Echo", ProxySettings(rediscover=True))
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(2_000_000)
-    assert bench.told() == [("FatalError", "Echo0")]
+    assert bench.announced() == [("FatalError", "Echo0")]
     bench.manager.delete("Echo0")
     bench.run_for(AWAY_US)
-    assert bench.told() == [("FatalError", "Echo0")]
+    assert bench.announced() == [("FatalError", "Echo0")]
     assert bench.manager.due_us == NEVER
 
 
@@ -189,5 +189,5 @@ def test_a_proxy_that_is_deleted_as_it_is_to_be_removed_is_not_looked_for() -> N
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_to(AWAY_US)
     assert deleter.deleted == 1
-    assert bench.told() == [("FatalError", "Echo0")]
+    assert bench.announced() == [("FatalError", "Echo0")]
     assert bench.manager.due_us == NEVER

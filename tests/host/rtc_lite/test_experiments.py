@@ -40,7 +40,7 @@ def test_t2_a_power_cut_while_active_is_fatal_within_10_10_and_40_ticks(phase_us
     fatal_us = system.at_us("FatalError")
     assert 50 * TICK_US <= fatal_us - cut_us <= 60 * TICK_US
     assert 100 * TICK_US <= system.at_us("Removed") - fatal_us < 101 * TICK_US
-    assert system.told() == [("FatalError", "LiteA0"), ("Removed", "LiteA0")]
+    assert system.announced() == [("FatalError", "LiteA0"), ("Removed", "LiteA0")]
 
 
 def test_t2_step_by_step() -> None:
@@ -170,7 +170,7 @@ def test_t5_an_error_of_the_device_is_mirrored_and_a_reset_leads_back() -> None:
         *("on_execute", "on_deactivated", "on_aborting"),
         *("on_error", "on_error"),
     ]
-    assert bench.told() == [("PassiveError", "Echo0")]
+    assert bench.announced() == [("PassiveError", "Echo0")]
     recorder.failing.clear()
     bench.manager.reset("Echo0")
     bench.run_for(PERIOD_US)
@@ -216,7 +216,7 @@ def test_t6_a_wrong_checksum_is_a_passive_error_and_the_next_frame_is_right() ->
     bench.run_for(PERIOD_US)
     assert bench.states() == {"Echo0": "ERROR"}
     assert bench.nodes[0].read("state") == "Error"
-    assert bench.told() == [("PassiveError", "Echo0")]
+    assert bench.announced() == [("PassiveError", "Echo0")]
 
 
 def test_t7_a_device_that_is_back_gets_a_new_proxy_without_connectors() -> None:
@@ -232,7 +232,7 @@ def test_t7_a_device_that_is_back_gets_a_new_proxy_without_connectors() -> None:
     assert list(proxy.ports) == ["in", "out"]
     assert system.states() == dict.fromkeys(ALL, "ACTIVE") | {"LiteA0": "INACTIVE"}
     assert [profile.ports for profile in system.manager.connectors] == [JOINTS[2]]
-    assert system.told()[-1] == ("Rediscovered", "LiteA0")
+    assert system.announced()[-1] == ("Rediscovered", "LiteA0")
     for first, second in JOINTS[:2]:
         system.manager.connect(first, second)
     system.manager.activate("LiteA0")
@@ -245,7 +245,7 @@ def test_t7_the_device_is_asked_each_100_ticks() -> None:
     system = Experiment(rediscover=True)
     system.nodes[0].inputs.set("power_cut", 1)
     system.run_to(3_000_000)
-    assert system.told()[-1] == ("Removed", "LiteA0")
+    assert system.announced()[-1] == ("Removed", "LiteA0")
     system.links[0].sent.clear()
     system.run_for(5_000_000)
     sent_us = [at_us for at_us, _ in system.links[0].sent]

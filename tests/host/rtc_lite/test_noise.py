@@ -149,6 +149,6 @@ def test_a_count_that_noise_made_larger_swallows_the_pings_and_the_device_is_fou
     out.write(TimedLong(Time(), 1))
     bench.links[0].spoil = lambda frame: frame.replace(b"PS\x02\x04", b"PS\x02\x34")
     bench.run_for(QUIET_US)
-    kinds = [kind for kind, _ in bench.told()]
+    kinds = [kind for kind, _ in bench.announced()]
     assert kinds == ["FatalError", "Removed", "Rediscovered"]
     assert bench.states() == {"Echo0": "INACTIVE"}

@@ -106,7 +106,7 @@ def test_t3_on_two_ptys(live: Live) -> None:
 @pytest.mark.realtime
 def test_an_emulator_that_is_started_again_is_found_again() -> None:
     settings = ProxySettings(
-        ping_period_us=100_000, linger_us=0, rediscover=True, look_period_us=100_000
+        ping_period_us=100_000, linger_us=0, rediscover=True, search_period_us=100_000
     )
     manager, events, paths = Manager(), list[ProxyEvent](), list[str]()
     runner = RealTime(manager, RealClock())

@@ -63,7 +63,7 @@ def test_a_lost_reply_deactivates_the_device() -> None:
     bench.run_for(PERIOD_US)
     bench.links[0].spoil = lambda packet: packet
     bench.run_for(4 * PERIOD_US)
-    assert bench.told() == [("PassiveError", "RTno0")]
+    assert bench.announced() == [("PassiveError", "RTno0")]
     assert bench.states() == {"RTno0": "ERROR"}
     assert recorder.called == ["on_deactivated"]
     bench.manager.reset("RTno0")
@@ -89,7 +89,7 @@ def test_a_power_cut_is_found_and_the_device_is_found_again() -> None:
     bench.run_for(3_000_000)
     bench.nodes[0].inputs.set("power_cut", 0)
     bench.run_for(2_000_000)
-    assert [kind for kind, _ in bench.told()] == ["FatalError", "Removed", "Rediscovered"]
+    assert [kind for kind, _ in bench.announced()] == ["FatalError", "Removed", "Rediscovered"]
     assert bench.states() == {"RTno0": "INACTIVE"}
 
 

@@ -177,7 +177,7 @@ def test_a_line_that_is_gone_is_no_reply() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["boot_us", "reply_us", "ping_period_us", "pings", "linger_us", "look_period_us"]
+    "name", ["boot_us", "reply_us", "ping_period_us", "pings", "linger_us", "search_period_us"]
 )
 def test_a_setting_that_is_too_small_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} is -1, at least [01] is needed"):

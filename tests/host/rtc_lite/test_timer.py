@@ -62,7 +62,7 @@ def test_an_error_of_the_device_is_seen_within_a_period_of_10_ticks() -> None:
     recorder.failing.add("on_execute")
     bench.run_for(2 * PERIOD_US)
     assert bench.states() == {"Echo0": "ERROR"}
-    assert bench.told() == [("PassiveError", "Echo0")]
+    assert bench.announced() == [("PassiveError", "Echo0")]
     requests = {data[1:3] for _, data in bench.links[0].sent}
     assert requests == {b"CX"}
     recorder.failing.clear()
@@ -107,7 +107,7 @@ def test_up_to_three_lost_questions_for_the_state_are_no_error() -> None:
     bench.links[0].spoil = Losing(b"CX", 4)
     bench.run_for(10 * PERIOD_US)
     assert bench.states() == {"Echo0": "ERROR"}
-    assert bench.told() == [("PassiveError", "Echo0")]
+    assert bench.announced() == [("PassiveError", "Echo0")]
     assert "on_aborting" in recorder.called
     assert proxy.fatal_us is None
 

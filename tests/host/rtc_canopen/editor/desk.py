@@ -34,9 +34,9 @@ class Desk:
         nodes: by node-ID.
     """
 
-    def __init__(self, path: Path, cast: dict[int, str], furnish: AddComponents) -> None:
+    def __init__(self, path: Path, models: dict[int, str], furnish: AddComponents) -> None:
         wire = CanWire()
-        self.nodes: dict[int, Node] = {n: node(wire, n, model) for n, model in cast.items()}
+        self.nodes: dict[int, Node] = {n: node(wire, n, model) for n, model in models.items()}
         rig = Rig(*(Station(one, one.port) for one in self.nodes.values()))
         self.link = CanHost(rig, wire.end())
         self.events: list[ServerEvent] = []
@@ -91,14 +91,14 @@ Act = Callable[[Desk], Awaitable[None]]
 def at_desk(
     act: Act,
     path: Path = FIG_120,
-    cast: dict[int, str] | None = None,
+    models: dict[int, str] | None = None,
     size: tuple[int, int] = (80, 24),
     furnish: AddComponents = lambda server: None,
 ) -> None:
     """Let somebody work at a desk where all nodes have booted."""
 
     async def main() -> None:
-        desk = Desk(path, cast or CAST, furnish)
+        desk = Desk(path, models or CAST, furnish)
         async with desk.app.run_test(size=size) as pilot:
             desk.pilot = pilot
             await desk.pass_ms(700)

@@ -36,7 +36,7 @@ class Broken:
     def receive(self, timeout_us: int, /) -> Frames:
         raise LinkClosed("gone")
 
-    def hear(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         raise LinkClosed("gone")
 
     def close(self) -> None:

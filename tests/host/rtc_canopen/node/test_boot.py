@@ -103,7 +103,7 @@ def test_a_stopped_node_with_heartbeat_is_reset_as_it_answers_no_sdo() -> None:
 
 
 def test_a_node_of_another_kind_is_refused() -> None:
-    bench = Bench(cast={16: "motor-core-unit", 32: "motor-core-unit"})
+    bench = Bench(models={16: "motor-core-unit", 32: "motor-core-unit"})
     event = bench.run_until(ServerEventType.WRONG_IDENTITY)
     assert (event.node, event.text) == (16, "1000h:00 is 000C0191h, not 00070191h")
     bench.run_ms(300)

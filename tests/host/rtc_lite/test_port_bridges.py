@@ -9,7 +9,7 @@ import pytest
 from tests.wire.rtc_lite.vectors import VECTORS
 from tickrig.host.links.errors import DeviceRefused
 from tickrig.host.rtc import InPort, OutPort, connect
-from tickrig.host.rtc_lite.relays import PortBridges
+from tickrig.host.rtc_lite.port_bridges import PortBridges
 from tickrig.wire.rtc_lite.messages import LitePortData, LitePortProfile
 from tickrig.wire.rtc_types.basic import Time
 

@@ -76,7 +76,7 @@ class DuplicateNodeDetector:
         self.sign = self.suspicion = ""
         self._strangers, self._doubt_us = 0, -NEVER
         self._identity: dict[tuple[int, int], bytes | None] = {}
-        self._crowd = _DoubleHeartbeats(self._period_us)
+        self._double = _DoubleHeartbeats(self._period_us)
 
     def command(self, command: int) -> None:
         """Hear an NMT command of anybody to the node."""
@@ -96,7 +96,7 @@ class DuplicateNodeDetector:
             values = f"{first[::-1].hex().upper()}h and {answer.data[::-1].hex().upper()}h"
             self.sign = f"{answer.index:04X}h:{answer.sub:02X} is {values}"
 
-    def hear(self, at_us: int, state: NmtState, *, listening: bool) -> None:
+    def receive(self, at_us: int, state: NmtState, *, listening: bool) -> None:
         """Take a boot-up or heartbeat.
 
         Args:
@@ -117,7 +117,7 @@ class DuplicateNodeDetector:
             return
         late_us = abs(at_us - self._old_us - self._period_us)
         self._old_us, self._steady = at_us, STEADY * late_us <= self._period_us
-        if self._crowd.hear(at_us):
+        if self._double.receive(at_us):
             self.suspicion = f"two heartbeats in each {self._period_us // 1_000} ms"
 
     def _judge_state(self, at_us: int, before: NmtState | None, state: NmtState) -> None:
@@ -156,7 +156,7 @@ class _DoubleHeartbeats:
         self._period_us, self._begin_us = period_us, -1
         self._window = self._count = self._run = 0
 
-    def hear(self, at_us: int) -> bool:
+    def receive(self, at_us: int) -> bool:
         """Take a heartbeat; True if there are too many."""
         if self._begin_us < 0:
             self._begin_us = at_us - self._period_us // 2

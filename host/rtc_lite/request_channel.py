@@ -7,8 +7,8 @@ from typing import Final
 
 from tickrig.host.links.link import Link
 from tickrig.host.rtc_lite.frame_link import SILENCE_US, FrameLink, RtnoLink
+from tickrig.host.rtc_lite.ping_monitor import PingMonitor
 from tickrig.host.rtc_lite.settings import ProxySettings
-from tickrig.host.rtc_lite.watch import PingMonitor
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import (
     FAULT_COMMANDS,
@@ -59,7 +59,7 @@ _LOG: Final = log_of(__name__)
 class RequestChannel:
     """What a proxy says and hears.
 
-    `ask` waits for a reply, for `reply_us` at most. A reply that does not come
+    `request` waits for a reply, for `reply_us` at most. A reply that does not come
     begins a burst of PINGs, which nobody waits for: `tick` goes on with it.
     While it lasts, and after a device was lost, nothing else is sent. As the
     device answers in order, an answered PING also means that no late reply is
@@ -70,7 +70,7 @@ class RequestChannel:
         settings: how long to wait, how to sum up.
 
     Attributes:
-        watch: counts the PINGs.
+        ping_monitor: counts the PINGs.
         state: of the device, as far as its replies tell; None if nobody knows.
         pushed: data of out-ports, not yet taken, with the time at which they arrived.
         in_ports: in-ports that the device has described.
@@ -80,7 +80,7 @@ class RequestChannel:
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
         self._line, self._settings = _frames_over(link, settings), settings
-        self.watch = PingMonitor(
+        self.ping_monitor = PingMonitor(
             settings.ping_period_us, settings.reply_us, settings.pings, link.now_us
         )
         self.state: LiteState | None = None
@@ -90,7 +90,7 @@ class RequestChannel:
         self.trouble = ""
         self._reply: LiteReply | None = None
         self._awaited: LiteCommand | None = None
-        self._looked_us = self._deadline_us = link.now_us
+        self._polled_us = self._deadline_us = link.now_us
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -105,8 +105,8 @@ class RequestChannel:
     @property
     def due_us(self) -> int:
         """When `tick` has something to do."""
-        due_us = self.watch.due_us
-        return min(due_us, self._looked_us + POLL_US) if self.watch.asked else due_us
+        due_us = self.ping_monitor.due_us
+        return min(due_us, self._polled_us + POLL_US) if self.ping_monitor.awaiting else due_us
 
     def tick(self) -> None:
         """Take what has arrived, and send a PING if one is due.
@@ -116,10 +116,10 @@ class RequestChannel:
         """
         now_us = self.now_us
         self.poll()
-        if (number := self.watch.tick(now_us)) is not None:
+        if (number := self.ping_monitor.tick(now_us)) is not None:
             self._ping(number)
 
-    def ask(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
+    def request(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
         """Send a request and wait for its reply; None without one, or if nothing may be sent."""
         if not self._free():
             return None
@@ -127,10 +127,10 @@ class RequestChannel:
         self.trouble = self._trouble(command, reply)
         if reply is None:
             _LOG.info("%s", self.trouble)
-            self._ping(self.watch.doubt(self.now_us))
+            self._ping(self.ping_monitor.doubt(self.now_us))
         return reply
 
-    def insist(self, command: LiteCommand) -> LiteReply | None:
+    def request_again(self, command: LiteCommand) -> LiteReply | None:
         """Send a request until it is answered, 4 times at most; a missing reply has no effect.
 
         A fault is no answer: what was on the line before has spoilt the request.
@@ -144,29 +144,29 @@ class RequestChannel:
             reply = self._exchange(command)
         return reply
 
-    def post(self, command: LiteCommand, data: bytes = b"") -> None:
+    def send(self, command: LiteCommand, data: bytes = b"") -> None:
         """Send a request and wait for nothing."""
         self._line.send(LiteFrame(command, data))
 
     def poll(self) -> None:
         """Take what has arrived."""
-        self._looked_us = self.now_us
-        self._hear(0)
+        self._polled_us = self.now_us
+        self._receive(0)
 
     def listen(self, duration_us: int) -> None:
         """Take what arrives meanwhile."""
         until_us = self.now_us + duration_us
-        while self.now_us < until_us and self._hear(until_us - self.now_us):
+        while self.now_us < until_us and self._receive(until_us - self.now_us):
             continue
 
     def _free(self) -> bool:
         """Whether a request may be sent; waits for the answer to a PING that is under way."""
-        watch = self.watch
-        while watch.pending and self.now_us < watch.due_us:
-            if not self._hear(watch.due_us - self.now_us):
+        ping_monitor = self.ping_monitor
+        while ping_monitor.pending and self.now_us < ping_monitor.due_us:
+            if not self._receive(ping_monitor.due_us - self.now_us):
                 return False
-        watch.let_go()
-        return not (watch.asked or watch.doubted or watch.lost)
+        ping_monitor.let_go()
+        return not (ping_monitor.awaiting or ping_monitor.doubted or ping_monitor.lost)
 
     def _exchange(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
         """Send a request and wait for its reply."""
@@ -175,7 +175,7 @@ class RequestChannel:
         self.in_ports, self.out_ports = [], []
         if command in WITH_STATE:
             self.state = None
-        self.post(command, data)
+        self.send(command, data)
         reply = self._await_reply()
         self._awaited = None
         return reply
@@ -184,10 +184,10 @@ class RequestChannel:
         limit_us = self.now_us + PROFILE_US
         self._deadline_us = self.now_us + self._settings.reply_us
         while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
-            if not self._hear(self._deadline_us - self.now_us):
+            if not self._receive(self._deadline_us - self.now_us):
                 break
         if self._reply is None:
-            self._hear(0)  # it may have come while this process was stopped
+            self._receive(0)  # it may have come while this process was stopped
         return self._reply
 
     def _trouble(self, command: LiteCommand, reply: LiteReply | None) -> str:
@@ -197,9 +197,9 @@ class RequestChannel:
         return "" if reply.ok else f"{name} was answered {_MEANINGS.get(reply.status, reply)}"
 
     def _ping(self, number: int) -> None:
-        self.post(LiteCommand.PING, bytes([number]))
+        self.send(LiteCommand.PING, bytes([number]))
 
-    def _hear(self, timeout_us: int) -> bool:
+    def _receive(self, timeout_us: int) -> bool:
         """Wait for bytes and take them; False if the line is gone."""
         frames = self._line.receive(timeout_us)
         for frame in frames or ():
@@ -208,7 +208,7 @@ class RequestChannel:
 
     def _take(self, frame: LiteFrame) -> None:
         """Note what a frame says."""
-        self.watch.heard_us = self.now_us
+        self.ping_monitor.received_us = self.now_us
         match frame.command:
             case LiteCommand.DATA:
                 self.pushed.append((self.now_us, parse_port_data(frame.data)))
@@ -229,7 +229,7 @@ class RequestChannel:
 
     def _take_reply(self, command: LiteCommand, reply: LiteReply) -> None:
         if command is LiteCommand.PING and reply.ok:
-            self.watch.answered(reply.fields[0])
+            self.ping_monitor.answered(reply.fields[0])
         if command in WITH_STATE and reply.fields:
             self.state = _state(reply.fields[0])
         if command is self._awaited:

@@ -19,10 +19,10 @@ class PingMonitor:
         period_us: from the last correct frame to a PING.
         wait_us: how long an answer may take.
         most: so many unanswered ones in a row, and the device is lost.
-        heard_us: when the last correct frame came.
+        received_us: when the last correct frame came.
 
     Attributes:
-        asked: a PING waits for its answer.
+        awaiting: a PING waits for its answer.
         doubted: a reply is missing, and no PING was answered since.
         lost: the device does not answer any more; it stays so.
     """
@@ -30,53 +30,55 @@ class PingMonitor:
     period_us: int
     wait_us: int
     most: int
-    heard_us: int
-    asked: bool = field(default=False, init=False)
+    received_us: int
+    awaiting: bool = field(default=False, init=False)
     doubted: bool = field(default=False, init=False)
     lost: bool = field(default=False, init=False)
     _number: int = field(default=0, init=False)
     _unanswered: int = field(default=0, init=False)
-    _asked_us: int = field(default=0, init=False)
+    _pinged_us: int = field(default=0, init=False)
 
     @property
     def due_us(self) -> int:
         """When `tick` has something to do; `NEVER` for a device that is lost."""
         if self.lost:
             return NEVER
-        return self._asked_us + self.wait_us if self.asked else self.heard_us + self.period_us
+        return (
+            self._pinged_us + self.wait_us if self.awaiting else self.received_us + self.period_us
+        )
 
     @property
     def pending(self) -> bool:
         """Whether an answer is out to a PING that was sent as a matter of routine."""
-        return self.asked and not self.doubted
+        return self.awaiting and not self.doubted
 
     def tick(self, now_us: int) -> int | None:
         """Return the number of a PING that is to be sent now, if one is."""
         if now_us < self.due_us:
             return None
-        self.doubted = self.doubted or self.asked
+        self.doubted = self.doubted or self.awaiting
         self.lost = self._unanswered == self.most
-        return None if self.lost else self.ask(now_us)
+        return None if self.lost else self.ping(now_us)
 
     def doubt(self, now_us: int) -> int:
         """Begin a burst, as a reply is missing; return the number of its first PING."""
         self.doubted, self._unanswered = True, 0
-        return self.ask(now_us)
+        return self.ping(now_us)
 
-    def ask(self, now_us: int) -> int:
+    def ping(self, now_us: int) -> int:
         """Count a PING that is sent now, and return its number."""
         self._number = self._number % SEQUENCE[-1] + 1
         self._unanswered += 1
-        self.asked, self._asked_us = True, now_us
+        self.awaiting, self._pinged_us = True, now_us
         return self._number
 
     def let_go(self) -> None:
         """Wait no more for a routine PING: a request follows, whose reply tells as much."""
         if self.pending:
-            self.asked, self._unanswered = False, 0
+            self.awaiting, self._unanswered = False, 0
 
     def answered(self, number: int) -> None:
         """Take an answer; that to an older PING is ignored."""
-        if self.asked and number == self._number:
-            self.asked = self.doubted = False
+        if self.awaiting and number == self._number:
+            self.awaiting = self.doubted = False
             self._unanswered = 0

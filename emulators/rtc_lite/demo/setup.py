@@ -79,10 +79,10 @@ class PtySetup:
     def __init__(
         self,
         links: Mapping[str, Link[bytes]],
-        hands: Mapping[str, ControlClient],
+        controls: Mapping[str, ControlClient],
         places: Mapping[str, str],
     ) -> None:
-        self.manager, self.links, self.places, self._hands = Manager(), links, places, hands
+        self.manager, self.links, self.places, self._controls = Manager(), links, places, controls
         self._runner = RealTime(self.manager, RealClock())
 
     def step(self) -> None:
@@ -92,9 +92,9 @@ class PtySetup:
     def power(self, name: str, *, on: bool) -> None:
         """Tell the emulator."""
         if on:
-            self._hands[name].ask("clear", name=POWER_CUT)
+            self._controls[name].ask("clear", name=POWER_CUT)
         else:
-            self._hands[name].ask("fault", spec=POWER_CUT)
+            self._controls[name].ask("fault", spec=POWER_CUT)
 
 
 @contextmanager
@@ -106,10 +106,10 @@ def pty_setup() -> Iterator[PtySetup]:
         LinkClosed: its terminal cannot be opened.
     """
     with ExitStack() as stack:
-        links, hands, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
+        links, controls, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
         for name, node in NODES.items():
             child = stack.enter_context(running(EMULATOR, f"--node={node}", f"--baud={BAUD}"))
-            hands[name] = stack.enter_context(ControlClient(child.control))
+            controls[name] = stack.enter_context(ControlClient(child.control))
             links[name] = stack.enter_context(closing(SerialLink(str(child.link), BAUD)))
             places[name] = str(child.link.resolve())
-        yield PtySetup(links, hands, places)
+        yield PtySetup(links, controls, places)
