@@ -91,6 +91,54 @@ def test_a_pty_and_the_control_socket_reach_it(
     assert running.wait() == 0
 
 
+SYSTEM = """\
+[[component]]
+name = "F"
+type = "{}"
+rate_hz = 100.0
+active = true
+"""
+
+
+@pytest.mark.realtime
+def test_its_component_runs_in_a_system_and_is_created_in_one(
+    environment: Environment, tmp_path: Path
+) -> None:
+    (tmp_path / "system.toml").write_text(SYSTEM.format("Fahrenheit"))
+    run = ("tickrig", "rtc", "run", "system.toml", "--control", "control")
+    variables, pipe = environment.variables, subprocess.PIPE
+    with subprocess.Popen(run, cwd=tmp_path, env=variables, stderr=pipe) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == b"F. Ctrl-C ends.\n"  # it is up
+
+        def rtc(*words: str) -> str:
+            return environment.run("tickrig", "rtc", *words, "--at", "control", cwd=tmp_path)
+
+        assert rtc("create", "Fahrenheit") == "Fahrenheit0\n"
+        rtc("con", "F.fahrenheit", "Fahrenheit0.celsius")
+        rtc("inject", "F.celsius", "100")
+        assert rtc("ls", "-l").split()[:2] == ["Active", "2/1"]
+        rtc("stop")
+    assert process.returncode == 0
+
+
+def test_its_broken_component_is_a_line(environment: Environment, tmp_path: Path) -> None:
+    (tmp_path / "system.toml").write_text(SYSTEM.format("Kelvin"))
+    run = ["tickrig", "rtc", "run", "system.toml", "--control", "control"]
+    done = subprocess.run(
+        run,
+        cwd=tmp_path,
+        env=environment.variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    place = "component type 'Kelvin' of package kettle-emu (kettle_rtc:Kelvin): "
+    assert line.startswith(f"Error: system system.toml: {place}")
+
+
 def test_its_own_tests_pass(environment: Environment, tmp_path: Path) -> None:
     shutil.copy(ROOT / "tests" / "stranger" / "test_kettle.py", tmp_path)
     assert "passed" in environment.run("pytest", "-q", cwd=tmp_path)

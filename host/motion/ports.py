@@ -18,13 +18,13 @@ MOST: Final = 1e9
 """Numbers beyond it are no metres, radians or speeds of a cart."""
 
 
-def arrived(port: InPort[T]) -> Iterator[T]:
+def read_all(port: InPort[T]) -> Iterator[T]:
     """Yield what arrived since the last read, oldest first."""
     while port.is_new and (value := port.read()) is not None:
         yield value
 
 
-def newest(port: InPort[T]) -> T | None:
+def read_newest(port: InPort[T]) -> T | None:
     """Return what arrived last, None if nothing did; the rest is dropped."""
     latest = None
     while port.is_new:
@@ -46,9 +46,9 @@ def to_pose(data: Pose2D) -> Pose | None:
     return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
 
 
-def newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
+def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
     """Return the pose that arrived last; None without one, or if a number is not `plausible`."""
-    latest = newest(port)
+    latest = read_newest(port)
     return None if latest is None else to_pose(latest.data)
 
 

@@ -15,7 +15,7 @@ from typing import ClassVar, Final
 
 from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.ports import newest, to_pose
+from tickrig.host.motion.ports import read_newest, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
@@ -62,7 +62,7 @@ class Pursuit(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Command the velocity of this period."""
-        if (latest := newest(self.position)) is not None and (pose := to_pose(latest.data)):
+        if (latest := read_newest(self.position)) is not None and (pose := to_pose(latest.data)):
             self.twist = LIMITS.smooth(self._wanted(pose), self.twist)
             data = Velocity2D(self.twist.v, 0.0, self.twist.w)
             self.velocity.write(iis.TimedVelocity2D(data=data))

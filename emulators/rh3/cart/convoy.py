@@ -12,7 +12,7 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import Cart, ClosedLoop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.follower import Follower
-from tickrig.host.motion.ports import newest, plausible, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -61,7 +61,7 @@ class OmniCart(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Go on for a period."""
-        if (latest := newest(self.velocity)) is not None:
+        if (latest := read_newest(self.velocity)) is not None:
             numbers = (latest.data.vx, latest.data.vy, latest.data.va)
             self._wanted = Velocity(*numbers) if plausible(*numbers) else Velocity()
             self._heard_us = ec.now_us

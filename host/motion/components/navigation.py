@@ -6,7 +6,7 @@ from math import pi, sqrt
 from typing import ClassVar
 
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.host.motion.ports import newest, newest_pose, to_pose
+from tickrig.host.motion.ports import read_newest, read_newest_pose, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -75,9 +75,9 @@ class Navigation(RtComponent):
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take a new list, judge a new pose, write the state."""
         now = Time.from_us(ec.now_us)
-        if (way := newest(self.min_path)) is not None:
+        if (way := read_newest(self.min_path)) is not None:
             self._start(now, way)
-        if (pose := newest_pose(self.position)) is not None and self._relays:
+        if (pose := read_newest_pose(self.position)) is not None and self._relays:
             self._judge(now, pose)
         self.status.write(TimedState(now, self.state))
         return ReturnCode.RTC_OK

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose, Wheels, moved, wrap
-from tickrig.host.motion.ports import arrived, plausible, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_all, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types import iis
@@ -84,7 +84,7 @@ class Odometry(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Add what the wheels have turned since the last angles."""
-        for sample in arrived(self.angles):
+        for sample in read_all(self.angles):
             self._add(sample)
         return ReturnCode.RTC_OK
 

@@ -11,7 +11,7 @@ from tickrig.host.motion.components.position_input import (
     START_POINT,
 )
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import arrived, newest, to_pose, to_pose_2d
+from tickrig.host.motion.ports import read_all, read_newest, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -60,13 +60,13 @@ class OmniTo2WD(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Plan what arrived, and write what has finished."""
-        if (latest := newest(self.current_position)) is not None:
+        if (latest := read_newest(self.current_position)) is not None:
             self._pose = to_pose(latest.data) or self._pose
-        for message in arrived(self.goal):
+        for message in read_all(self.goal):
             self._take(message)
         if self._waiting and self._pose is not None:
             self._plan(ec, self._pose)
-        for status in arrived(self.status_in):
+        for status in read_all(self.status_in):
             self._follow(ec, status)
         return ReturnCode.RTC_OK
 
@@ -91,7 +91,7 @@ class OmniTo2WD(RtComponent):
         self._waiting = []
         now = Time.from_us(ec.now_us)
         self.min_path.write(iis.TimedPath2DSeq(now, pose=tuple(to_pose_2d(p) for p in way)))
-        for _ in arrived(self.status_in):  # of the command before
+        for _ in read_all(self.status_in):  # of the command before
             continue
         self._began, self._ran = True, False
 

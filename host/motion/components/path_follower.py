@@ -14,7 +14,7 @@ from tickrig.host.motion.control_laws import (
     steps,
 )
 from tickrig.host.motion.geometry import Pose, Twist, clip, twist_of
-from tickrig.host.motion.ports import newest_pose, plausible, write_velocity
+from tickrig.host.motion.ports import plausible, read_newest_pose, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rh2 import Path, RunMode
@@ -110,7 +110,7 @@ class PathFollower(RtComponent):
         if self.target_path.is_new and (path := self.target_path.read()) is not None:
             numbers = (path.x, path.y, path.theta, path.v, path.w, path.r)
             self.path = path if plausible(*numbers) else Path(RunMode.STOP)
-        wanted = self._wanted(self._present(ec))
+        wanted = self._wanted(self._update_pose(ec))
         self.twist = self._limits(ec).smooth(wanted, self.twist)
         write_velocity(self.velocity, ec, self.twist.v, 0.0, self.twist.w)
         return ReturnCode.RTC_OK
@@ -121,9 +121,9 @@ class PathFollower(RtComponent):
         )
         return VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
-    def _present(self, ec: ExecutionContext) -> Pose | None:
-        """Return the latest pose, None if there was none for long."""
-        if (pose := newest_pose(self.position)) is not None:
+    def _update_pose(self, ec: ExecutionContext) -> Pose | None:
+        """Read new poses. Returns: the latest, None if there was none for `pose_timeout`."""
+        if (pose := read_newest_pose(self.position)) is not None:
             self._pose, self._seen_us = pose, ec.now_us
         elif ec.now_us - self._seen_us > self.pose_timeout.value * 1e6:
             self._pose = None

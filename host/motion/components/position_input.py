@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import newest, plausible, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -85,7 +85,7 @@ class PositionInput(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Send the next command, or look whether the last one has finished."""
-        status = newest(self.status)
+        status = read_newest(self.status)
         if self._running and status is not None and status.data == NavigationState.FINISH:
             self._running = False
             self.finished += 1

@@ -11,9 +11,8 @@ from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
-from tickrig.host.motion.components.base_texts import fault_text, refusal_text
 from tickrig.host.motion.geometry import Twist, wheel_speeds
-from tickrig.host.motion.ports import newest, plausible
+from tickrig.host.motion.ports import plausible, read_newest
 from tickrig.host.rtc import (
     ExecutionContext,
     InPort,
@@ -26,8 +25,8 @@ from tickrig.host.rtc import (
 )
 from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.text.log import log_of
-from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, Request
-from tickrig.wire.rh3 import REPORT, Address, Command, Mode, Report, Status, wide
+from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, ExceptionCode, Request
+from tickrig.wire.rh3 import REPORT, Address, Command, Fault, Mode, Report, Status, wide
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 
@@ -181,7 +180,7 @@ class RefHardRh3(RtComponent):
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
         """Send what is to be sent in this period."""
-        if (latest := newest(self.velocity)) is not None:
+        if (latest := read_newest(self.velocity)) is not None:
             v, w = latest.data.vx, latest.data.va
             self._twist = Twist(v, w) if plausible(v, w) else Twist()
         if self._master is None or self._master.pending:
@@ -250,3 +249,36 @@ class RefHardRh3(RtComponent):
 
 def _write(address: Address, *values: int) -> Request:
     return Request(WRITE, write=(address, tuple(int(value) for value in values)))
+
+
+def fault_text(left: Fault, right: Fault) -> str:
+    """Return the faults of both wheels, each with the wheels that have it.
+
+    >>> fault_text(Fault.EMERGENCY_STOP | Fault.STALL, Fault.EMERGENCY_STOP)
+    'stall (left), emergency stop (left, right)'
+    >>> fault_text(Fault(0x20), Fault(0))
+    'fault 20h (left)'
+    """
+    sides = {"left": left, "right": right}
+    bits = [1 << place for place in range((left | right).bit_length())]
+    named = {bit: ", ".join(side for side, fault in sides.items() if fault & bit) for bit in bits}
+    return ", ".join(f"{_name(bit)} ({who})" for bit, who in named.items() if who) or "unknown"
+
+
+def _name(bit: int) -> str:
+    return _words(Fault(bit).name or f"fault {bit:02X}h")
+
+
+def refusal_text(request: Request, code: ExceptionCode | int) -> str:
+    """Return which request was refused, and why.
+
+    >>> refusal_text(Request(3, (0x10, 1)), ExceptionCode.ILLEGAL_DATA_ADDRESS)
+    'function 03h at 0010h: illegal data address'
+    """
+    first, _ = request.write or request.read or (0, 0)
+    why = _words(code.name) if isinstance(code, ExceptionCode) else f"exception code {code:02X}h"
+    return f"function {request.function:02X}h at {first:04X}h: {why}"
+
+
+def _words(name: str) -> str:
+    return name.lower().replace("_", " ")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import ClassVar, Generic, TypeVar, get_args
 
 from tickrig.host.motion.geometry import Pose, positive
-from tickrig.host.motion.ports import arrived, plausible, to_pose, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_all, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis, iis_phase1, iis_phase2
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
@@ -37,7 +37,7 @@ class Adapter(RtComponent, Generic[S, T]):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Convert what arrived."""
-        for value in arrived(self.arriving):
+        for value in read_all(self.arriving):
             if (converted := self.convert(value)) is not None:
                 self.leaving.write(converted)
         return ReturnCode.RTC_OK

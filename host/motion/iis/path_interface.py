@@ -7,7 +7,7 @@ from math import copysign, pi, sqrt
 from typing import ClassVar, Final, NamedTuple
 
 from tickrig.host.motion.geometry import Pose, positive, wrap
-from tickrig.host.motion.ports import newest, newest_pose, plausible, to_pose, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_newest, read_newest_pose, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -87,9 +87,9 @@ class PathInterface(RtComponent):
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take the newest list, and judge a new pose."""
         now = Time.from_us(ec.now_us)
-        if (path := newest(self.path)) is not None:
+        if (path := read_newest(self.path)) is not None:
             self._take(now, path)
-        if (pose := newest_pose(self.position)) is not None:
+        if (pose := read_newest_pose(self.position)) is not None:
             self._judge(now, pose)
         if self._order is not None:
             self.target_path.write(self._order)

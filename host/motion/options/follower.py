@@ -6,7 +6,7 @@ from math import cos, sin
 from typing import ClassVar
 
 from tickrig.host.motion.geometry import Pose, clip, wrap
-from tickrig.host.motion.ports import newest_pose, write_velocity
+from tickrig.host.motion.ports import read_newest_pose, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 
@@ -52,7 +52,7 @@ class Follower(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Command a velocity towards the leader."""
-        leader, own = self._present(ec, self.leader), self._present(ec, self.position)
+        leader, own = self._update_pose(ec, self.leader), self._update_pose(ec, self.position)
         wanted = (0.0, 0.0, 0.0) if leader is None or own is None else self._wanted(own, leader)
         step_s = ec.period_us / 1e6
         steps = (self.max_acc_v.value, self.max_acc_v.value, self.max_acc_w.value)
@@ -64,8 +64,8 @@ class Follower(RtComponent):
         write_velocity(self.velocity, ec, vx, vy, va)
         return ReturnCode.RTC_OK
 
-    def _present(self, ec: ExecutionContext, port: InPort[iis.TimedPose2D]) -> Pose | None:
-        if (pose := newest_pose(port)) is not None:
+    def _update_pose(self, ec: ExecutionContext, port: InPort[iis.TimedPose2D]) -> Pose | None:
+        if (pose := read_newest_pose(port)) is not None:
             self._seen[port] = ec.now_us, pose
         seen_us, seen = self._seen.get(port, (0, None))
         return seen if ec.now_us - seen_us <= self.pose_timeout.value * 1e6 else None

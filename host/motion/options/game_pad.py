@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import ClassVar, Final
 
 from tickrig.host.links.errors import LinkError
-from tickrig.host.motion.options.evdev_pad import EvdevPad
-from tickrig.host.motion.options.keyboard_pad import KeyboardPad
-from tickrig.host.motion.options.pad import GamePadDevice, GamePadOpener, StickPosition
+from tickrig.host.motion.options.game_pad_devices import (
+    EvdevPad,
+    GamePadDevice,
+    GamePadOpener,
+    KeyboardPad,
+    StickPosition,
+)
 from tickrig.host.motion.ports import write_velocity
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of

@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 from tickrig.host.motion.components.ref_hard import RefHard
 from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Twist
-from tickrig.host.motion.ports import MOST, newest, plausible, write_velocity
+from tickrig.host.motion.ports import MOST, plausible, read_newest, write_velocity
 from tickrig.host.rtc import (
     Consumer,
     ExecutionContext,
@@ -47,7 +47,7 @@ class UrgToObstacles(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take the newest scan."""
-        if (scan := newest(self.ranges)) is not None:
+        if (scan := read_newest(self.ranges)) is not None:
             points = tuple(self._points(scan))
             self.obstacles.write(iis.TimedPose2DSeq(scan.tm, data=points))
         return ReturnCode.RTC_OK
@@ -80,7 +80,7 @@ class ObstacleMonitor(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Measure the newest points."""
-        if (seen := newest(self.obstacles)) is not None:
+        if (seen := read_newest(self.obstacles)) is not None:
             self.distance.write(TimedDouble(seen.tm, self._nearest(seen)))
         return ReturnCode.RTC_OK
 
@@ -111,7 +111,7 @@ class WatchedDistance:
 
     def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
         """Take the newest distance; return whether the way is free."""
-        latest = newest(self._port)
+        latest = read_newest(self._port)
         if latest is not None and plausible(latest.data):
             self._heard_us = ec.now_us
             self.free = latest.data > (stop_m if self.free else go_m)
@@ -155,7 +155,7 @@ class ObstaclesAvoidance(RtComponent):
         free = self._watched.update(
             ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
         )
-        if (latest := newest(self.arriving)) is not None:
+        if (latest := read_newest(self.arriving)) is not None:
             data = latest.data
             self._pass(
                 ec, Twist(data.vx, data.va) if plausible(data.vx, data.va) else Twist(), free

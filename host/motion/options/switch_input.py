@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from tickrig.host.motion.ports import newest, plausible, write_velocity
+from tickrig.host.motion.ports import plausible, read_newest, write_velocity
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -46,7 +46,7 @@ class SwitchInput(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Pass the velocity of whoever drives on."""
-        planned = newest(self.automatic)
+        planned = read_newest(self.automatic)
         self._listen(ec)
         self._switch(ec)
         if self.is_manual:
@@ -56,7 +56,7 @@ class SwitchInput(RtComponent):
         return ReturnCode.RTC_OK
 
     def _listen(self, ec: ExecutionContext) -> None:
-        if (latest := newest(self.joystick)) is not None:
+        if (latest := read_newest(self.joystick)) is not None:
             self._pushed, self._heard_us = _made_plausible(latest.data), ec.now_us
         elif ec.now_us - self._heard_us > self.stale.value * 1e6:
             self._pushed = Velocity2D()

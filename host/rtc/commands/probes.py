@@ -30,7 +30,7 @@ class NumberedValue:
 
 
 @dataclass(slots=True)
-class _Watch:
+class _WatchedPort:
     """An InPort that takes what an OutPort writes."""
 
     port: InPort[Any]
@@ -56,11 +56,11 @@ class Probes:
 
     def __init__(self, manager: Manager) -> None:
         self._manager = manager
-        self._watches: dict[AnyPort, _Watch] = {}
+        self._watches: dict[AnyPort, _WatchedPort] = {}
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
-    def seen(self, name: str, since: int = 0) -> tuple[tuple[NumberedValue, ...], int]:
-        """Return what an OutPort wrote; it is watched from the first call on.
+    def watch(self, name: str, since: int = 0) -> tuple[tuple[NumberedValue, ...], int]:
+        """Watch an OutPort from the first call on, and return what it wrote.
 
         Args:
             name: of the port, as `Manager.port` takes it.
@@ -75,7 +75,7 @@ class Probes:
         port = self._manager.port(name)
         if not isinstance(port, OutPort):
             raise RtcRefused(f"{name} is a {port.port_type}; values are shown of a DataOutPort")
-        watch = self._watches.get(port) or self._watch(port)
+        watch = self._watches.get(port) or self._start(port)
         watch.asked_us = self._manager.now_us
         watch.take()
         return tuple(seen for seen in watch.seen if seen.number > since), watch.count
@@ -112,8 +112,8 @@ class Probes:
                 source.disconnect_all()
                 del self._injections[port]
 
-    def _watch(self, port: OutPort[Any]) -> _Watch:
-        watch = _Watch(InPort("print", port.data_type), self._manager.now_us)
+    def _start(self, port: OutPort[Any]) -> _WatchedPort:
+        watch = _WatchedPort(InPort("print", port.data_type), self._manager.now_us)
         connect(port, watch.port, {"dataport.buffer.length": str(HELD)})
         self._watches[port] = watch
         return watch

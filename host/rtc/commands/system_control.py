@@ -157,7 +157,7 @@ class SystemControl(RequestDispatcher):
 
     def _seen(self, request: Object) -> Object:
         since = whole(request.get("since", 0), "since", 0, NEVER)
-        seen, latest = self._probes.seen(text_of(request, "port"), since)
+        seen, latest = self._probes.watch(text_of(request, "port"), since)
         values = [{"number": one.number, "value": literal(one.value)} for one in seen]
         return {"values": values, "latest": latest}
 

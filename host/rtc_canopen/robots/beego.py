@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import tau
 from typing import ClassVar, Final
 
-from tickrig.host.motion.ports import newest
+from tickrig.host.motion.ports import read_newest
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode
 from tickrig.host.rtc_canopen.robots.wheeled_base import WheeledBase
 from tickrig.wire.rtc_types.basic import Time, TimedLong
@@ -64,7 +64,7 @@ class Beego(WheeledBase):
         return left, right
 
     def _moved(self, side: int) -> float:
-        if (position := newest(self.positions[side])) is None:
+        if (position := read_newest(self.positions[side])) is None:
             return 0.0
         before, self._counts[side] = self._counts[side], position.data
         if before is None:

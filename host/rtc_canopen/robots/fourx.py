@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import radians
 from typing import ClassVar, Final
 
-from tickrig.host.motion.ports import newest
+from tickrig.host.motion.ports import read_newest
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode
 from tickrig.host.rtc_canopen.robots.wheeled_base import WheeledBase
 from tickrig.wire.rtc_types.basic import Time, TimedShort
@@ -58,7 +58,7 @@ class FourX(WheeledBase):
     def turned(self, since_s: float) -> tuple[float, float]:
         """Return how far the wheels turned at the speeds that were measured last, in the mean."""
         for place, port in enumerate(self.speeds):
-            if (speed := newest(port)) is not None:
+            if (speed := read_newest(port)) is not None:
                 self._latest[place] = speed.data / FULL * self.fastest
         front_left, rear_left, front_right, rear_right = self._latest
         return (front_left + rear_left) / 2 * since_s, (front_right + rear_right) / 2 * since_s

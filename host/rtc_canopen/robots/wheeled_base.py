@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import Final
 
 from tickrig.host.motion.geometry import Pose, Twist, moved, wheel_speeds
-from tickrig.host.motion.ports import arrived, plausible, to_pose_2d
+from tickrig.host.motion.ports import plausible, read_all, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.basic import Time
@@ -80,7 +80,7 @@ class WheeledBase(RtComponent, ABC):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Command the wheels, and tell where they took it."""
-        for message in arrived(self.velocity):
+        for message in read_all(self.velocity):
             self._take(ec.now_us, message)
         if ec.now_us - self._received_us > 1e6 * self.timeout.value:
             self._twist = Twist()

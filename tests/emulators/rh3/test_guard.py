@@ -12,7 +12,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.collision_guard import CollisionGuard
 from tickrig.host.motion.options.game_pad import GamePad
-from tickrig.host.motion.options.pad import StickPosition
+from tickrig.host.motion.options.game_pad_devices import StickPosition
 from tickrig.host.motion.options.switch_input import SwitchInput
 
 SECOND_US = 1_000_000

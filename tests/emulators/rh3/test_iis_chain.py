@@ -9,10 +9,9 @@ import pytest
 
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.iis.goal_interface import GoalInterface
+from tickrig.host.motion.iis.interfaces import GoalInterface, RunningInformation
 from tickrig.host.motion.iis.path_interface import PASSED, STOPPED, PathInterface
-from tickrig.host.motion.iis.running_information import RunningInformation
-from tickrig.host.motion.ports import arrived, to_pose_2d
+from tickrig.host.motion.ports import read_all, to_pose_2d
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
@@ -92,7 +91,7 @@ def test_a_path_is_driven_and_each_way_point_told() -> None:
     end = cart.run(14)
     assert end.distance(Pose(0.6, 0.5)) < 0.005
     told = [
-        (state.id[0], state.data.position.x, state.data.position.y) for state in arrived(states)
+        (state.id[0], state.data.position.x, state.data.position.y) for state in read_all(states)
     ]
     assert told == [(PASSED, 0, 0), (PASSED, 0.6, 0), (PASSED, 0.6, 0.5), (STOPPED, 0.6, 0.5)]
 
@@ -113,7 +112,7 @@ def test_a_cart_backs_up_where_the_speed_is_negative() -> None:
     )
     cart.feed("Path0.path", back)
     cart.run(2)
-    assert list(arrived(velocities))[-1].data.vx == pytest.approx(-0.2, abs=0.01)
+    assert list(read_all(velocities))[-1].data.vx == pytest.approx(-0.2, abs=0.01)
     end = cart.run(4)
     assert end.distance(Pose(-0.5)) < 0.005
     assert abs(end.heading) < 0.01
@@ -125,6 +124,6 @@ def test_running_information_is_told_every_10_ms() -> None:
     cart.run(4)
     velocities = cart.listen("Info0.velocity", iis.TimedVelocity2D)
     cart.run(0.5)
-    told = list(arrived(velocities))
+    told = list(read_all(velocities))
     assert len(told) == 50
     assert told[-1].data.vx == pytest.approx(0.3, abs=0.01)

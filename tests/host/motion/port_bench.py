@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Generic, TypeVar
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import arrived, to_pose, to_pose_2d
+from tickrig.host.motion.ports import read_all, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, Manager, OutPort, RtComponent
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.rtc_types import iis
@@ -58,7 +58,7 @@ class PortBench(Generic[R]):
 
     def taken(self, name: str) -> list[Any]:
         """Return what an OutPort wrote since the last call."""
-        return list(arrived(self._ends[name]))
+        return list(read_all(self._ends[name]))
 
     def after(self, name: str, feed: str, *values: Struct) -> list[Any]:
         """Return what an OutPort writes in a period with these values at an InPort."""

@@ -4,7 +4,7 @@ from math import nan, pi
 
 from tests.host.motion.port_bench import PortBench
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.iis.goal_interface import GoalInterface
+from tickrig.host.motion.iis.interfaces import GoalInterface
 from tickrig.host.motion.ports import to_pose_2d
 from tickrig.wire.rtc_types import iis
 

@@ -5,8 +5,8 @@ from math import nan, pi
 import pytest
 
 from tests.host.motion.port_bench import at
-from tickrig.host.motion.iis.running_information import RunningInformation
-from tickrig.host.motion.ports import arrived
+from tickrig.host.motion.iis.interfaces import RunningInformation
+from tickrig.host.motion.ports import read_all
 from tickrig.host.rtc import InPort, Manager, OutPort, connect
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
@@ -33,7 +33,7 @@ class Bench:
     def run(self, duration_us: int = 20_000) -> list[iis.TimedVelocity2D]:
         self.now_us += duration_us
         self.manager.run_to(self.now_us)
-        return list(arrived(self.end))
+        return list(read_all(self.end))
 
 
 def test_a_velocity_leaves_every_10_ms() -> None:

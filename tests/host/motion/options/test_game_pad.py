@@ -8,10 +8,17 @@ import pytest
 
 from tests.host.motion.port_bench import PERIOD_US, PortBench
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.motion.options.evdev_pad import ABS_RX, ABS_X, ABS_Y, EV_ABS, Axes, EvdevPad
 from tickrig.host.motion.options.game_pad import GamePad, open_pad
-from tickrig.host.motion.options.keyboard_pad import KeyboardPad
-from tickrig.host.motion.options.pad import StickPosition
+from tickrig.host.motion.options.game_pad_devices import (
+    ABS_RX,
+    ABS_X,
+    ABS_Y,
+    EV_ABS,
+    Axes,
+    EvdevPad,
+    KeyboardPad,
+    StickPosition,
+)
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
 

@@ -26,7 +26,7 @@ class Bench(Chain):
             self.probes.tick(self.manager.now_us)
 
     def seen(self, since: int = 0) -> list[tuple[int, int]]:
-        seen, _ = self.probes.seen("ConsoleIn0.out", since)
+        seen, _ = self.probes.watch("ConsoleIn0.out", since)
         return [(one.number, one.value.data) for one in seen if isinstance(one.value, TimedLong)]
 
 
@@ -34,7 +34,7 @@ def test_what_an_outport_writes_is_seen_from_the_first_look_on() -> None:
     bench = Bench()
     bench.source.enter(1, 2, 3)
     bench.run(1)
-    assert bench.probes.seen("ConsoleIn0.out") == ((), 0)
+    assert bench.probes.watch("ConsoleIn0.out") == ((), 0)
     bench.run(2)
     assert bench.seen() == [(1, 2), (2, 3)]
     assert bench.seen(since=1) == [(2, 3)]
@@ -115,4 +115,4 @@ def test_a_value_that_cannot_be_injected_is_refused(name: str, error: str) -> No
 
 def test_values_of_an_inport_are_not_shown() -> None:
     with pytest.raises(RtcRefused, match="is a DataInPort; values are shown of a DataOutPort"):
-        Bench().probes.seen("ConsoleOut0.in")
+        Bench().probes.watch("ConsoleOut0.in")

@@ -1,4 +1,4 @@
-"""The running information interface of IIS: how a robot moves, every 10 ms or more often."""
+"""The goal interface of IIS in front of RH3's planner, and its running information."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from math import cos, sin
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.host.motion.ports import arrived, to_pose
+from tickrig.host.motion.iis.adapters import with_wrapped_heading
+from tickrig.host.motion.ports import read_all, read_newest, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -53,7 +54,7 @@ class RunningInformation(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take new poses, write the velocity."""
-        for sample in arrived(self.position):
+        for sample in read_all(self.position):
             if (pose := to_pose(sample.data)) is not None:
                 self._take(sample.tm, pose)
                 self._seen_us = ec.now_us
@@ -73,3 +74,31 @@ class RunningInformation(RtComponent):
         dx, dy = (pose.x - before.x) / elapsed_s, (pose.y - before.y) / elapsed_s
         vx, vy = dx * cos(middle) + dy * sin(middle), dy * cos(middle) - dx * sin(middle)
         self._velocity = iis.TimedVelocity2D(tm, data=Velocity2D(vx, vy, turn / elapsed_s))
+
+
+class GoalInterface(RtComponent):
+    """Takes goals as IIS has them: the first pose counts, no pose clears the goal.
+
+    A new goal takes the place of the old one. A cleared goal becomes an empty path, so the
+    cart stops on the spot, as IIS recommends. A goal with a number that is none is passed
+    over. Join `position` with OmniTo2WD.goal and `min_path` with Navigation.min_path.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("GoalInterface", "IIS goals for RH3")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.goal = self.add_port(InPort("goal", iis.TimedPose2DSeq))
+        self.position = self.add_port(OutPort("position", iis.TimedPose2D))
+        self.min_path = self.add_port(OutPort("min_path", iis.TimedPath2DSeq))
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Pass the newest goal on."""
+        if (goal := read_newest(self.goal)) is None:
+            return ReturnCode.RTC_OK
+        now = Time.from_us(ec.now_us)
+        if not goal.data:
+            self.min_path.write(iis.TimedPath2DSeq(now))
+        elif (pose := with_wrapped_heading(iis.TimedPose2D(now, data=goal.data[0]))) is not None:
+            self.position.write(pose)
+        return ReturnCode.RTC_OK

@@ -1,13 +1,15 @@
-"""A game pad on Linux, through evdev (extra `gamepad`)."""
+"""What `GamePad` reads: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple, Protocol
 
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.motion.options.pad import StickPosition
+from tickrig.host.links.terminal import take_keys
 
 EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
@@ -16,6 +18,72 @@ ABS_RX: Final = 0x03
 """As in the kernel's input-event-codes: left stick across and along, right stick across."""
 
 Range = tuple[int, int]
+
+
+class StickPosition(NamedTuple):
+    """Where a hand pushes, each -1..1: forward, to the left, turning to the left."""
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+
+
+class GamePadDevice(Protocol):
+    """A device with sticks or keys; reading it does not wait."""
+
+    def poll(self, now_us: int, /) -> StickPosition:
+        """Return where the hand pushes now; LinkClosed if the device is gone."""
+        ...
+
+    def close(self) -> None:
+        """Give the device back."""
+
+
+GamePadOpener = Callable[[str], GamePadDevice]
+"""Opens the pad that DeviceFileName names; LinkClosed if it cannot."""
+
+
+KEYS: Final[Mapping[str, StickPosition]] = {
+    "w": StickPosition(forward=1.0),
+    "s": StickPosition(forward=-1.0),
+    "a": StickPosition(turn=1.0),
+    "d": StickPosition(turn=-1.0),
+    "q": StickPosition(left=1.0),
+    "e": StickPosition(left=-1.0),
+    " ": StickPosition(),
+}
+
+HOLD_US: Final = 300_000
+"""A key pushes so long after it came; terminals repeat it sooner than that."""
+
+
+class KeyboardPad:
+    """Reads keys of a terminal: w s forward and back, a d turn, q e sideways, space stop.
+
+    Args:
+        fd: of the terminal, standard input unless given.
+
+    Attributes:
+        close: lets the terminal be as it was.
+
+    Raises:
+        LinkClosed: it is no terminal.
+    """
+
+    def __init__(self, fd: int | None = None) -> None:
+        self._fd = sys.stdin.fileno() if fd is None else fd
+        try:
+            self.close = take_keys(self._fd)
+        except OSError as error:
+            raise LinkClosed(f"the keyboard is no terminal: {error.strerror}") from error
+        self._hand, self._until_us = StickPosition(), 0
+
+    def poll(self, now_us: int, /) -> StickPosition:
+        """Return where the latest key pushes."""
+        for key in os.read(self._fd, 256).decode("latin-1"):
+            if key in KEYS:
+                self._hand, self._until_us = KEYS[key], now_us + HOLD_US
+        return self._hand if now_us < self._until_us else StickPosition()
 
 
 @dataclass(slots=True)
