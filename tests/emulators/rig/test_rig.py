@@ -136,6 +136,7 @@ def test_time_without_work_passes_on_the_clock_and_on_the_bus() -> None:
     end.send(0, frames("123#"))
     rig.run_to(700)
     assert (clock.asked, heard, rig.now_us) == ([700], [45], 700)
+    assert wire.load_permille() == 1_000 * (45 + 3) // 700
 
 
 def test_what_happens_at_the_deadline_is_in_time() -> None:
