@@ -28,7 +28,7 @@ class StepError(ValueError):
     """Steps that cannot be carried out: `FILE:LINE: what came, what is allowed`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
 class Condition(Generic[Came]):
     """What must come, as it was written, and what decides."""
 
@@ -36,7 +36,7 @@ class Condition(Generic[Came]):
     matches: Callable[[Came], bool]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Step(Generic[What, Came]):
     """One step. What stands first here is done first; most steps say one of these alone.
 

@@ -8,18 +8,13 @@ from collections.abc import Iterable, Sequence
 from itertools import repeat
 from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    import can
-
-    from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec
-    from tickrig.host.cli.can_options import BusOptions
-    from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
+    from tickrig.host.monitor.frames.record import LineRecord
 
 QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""
@@ -163,37 +158,3 @@ class LiveSource(Generic[Item]):
 
 def _passes(chosen: CandumpFilter, one: Record | LineRecord) -> bool:
     return not isinstance(one, Record) or chosen.passes(flagged_id(one))
-
-
-def open_live(
-    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
-) -> tuple[LiveSource[AnyRecord], dict[str, can.BusABC]]:
-    """Open buses and serial ports.
-
-    Returns:
-        The source, and the buses by name, to send on.
-
-    Raises:
-        Refused: options that python-can does not know.
-        SourceFailed: a bus or port that cannot be opened.
-    """
-    opened: dict[str, can.BusABC] = {}
-    readers: list[Reader[AnyRecord]] = []
-    try:
-        for word in buses:
-            from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
-
-            bus, interface, name = bus_source.open_bus(bus_source.merged(word, options))
-            readers.append(bus_source.reader_of(bus, interface, name))
-            opened[name] = bus
-        for line in lines:
-            from tickrig.host.canmon.sources.line_source import LineReader  # noqa: PLC0415 - pyserial
-
-            readers.append(LineReader(line))
-    except BaseException as error:
-        for reader in readers:
-            reader.close()
-        if isinstance(error, LinkClosed):
-            raise SourceFailed(str(error)) from None
-        raise
-    return LiveSource(readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]), opened

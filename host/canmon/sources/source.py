@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import FileSource, StdinSource
 from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
+    import can
+
+    from tickrig.host.canmon.sources.live_source import LiveSource, Reader
     from tickrig.host.monitor.frames.record import AnyRecord
 
 Taken_co = TypeVar("Taken_co", covariant=True)
@@ -101,7 +106,7 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
-    return cast("Source", _open_live(buses or [BusSpec()], [], options))  # buses alone: frames
+    return cast("Source", open_live(buses or [BusSpec()], [], options)[0])  # buses alone: frames
 
 
 def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
@@ -113,15 +118,43 @@ def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
     buses = [word for word in parsed if isinstance(word, BusSpec)]
     if len(buses) + len(lines) < len(parsed):
         raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
-    return _open_live(buses, lines, options)
-
-
-def _open_live(
-    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
-) -> AnySource[AnyRecord]:
-    from tickrig.host.canmon.sources.live_source import open_live  # noqa: PLC0415 - threads
-
     return open_live(buses, lines, options)[0]
+
+
+def open_live(
+    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
+) -> tuple[LiveSource[AnyRecord], dict[str, can.BusABC]]:
+    """Open buses and serial ports.
+
+    Returns:
+        The source, and the buses by name, to send on.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: a bus or port that cannot be opened.
+    """
+    from tickrig.host.canmon.sources.live_source import LiveSource  # noqa: PLC0415 - threads
+
+    opened: dict[str, can.BusABC] = {}
+    readers: list[Reader[AnyRecord]] = []
+    try:
+        for word in buses:
+            from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
+
+            bus, interface, name = bus_source.open_bus(bus_source.merged(word, options))
+            readers.append(bus_source.reader_of(bus, interface, name))
+            opened[name] = bus
+        for line in lines:
+            from tickrig.host.canmon.sources.line_source import LineReader  # noqa: PLC0415 - pyserial
+
+            readers.append(LineReader(line))
+    except BaseException as error:
+        for reader in readers:
+            reader.close()
+        if isinstance(error, LinkClosed):
+            raise SourceFailed(str(error)) from None
+        raise
+    return LiveSource(readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]), opened
 
 
 def log_path(word: str) -> Path:

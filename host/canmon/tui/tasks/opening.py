@@ -9,8 +9,7 @@ from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
-from tickrig.host.canmon.sources.live_source import open_live
-from tickrig.host.canmon.sources.source import open_any
+from tickrig.host.canmon.sources.source import open_any, open_live
 from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec, parse_source
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
