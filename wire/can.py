@@ -46,7 +46,13 @@ class CanFrame(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> CanFrame:
-        """Read candump's compact notation: `ID#DATA`, `ID#R` with an optional length.
+        """Read candump's compact notation.
+
+        Args:
+            text: `ID#DATA`, or `ID#R` with an optional length; an ID of 8 digits is a 29-bit one.
+
+        Returns:
+            The frame.
 
         Raises:
             FramingError: not a frame in this notation.
@@ -66,7 +72,14 @@ class CanFrame(NamedTuple):
         return frame.checked()
 
     def checked(self) -> CanFrame:
-        """Return the frame; FieldError if it cannot be on a CAN bus."""
+        """Check the frame.
+
+        Returns:
+            The frame itself.
+
+        Raises:
+            FieldError: it cannot be on a CAN bus.
+        """
         most = EXTENDED_MAX if self.extended else STANDARD_MAX
         if not 0 <= self.can_id <= most:
             raise FieldError(f"CAN-ID 0x{self.can_id:X} is not {29 if self.extended else 11}-bit")

@@ -65,6 +65,9 @@ class CanWire(Copyable):
 
         Args:
             accepts: CAN-IDs that it receives, 29-bit ones with bit 29 set; None for all.
+
+        Returns:
+            The node's end, its port in a `Station`.
         """
         end = CanEnd(self, self._count, accepts)
         self._count += 1
@@ -79,14 +82,25 @@ class CanWire(Copyable):
         return min(self.bus.due_us, *(apart.due_us for apart in self._apart.values()))
 
     def advance(self, now_us: int) -> None:
-        """Let everything end that ends by `now_us`."""
+        """Let everything end that ends by a time.
+
+        Args:
+            now_us: the time.
+        """
         self.bus.advance(now_us)
         if self._apart:
             for apart in self._apart.values():
                 apart.advance(now_us)
 
     def advance_until_heard(self, until_us: int) -> bool:
-        """Let everything end up to the first frame that somebody heard; False if none was."""
+        """Let everything end up to the first frame that somebody heard.
+
+        Args:
+            until_us: no further than this.
+
+        Returns:
+            Whether there was one.
+        """
         if not self._apart:
             return self.bus.advance_until_heard(until_us)
         due_us = self.due_us
@@ -94,7 +108,14 @@ class CanWire(Copyable):
         return due_us <= until_us
 
     def load_permille(self, window_us: int = WINDOW_US) -> int:
-        """Return how busy the bus was in the latest time, in 0.1 %; at most a second is known."""
+        """Measure how busy the bus was.
+
+        Args:
+            window_us: in the latest time of this length; at most a second is known.
+
+        Returns:
+            The share of bits, in 0.1 %.
+        """
         bus = self.bus
         now = bus.now_us * bus.unit
         first = max(0, now - window_us * bus.unit)

@@ -80,7 +80,13 @@ def predefined(index: int, sub: int) -> tuple[int, bool] | None:
 
 
 def read_eds(path: Path) -> DeviceDescription:
-    """Read an EDS or DCF file.
+    """Read an EDS or DCF file (CiA 306).
+
+    Args:
+        path: the file; what its name ends with does not matter.
+
+    Returns:
+        What it says of the device; `make_dictionary()` of it is what `make_slave` takes.
 
     Raises:
         OSError: the file cannot be read.

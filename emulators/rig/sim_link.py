@@ -26,7 +26,14 @@ class SimLink:
         return self._rig.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Queue bytes on the line; where its buffer is full, time passes until they fit."""
+        """Queue bytes on the line; where its buffer is full, time passes until they fit.
+
+        Args:
+            traffic: the bytes.
+
+        Raises:
+            LinkClosed: the link was closed.
+        """
         self._check_open()
         while traffic:
             room = self._end.room(self.now_us)
@@ -36,7 +43,17 @@ class SimLink:
                 self._rig.run_for(1_000)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Step the rig until bytes have arrived."""
+        """Step the rig until bytes have arrived.
+
+        Args:
+            timeout_us: for how long at most; 0 only looks.
+
+        Returns:
+            The bytes, none if none came in time.
+
+        Raises:
+            LinkClosed: the link was closed.
+        """
         self._check_open()
         deadline_us = self.now_us + timeout_us
         while not (data := self._end.poll(self.now_us)) and self.now_us < deadline_us:

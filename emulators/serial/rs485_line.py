@@ -50,6 +50,9 @@ class Rs485Line(Copyable):
         ends: the stations' ends.
         collisions: pairs of bytes that overlapped.
 
+    Raises:
+        ValueError: a size below 1, or fewer than two ends.
+
     >>> line = Rs485Line(baud=115_200)
     >>> line.a.send(0, b"who?")
     >>> line.b.poll(10_000)
@@ -85,7 +88,16 @@ class Rs485Line(Copyable):
         return self.ends[1]
 
     def put(self, sender: Rs485End, start_us: int, data: bytes) -> int:
-        """Put bytes on the wires back to back; return when the last has passed."""
+        """Put bytes on the wires back to back; an end does so.
+
+        Args:
+            sender: the end.
+            start_us: when the first begins.
+            data: the bytes.
+
+        Returns:
+            When the last has passed, in us.
+        """
         end_us = start_us + self.after(len(data))
         burst = _Burst(sender, start_us, end_us, bytearray(data))
         self._air = [other for other in self._air if other.end_us > start_us]
@@ -99,11 +111,26 @@ class Rs485Line(Copyable):
         return end_us
 
     def after(self, count: int) -> int:
-        """Return how long so many bytes take."""
+        """Compute how long bytes take on the wires.
+
+        Args:
+            count: how many.
+
+        Returns:
+            The time in us, rounded up.
+        """
         return -(-count * self._byte_cost // self._baud)
 
     def passed(self, burst: _Burst, now_us: int) -> int:
-        """Return how many bytes of a burst a receiver can take."""
+        """Compute how many bytes of a burst a receiver can take.
+
+        Args:
+            burst: bytes sent back to back.
+            now_us: the present.
+
+        Returns:
+            Their number, those that it took already among them.
+        """
         if now_us >= burst.end_us:
             return len(burst.data)
         if self._bursts:
@@ -111,11 +138,26 @@ class Rs485Line(Copyable):
         return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
 
     def arrival_us(self, burst: _Burst, taken: int) -> int:
-        """Return when a receiver can take more of a burst than what it took."""
+        """Compute when a receiver can take more of a burst.
+
+        Args:
+            burst: bytes sent back to back.
+            taken: how many of them it took.
+
+        Returns:
+            The time in us.
+        """
         return burst.end_us if self._bursts else burst.start_us + self.after(taken + 1)
 
     def unsent(self, duration_us: int) -> int:
-        """Return how many bytes are still to be sent for so long."""
+        """Compute how many bytes are still to be sent.
+
+        Args:
+            duration_us: how long their sender is busy with them.
+
+        Returns:
+            Their number, rounded up.
+        """
         return -(-max(0, duration_us) * self._baud // self._byte_cost)
 
     def _collide(self, burst: _Burst, other: _Burst) -> None:

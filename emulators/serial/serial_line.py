@@ -20,6 +20,13 @@ class SerialLine(Copyable):
         frame_bits: bits of a byte on the line, 10 for 8N1.
         buffer_bytes: size of each sender's and each receiver's buffer.
 
+    Attributes:
+        a: one end, such as the device's.
+        b: the other end, such as the host's.
+
+    Raises:
+        ValueError: an argument below 1.
+
     >>> line = SerialLine(baud=115_200)
     >>> line.a.send(0, b"OK:beep")
     >>> line.b.poll(100), line.b.poll(10_000)

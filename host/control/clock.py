@@ -20,7 +20,14 @@ class RealClock:
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, t_us: int, /) -> int:
-        """Sleep until `t_us`; a late rig catches up, it never skips a tick."""
+        """Sleep until a time; a late rig catches up, it never skips a tick.
+
+        Args:
+            t_us: time since the first wait.
+
+        Returns:
+            By how much it was late, in us.
+        """
         if self._start_ns is None:
             self._start_ns = time.monotonic_ns()
         early_us = t_us - self.now_us

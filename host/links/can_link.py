@@ -120,6 +120,9 @@ class CanLink:
             interface: python-can's name of the adapter's kind, as `socketcan`.
             bit_rate: bits a second, where the interface sets it.
 
+        Returns:
+            A link that has the bus alone; close it.
+
         Raises:
             LinkClosed: the bus cannot be opened.
         """
@@ -135,7 +138,14 @@ class CanLink:
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: Frames, /) -> None:
-        """Send frames; raises LinkClosed if the bus is gone or takes none for 1 s."""
+        """Send frames.
+
+        Args:
+            traffic: the frames, the first one first.
+
+        Raises:
+            LinkClosed: the bus is gone, or took none for 1 s.
+        """
         for frame in traffic:
             try:
                 self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_S)
@@ -145,11 +155,30 @@ class CanLink:
                 self.lost += 1
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Wait for a first frame, then return all that are there."""
+        """Wait for a first frame, then take all that are there.
+
+        Args:
+            timeout_us: how long to wait; 0 only looks.
+
+        Returns:
+            The frames, none if none came in time.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all that had arrived by then.
+        """Wait for a first frame, then take all that are there, with their times.
+
+        Args:
+            timeout_us: how long to wait; 0 only looks.
+
+        Returns:
+            A time, and the frames that had arrived by then, each with its own time.
+
+        Raises:
+            LinkClosed: the bus is gone.
 
         The time is of before the last look: a process that is stopped behind it knows
         itself late, and takes nobody for silent.

@@ -24,6 +24,10 @@ class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the lin
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
     """The device answered, and refused.
 
+    Args:
+        message: what people read.
+        code: what the device gave as its reason.
+
     Attributes:
         code: what the device gave as its reason, in its own notation.
     """

@@ -55,14 +55,31 @@ class SerialLink:
         return time.monotonic_ns() // 1_000
 
     def send(self, traffic: bytes, /) -> None:
-        """Write bytes; LinkClosed if the port is gone or takes none for 1 s."""
+        """Write bytes.
+
+        Args:
+            traffic: the bytes.
+
+        Raises:
+            LinkClosed: the port is gone, or takes none for 1 s.
+        """
         try:
             self._port.write(traffic)
         except (serial.SerialException, OSError, TypeError) as error:
             raise LinkClosed(f"cannot write to {self._url!r}: {error}") from error
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Wait for a first byte, then return all that are there."""
+        """Wait for a first byte, then take all that are there.
+
+        Args:
+            timeout_us: how long to wait; 0 only looks.
+
+        Returns:
+            The bytes, none if none came in time.
+
+        Raises:
+            LinkClosed: the port is gone.
+        """
         try:
             first = self._wait_for_byte(timeout_us)
             return first + self._port.read(self._port.in_waiting) if first else b""

@@ -76,7 +76,18 @@ class RrcClient:
 
     @classmethod
     def open(cls, url: str) -> Self:
-        """Open a device path or pyserial URL and start; see `SerialLink` and `start`."""
+        """Open a port and start to talk.
+
+        Args:
+            url: a device path or pyserial URL, as `SerialLink` takes it.
+
+        Returns:
+            A client that has started; close it, or use it in a `with` block.
+
+        Raises:
+            LinkClosed: the port cannot be opened.
+            LinkTimeout: no RRC answers.
+        """
         client = cls(SerialLink(url))
         try:
             client.start()
@@ -149,7 +160,10 @@ class RrcClient:
         return self._inbox.latest_status
 
     def resume(self) -> None:
-        """Send again after RrcStopped."""
+        """Send again after RrcStopped.
+
+        Refusals are counted from zero.
+        """
         self._channel.resume()
 
     def command(self, command: Command, *, confirm: bool | None = None) -> str:
@@ -178,22 +192,50 @@ class RrcClient:
         return ""
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass, and take in what comes; 0 only takes in what is there."""
+        """Let time pass, and take in what comes.
+
+        Args:
+            duration_us: for how long; 0 only takes in what is there.
+
+        Raises:
+            LinkClosed: the line is gone.
+        """
         until_us = self._link.now_us + duration_us
         self._channel.step(until_us)
         while self._link.now_us < until_us:
             self._channel.step(until_us)
 
     def events(self, timeout_us: int) -> Iterator[Arrival[Event]]:
-        """Give events, the oldest untaken one first; end when none came for `timeout_us`."""
+        """Take events, the oldest untaken one first.
+
+        Args:
+            timeout_us: how long to wait for each; then the iteration ends.
+
+        Yields:
+            Events, with the time at which they arrived.
+        """
         return self._drain(self._inbox.events, timeout_us)
 
     def statuses(self, timeout_us: int) -> Iterator[Arrival[StatusA]]:
-        """Give status lines, the oldest untaken one first; end when none came for `timeout_us`."""
+        """Take status lines, the oldest untaken one first.
+
+        Args:
+            timeout_us: how long to wait for each; then the iteration ends.
+
+        Yields:
+            Status lines, with the time at which they arrived.
+        """
         return self._drain(self._inbox.statuses, timeout_us)
 
     def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
         """Take events up to the first of this kind; one that came before the call counts.
+
+        Args:
+            kind: which event.
+            timeout_us: how long to wait for it.
+
+        Returns:
+            The event, with the time at which it arrived.
 
         Raises:
             LinkTimeout: it did not come; the other events stay untaken.
@@ -219,7 +261,18 @@ class RrcClient:
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Let the stick drive, within limits; see `commands.Limit`."""
+        """Let the stick drive, within limits (command `limit`).
+
+        Args:
+            v_pct: most translation, 0..100 %.
+            w_pct: most rotation, 0..100 %.
+            sum_pct: most of `|v| + |w|`, 0..255 %.
+            product_pct: most of `|v| * |w| / 100`, 0..255 %.
+            radius_pct: most of the root of v² + w², 0..255 %.
+
+        Raises:
+            RrcRefused: VR2 is off.
+        """
         self.command(cmd.Limit(v_pct, w_pct, sum_pct, product_pct, radius_pct))
 
     def output(self, v_pct: int, w_pct: int, *, confirm: bool | None = None) -> None:
@@ -246,26 +299,49 @@ class RrcClient:
         return self.command(cmd.Date())
 
     def speedmode(self, mode: int, *, locked: bool = False) -> None:
-        """Choose the speed mode, 1 (slowest) to 5, and whether its buttons are locked."""
+        """Choose the speed mode.
+
+        Args:
+            mode: 1 (slowest) to 5.
+            locked: whether the buttons of the stick that change it are locked.
+        """
         self.command(cmd.SpeedMode(mode, int(locked)))
 
     def joystick(self, shape: cmd.Joystick) -> None:
-        """Shape the stick; the ten parameters are named in `commands.Joystick`."""
+        """Shape the stick.
+
+        Args:
+            shape: the ten parameters of the command, by name.
+        """
         self.command(shape)
 
     def watchdog(self, time_us: int) -> None:
-        """Stop VR2 after this time without a command, 0..2_550_000 us; 0 is off.
+        """Let the RRC stop VR2 when no command came for a time.
 
         From then on the client renews it in each of its calls.
+
+        Args:
+            time_us: 0..2_550_000 us, a multiple of 10_000 us; 0 is off.
+
+        Raises:
+            ValueError: another time.
         """
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
-        """Want CHECK on each line, which the client appends, and no OK lines."""
+        """Want CHECK on each line, which the client appends, and no OK lines.
+
+        Args:
+            on: False ends it.
+        """
         self.command(cmd.StableMode(int(on)))
 
     def status(self, *, on: bool = True) -> None:
-        """Switch the stream of status lines, one each 10 ms while VR2 is on."""
+        """Switch the stream of status lines, one each 10 ms while VR2 is on.
+
+        Args:
+            on: False ends it.
+        """
         self.command(cmd.Status(int(on)))
 
     def poweroff(self) -> None:
@@ -273,7 +349,15 @@ class RrcClient:
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:
-        """Sound the buzzer: on, off, on, ... up to ten times of 0..2_550_000 us."""
+        """Sound the buzzer.
+
+        Args:
+            times_us: for how long it is on, off, on, ...: up to ten times of 0..2_550_000 us,
+                multiples of 10_000 us.
+
+        Raises:
+            ValueError: another time.
+        """
         times = tuple(_units(time_us) for time_us in times_us)
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
@@ -282,6 +366,10 @@ class RrcClient:
 
         The manual advises it for every change between limit and output. The
         first output is confirmed. Choose the speed mode again afterwards.
+
+        Args:
+            v_pct: translation, -100..100 %, forward positive.
+            w_pct: rotation, -100..100 %, right positive.
         """
         changes = self._slow_down_before(cmd.Output)
         self.output(v_pct, w_pct, confirm=changes or None)
@@ -294,7 +382,10 @@ class RrcClient:
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Send `limit`, and before it the slowest speed mode if the host drove until now."""
+        """Send `limit`, and before it the slowest speed mode if the host drove until now.
+
+        Its arguments are those of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
+        """
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)
 

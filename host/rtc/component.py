@@ -17,7 +17,15 @@ P = TypeVar("P", bound=AnyPort)
 
 @dataclass(frozen=True, slots=True)
 class ModuleSpec:
-    """What is the same for all components of a class (OpenRTM-aist 1.x, module profile)."""
+    """What is the same for all components of a class (OpenRTM-aist 1.x, module profile).
+
+    Attributes:
+        type_name: of the class, such as `ConsoleIn`.
+        description: in a line.
+        version: of the class.
+        vendor: who made it.
+        category: what it is for, such as `sensor`.
+    """
 
     type_name: str
     description: str = ""
@@ -76,7 +84,17 @@ class RtComponent(ComponentAction):
         )
 
     def add_port(self, port: P) -> P:
-        """Add a port and return it; RtcRefused if one has its name."""
+        """Add a port.
+
+        Args:
+            port: a data port or service port.
+
+        Returns:
+            The port itself.
+
+        Raises:
+            RtcRefused: one has its name.
+        """
         if port.name in self.ports:
             raise RtcRefused(f"{self.instance_name} has a port {port.name!r} already")
         port.owner = self.instance_name
@@ -90,7 +108,14 @@ class RtComponent(ComponentAction):
         port.owner = ""
 
     def own(self, context: ExecutionContext) -> ReturnCode:
-        """Take part in an execution context that ends with this component."""
+        """Take part in an execution context that ends with this component.
+
+        Args:
+            context: the execution context.
+
+        Returns:
+            What `ExecutionContext.add_component` says.
+        """
         code = context.add_component(self)
         if code is ReturnCode.RTC_OK:
             self.own_contexts.append(context)

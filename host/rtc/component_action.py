@@ -36,55 +36,56 @@ def guarded(
 class ComponentAction:
     """What a component does, one method a callback; each does nothing until overridden.
 
-    A callback returns RTC_OK or what went wrong. An exception is logged and
-    counts as RTC_ERROR. No callback waits: time passes between them. It reads
-    the time from its execution context.
+    A callback returns RTC_OK or what went wrong: then Error comes next, but where its
+    docstring says otherwise. An exception is logged and counts as RTC_ERROR. No callback
+    waits: time passes between them. Its argument `ec` is the execution context that runs it;
+    the time is `ec.now_us`.
     """
 
     def on_initialize(self) -> ReturnCode:
-        """Created to alive; with another code than RTC_OK it stays Created."""
+        """Begin; it stays Created if this returns another code than RTC_OK."""
         return OK
 
     def on_finalize(self) -> ReturnCode:
-        """The end, whatever is returned."""
+        """End, whatever this returns."""
         return OK
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
-        """The execution context was started."""
+        """Take the start of the execution context `ec`."""
         return OK
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
-        """The execution context was stopped."""
+        """Take the stop of the execution context `ec`."""
         return OK
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """The execution context has another rate."""
+        """Take another rate of the execution context `ec`."""
         return OK
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Inactive to Active."""
+        """Become Active in `ec`."""
         return OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Active is left, for Inactive or for Error."""
+        """Leave Active in `ec`, for Inactive or for Error."""
         return OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Once a period in Active, the first pass."""
+        """Work, once a period of `ec` in Active: the first pass."""
         return OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
-        """Once a period in Active, after on_execute of every component of the context."""
+        """Work, once a period in Active, after on_execute of every component of `ec`."""
         return OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
-        """Error is entered."""
+        """Enter Error in `ec`; what this returns is ignored."""
         return OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
-        """Once a period in Error."""
+        """Work, once a period of `ec` in Error; what this returns is ignored."""
         return OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
-        """A reset was asked for in Error; RTC_OK leads to Inactive."""
+        """Leave Error in `ec`, if this returns RTC_OK: for Inactive."""
         return OK

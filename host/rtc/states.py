@@ -6,7 +6,16 @@ from enum import IntEnum
 
 
 class ReturnCode(IntEnum):
-    """What an operation or a callback returns (ReturnCode_t)."""
+    """What an operation or a callback returns (ReturnCode_t).
+
+    Attributes:
+        RTC_OK: it was done.
+        RTC_ERROR: it went wrong.
+        BAD_PARAMETER: an argument is not possible.
+        UNSUPPORTED: there is no such operation here.
+        OUT_OF_RESOURCES: there is no more room.
+        PRECONDITION_NOT_MET: not in this state.
+    """
 
     RTC_OK = 0
     RTC_ERROR = 1

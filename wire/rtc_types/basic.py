@@ -28,14 +28,26 @@ _ZERO: Final[Any] = None  # the metaclass puts that of the type in its place
 
 
 class Time(Struct):
-    """A time stamp in seconds and nanoseconds."""
+    """A time stamp in seconds and nanoseconds.
+
+    Attributes:
+        sec: whole seconds.
+        nsec: the rest in nanoseconds.
+    """
 
     sec: ULong = 0
     nsec: ULong = 0
 
     @classmethod
     def from_us(cls, now_us: int) -> Time:
-        """Return the time stamp of a time in microseconds."""
+        """Make a time stamp.
+
+        Args:
+            now_us: a time in microseconds.
+
+        Returns:
+            The same in seconds and nanoseconds.
+        """
         return cls(now_us // _US, now_us % _US * 1_000)
 
     @property

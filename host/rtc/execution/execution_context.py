@@ -58,7 +58,11 @@ class ExecutionContext:
         return tuple(participant.component for participant in self._participants)
 
     def tick(self, now_us: int) -> None:
-        """Go on to `now_us`, and run a period if one is due."""
+        """Go on, and run a period if one is due.
+
+        Args:
+            now_us: the present.
+        """
         self.now_us = now_us
         if now_us < self.due_us:
             return
@@ -105,6 +109,9 @@ class ExecutionContext:
     def set_rate(self, rate_hz: float) -> ReturnCode:
         """Change the rate, with on_rate_changed of every participant.
 
+        Args:
+            rate_hz: periods a second.
+
         Returns:
             BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz.
         """
@@ -119,6 +126,9 @@ class ExecutionContext:
     def add_component(self, component: RtComponent) -> ReturnCode:
         """Let a component take part, Inactive, after all that do.
 
+        Args:
+            component: which.
+
         Returns:
             PRECONDITION_NOT_MET if it takes part already.
         """
@@ -130,6 +140,9 @@ class ExecutionContext:
 
     def remove_component(self, component: RtComponent) -> ReturnCode:
         """Let a component take part no more.
+
+        Args:
+            component: which.
 
         Returns:
             BAD_PARAMETER if it does not take part, PRECONDITION_NOT_MET while it is Active.
@@ -145,6 +158,9 @@ class ExecutionContext:
     def release_component(self, component: RtComponent) -> ReturnCode:
         """Let a component take part no more, with on_deactivated at once if it is Active.
 
+        Args:
+            component: which.
+
         Returns:
             BAD_PARAMETER if it does not take part.
         """
@@ -157,6 +173,9 @@ class ExecutionContext:
     def activate_component(self, component: RtComponent) -> ReturnCode:
         """Ask for Inactive to Active.
 
+        Args:
+            component: which.
+
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
             unless it is Inactive.
@@ -166,6 +185,9 @@ class ExecutionContext:
     def deactivate_component(self, component: RtComponent) -> ReturnCode:
         """Ask for Active to Inactive.
 
+        Args:
+            component: which.
+
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
             unless it is Active and not on its way to Error.
@@ -174,6 +196,9 @@ class ExecutionContext:
 
     def reset_component(self, component: RtComponent) -> ReturnCode:
         """Ask for Error to Inactive.
+
+        Args:
+            component: which.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
@@ -185,6 +210,9 @@ class ExecutionContext:
         """Ask for Error, from Inactive or Active; for a proxy whose device went there.
 
         Not in OMG RTC, where only a callback that fails leads to Error.
+
+        Args:
+            component: which.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET

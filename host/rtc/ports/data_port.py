@@ -47,6 +47,9 @@ class OutPort(DataPort[T]):
     Args:
         name: without that of its component, such as `out`.
         data_type: the struct it carries, such as `TimedLong`; InPorts of the same one fit.
+
+    Attributes:
+        data_type: the struct it carries.
     """
 
     port_type = "DataOutPort"
@@ -83,6 +86,9 @@ class InPort(DataPort[T]):
     Args:
         name: without that of its component, such as `in`.
         data_type: the struct it carries, such as `TimedLong`; OutPorts of the same one fit.
+
+    Attributes:
+        data_type: the struct it carries.
     """
 
     port_type = "DataInPort"

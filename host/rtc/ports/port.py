@@ -101,6 +101,8 @@ class Port(Generic[C]):
         name: without that of its component.
 
     Attributes:
+        name: without that of its component.
+        port_type: how OpenRTM calls its class, such as `DataInPort`.
         owner: instance name of its component, empty without one.
         connectors: in the order in which they were made.
         on_connect: called with its profile after a connector was made.
@@ -117,7 +119,7 @@ class Port(Generic[C]):
 
     @property
     def full_name(self) -> str:
-        """Its name in profiles: `ConsoleIn0.out`."""
+        """Its name in profiles, such as `ConsoleIn0.out`."""
         return f"{self.owner}.{self.name}" if self.owner else self.name
 
     @property
@@ -128,7 +130,14 @@ class Port(Generic[C]):
         return PortProfile(self.full_name, self._interfaces(), connectors, properties)
 
     def connector_to(self, other: AnyPort) -> C | None:
-        """Return the connector that joins it with another port, if there is one."""
+        """Look for the connector that joins it with another port.
+
+        Args:
+            other: the other port.
+
+        Returns:
+            The connector, None if there is none.
+        """
         shared = (own for own in self.connectors if own in other.connectors)
         return next(shared, None) if other is not self else None
 

@@ -86,7 +86,7 @@ class Manager(Schedule):
 
     @property
     def types(self) -> tuple[str, ...]:
-        """Names of the types that can be created: registered ones, then those installed."""
+        """Names of the types that can be created, registered ones before those installed."""
         return tuple(dict.fromkeys((*self._factories, *self._installed)))
 
     @property
@@ -108,7 +108,11 @@ class Manager(Schedule):
         return tuple(profiles.values())
 
     def register(self, kind: type[RtComponent]) -> None:
-        """Let components of a class be created."""
+        """Let components of a class be created by `create`.
+
+        Args:
+            kind: the class, under the type name of its `spec`.
+        """
         self._factories[kind.spec.type_name] = kind
 
     def create(
@@ -126,6 +130,9 @@ class Manager(Schedule):
             rate_hz: of its own execution context.
             context: an execution context to take part in, in place of an own one.
 
+        Returns:
+            The component.
+
         Raises:
             RtcRefused: no such type, one that cannot be loaded, and what `add` refuses.
         """
@@ -140,6 +147,14 @@ class Manager(Schedule):
         context: ExecutionContext | None = None,
     ) -> R:
         """Initialize a component, name it, and start its execution context.
+
+        Args:
+            component: a component of your own.
+            rate_hz: of its own execution context, 1 uHz to 1 MHz.
+            context: an execution context to take part in, in place of an own one.
+
+        Returns:
+            The component itself.
 
         Raises:
             RtcRefused: its name is taken, or on_initialize failed.
@@ -164,6 +179,9 @@ class Manager(Schedule):
     def delete(self, name: str) -> None:
         """End a component; asked for in a callback, at the end of the tick.
 
+        Args:
+            name: its instance name or path.
+
         Raises:
             RtcRefused: no such component.
         """
@@ -171,7 +189,17 @@ class Manager(Schedule):
         self.defer(lambda: self._end(component))
 
     def find(self, name: str) -> RtComponent:
-        """Return a component by its instance name or its path; RtcRefused if there is none."""
+        """Look a component up.
+
+        Args:
+            name: its instance name or path, as `ConsoleIn0` or `localhost/ConsoleIn0.rtc`.
+
+        Returns:
+            The component.
+
+        Raises:
+            RtcRefused: there is none of that name.
+        """
         if "/" in name:
             return self.names.resolve(name)
         if (component := self._components.get(name)) is None:
@@ -180,7 +208,13 @@ class Manager(Schedule):
         return component
 
     def port(self, name: str) -> AnyPort:
-        """Return a port by its full name or path: `ConsoleIn0.out`, `localhost/ConsoleIn0.rtc:out`.
+        """Look a port up.
+
+        Args:
+            name: its full name or path, as `ConsoleIn0.out` or `localhost/ConsoleIn0.rtc:out`.
+
+        Returns:
+            The port.
 
         Raises:
             RtcRefused: no such component or port.
@@ -195,55 +229,132 @@ class Manager(Schedule):
     def connect(
         self, first: str, second: str, properties: Properties | None = None, *, name: str = ""
     ) -> ConnectorProfile:
-        """Join two ports by their names; see `connect.connect` and `port`."""
+        """Join two ports.
+
+        Args:
+            first: the name of one, as `port` takes it.
+            second: the name of the other.
+            properties: what is to hold for the connector, such as
+                `{"dataport.subscription_type": "new"}`; the rest is as OpenRTM has it.
+            name: of the connector, for people.
+
+        Returns:
+            The connector as it was made.
+
+        Raises:
+            RtcRefused: no such port, ports that do not fit, or properties that cannot be.
+        """
         connector = connect(self.port(first), self.port(second), properties, name=name)
         if isinstance(connector, Connector):
             self.add_connector(connector)
         return connector.profile
 
     def disconnect(self, first: str, second: str) -> None:
-        """End the connector between two ports; RtcRefused if there is none."""
+        """End the connector between two ports.
+
+        Args:
+            first: the name of one, as `port` takes it.
+            second: the name of the other.
+
+        Raises:
+            RtcRefused: no such port, or they are not connected.
+        """
         connector = self.port(first).connector_to(self.port(second))
         if connector is None:
             raise RtcRefused(f"{first} and {second} are not connected")
         connector.end()
 
     def context_of(self, name: str) -> ExecutionContext:
-        """Return the first execution context of a component; RtcRefused if it has none."""
+        """Look up the first execution context of a component.
+
+        Args:
+            name: the component's instance name or path.
+
+        Returns:
+            The execution context.
+
+        Raises:
+            RtcRefused: no such component, or it takes part in none.
+        """
         if not (contexts := self.find(name).contexts):
             raise RtcRefused(f"{name} takes part in no execution context")
         return contexts[0]
 
     def state_of(self, name: str) -> LifeCycleState:
-        """Return the state of a component in its first execution context."""
+        """Look at the state of a component in its first execution context.
+
+        Args:
+            name: the component's instance name or path.
+
+        Returns:
+            The state.
+
+        Raises:
+            RtcRefused: no such component, or it takes part in no execution context.
+        """
         return self.context_of(name).state_of(self.find(name))
 
     def activate(self, *names: str) -> None:
-        """Ask for Active; RtcRefused for the first one whose context refuses."""
+        """Ask for Active.
+
+        Args:
+            names: of the components, asked for one after the other.
+
+        Raises:
+            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+        """
         for name in names:
             code = self.context_of(name).activate_component(self.find(name))
             self._demand(code, name, "activate")
 
     def deactivate(self, *names: str) -> None:
-        """Ask for Inactive; RtcRefused for the first one whose context refuses."""
+        """Ask for Inactive.
+
+        Args:
+            names: of the components, asked for one after the other.
+
+        Raises:
+            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+        """
         for name in names:
             code = self.context_of(name).deactivate_component(self.find(name))
             self._demand(code, name, "deactivate")
 
     def reset(self, *names: str) -> None:
-        """Ask for Error to Inactive; RtcRefused for the first one whose context refuses."""
+        """Ask for Error to Inactive.
+
+        Args:
+            names: of the components, asked for one after the other.
+
+        Raises:
+            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+        """
         for name in names:
             code = self.context_of(name).reset_component(self.find(name))
             self._demand(code, name, "reset")
 
     def free_name(self, type_name: str) -> str:
-        """Return the type name with the lowest number that is free: `ConsoleIn0`."""
+        """Find an instance name that is free.
+
+        Args:
+            type_name: what it begins with.
+
+        Returns:
+            The type name with the lowest number that is free, such as `ConsoleIn0`.
+        """
         return next(
             name for number in count() if (name := f"{type_name}{number}") not in self._components
         )
 
     def path(self, name: str) -> str:
-        """Return the path of a component in the name service."""
+        """Tell the path of a component in the name service.
+
+        Args:
+            name: its instance name.
+
+        Returns:
+            The path, such as `localhost/ConsoleIn0.rtc`.
+        """
         return f"{self._host}/{name}.rtc"
 
     @cached_property

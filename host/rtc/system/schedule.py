@@ -53,7 +53,10 @@ class Schedule:
         return max(due_us, self.now_us)
 
     def tick(self, now_us: int) -> None:
-        """Go on to `now_us`, and run what is due.
+        """Go on, and run what is due.
+
+        Args:
+            now_us: the present; never less than before.
 
         Who skips a `due_us` skips its periods: each execution context runs one at most.
         """
@@ -69,7 +72,11 @@ class Schedule:
             self._deferred.pop(0)()
 
     def run_to(self, t_us: int) -> None:
-        """Run all that is due up to and at `t_us`, without waiting."""
+        """Run all that is due up to and at a time, without waiting.
+
+        Args:
+            t_us: the time.
+        """
         while (due_us := self.due_us) <= t_us:
             self.tick(due_us)
             if due_us == t_us:
@@ -77,11 +84,19 @@ class Schedule:
         self.tick(t_us)
 
     def run_for(self, duration_us: int) -> None:
-        """Run what is due in the next `duration_us`."""
+        """Run what is due in the time that follows, without waiting.
+
+        Args:
+            duration_us: for how long.
+        """
         self.run_to(self.now_us + duration_us)
 
     def defer(self, action: Callable[[], None]) -> None:
-        """Do something at once, or at the end of the tick if one is running."""
+        """Do something at once, or at the end of the tick if one is running.
+
+        Args:
+            action: what is done.
+        """
         if self._ticking:
             self._deferred.append(action)
         else:
@@ -98,11 +113,15 @@ class Schedule:
         self._contexts.remove(context)
 
     def add_item(self, item: ScheduledItem) -> None:
-        """Tick something else, too, from now on."""
+        """Tick something else, too, from now on.
+
+        Args:
+            item: what has a time at which it is due, and a `tick`.
+        """
         self._items += (item,)
 
     def remove_item(self, item: ScheduledItem) -> None:
-        """Tick it no more."""
+        """Tick an item no more; one that is not ticked is no error."""
         self._items = tuple(other for other in self._items if other is not item)
 
     def add_connector(self, connector: Connector[Any]) -> None:
