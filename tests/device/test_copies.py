@@ -23,7 +23,6 @@ from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
-from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import Input, Output
@@ -69,11 +68,9 @@ MACHINES: Final[dict[str, Callable[[], object]]] = {
     "omni body": OmniBody,
     "CANopen slave": slave,
     "CiA 402 drive": lambda: make_slave(make_dictionary({DRIVE}), 5, application=Ds402),
-    "EPOS": lambda: make_slave(epos.dictionary(), 5, application=epos.make),
-    "f-palette": lambda: make_slave(f_palette.dictionary(), 5, application=f_palette.make),
-    "motor core unit": lambda: make_slave(
-        motor_core_unit.dictionary(), 5, application=MotorCoreUnit
-    ),
+    "EPOS": lambda: epos.make_epos(5),
+    "f-palette": lambda: f_palette.make_f_palette(5),
+    "motor core unit": lambda: motor_core_unit.make_motor_core_unit(5),
     "DeviceRTC": lambda: make_device_rtc(CanopenEcho, 5),
     "application": lambda: Application.of(slave()),
 }

@@ -69,7 +69,7 @@ def run(seconds: float) -> None:
     def turn() -> None:
         wire = CanWire()
         stations = [
-            Station(make_slave(dictionary(), number, application=epos.make), wire.end())
+            Station(make_slave(dictionary(), number, application=epos.make_application), wire.end())
             for number in range(1, DRIVES + 1)
         ]
         rigs.append(stations)

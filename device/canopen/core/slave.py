@@ -23,7 +23,9 @@ UNCONFIGURED: Final = 0xFF
 
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 
-_can_id = itemgetter(0)
+_priority = itemgetter(0)
+"""Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as out of the
+mailboxes of a CAN controller; on the wire `emulators/can/arbitration.py` decides."""
 
 ServiceMaker = Callable[["CanopenSlave", int], Service]
 
@@ -33,7 +35,8 @@ class CanopenSlave(Copyable):
 
     Frames of a tick are handled in the order in which they came over the wire.
     Then services act in the order in which they are listed: SYNC, RPDO, SDO,
-    application, TPDO, EMCY, heartbeat. Frames of one tick leave sorted by CAN-ID.
+    application, TPDO, EMCY, heartbeat. The frames of one tick leave sorted by priority, that
+    is by CAN-ID; those of one CAN-ID keep their order.
 
     Not emulated: the time that a real slave's processor needs.
 
@@ -135,7 +138,7 @@ class CanopenSlave(Copyable):
         if now_us < self.silent_until_us:
             return ()
         if len(out) > 1:
-            out.sort(key=_can_id)
+            out.sort(key=_priority)
         return tuple(out)
 
     def send(self, can_id: int, data: bytes) -> None:

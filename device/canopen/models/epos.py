@@ -7,9 +7,11 @@ has the same; docs/epos.md says what is ours.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds402.actual_values import MEASURES, Measure, statusword_of
 from tickrig.device.canopen.ds402.drive import Ds402
@@ -17,6 +19,7 @@ from tickrig.device.canopen.ds402.modes import maxon, modes
 from tickrig.device.canopen.ds402.modes.mode import Mode
 from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
 from tickrig.device.canopen.ds402.state.supervision import Bounds
+from tickrig.device.canopen.stack import make_slave
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.datatypes import DataType
@@ -99,8 +102,29 @@ class Epos(Ds402):
     more_targets = maxon.SETTINGS
 
 
+def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) -> CanopenSlave:
+    """Make a positioning drive like Maxon's EPOS 24/5, at a wheel of beego.
+
+    Args:
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+
+    Returns:
+        A slave that boots in its first tick.
+
+    Raises:
+        ValueError: an impossible node-ID.
+    """
+    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+
+
 def dictionary() -> Dictionary:
-    """Make the object dictionary."""
+    """Return the objects with default values, for one slave; their description is shared."""
+    return _template().copy()
+
+
+@cache
+def _template() -> Dictionary:
     objects = ObjectTable()
     add_communication(objects, PROFILE)
     _add_setting_values(objects)
@@ -115,7 +139,7 @@ def dictionary() -> Dictionary:
     return Dictionary(objects, objects.objects)
 
 
-def make(node: CanopenSlave, slot: int) -> Epos:
+def make_application(node: CanopenSlave, slot: int) -> Epos:
     """Make the application, for `make_slave`."""
     return Epos(node, slot, Servo(EPOS_WHEEL))
 

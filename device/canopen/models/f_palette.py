@@ -5,11 +5,14 @@ Its documents are lost; channels, node-ID and converter are decision K22 of the 
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Converter, Ds401
+from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.communication_profile import (
     CommunicationProfile,
@@ -48,8 +51,29 @@ PROFILE: Final = CommunicationProfile(
 )
 
 
+def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) -> CanopenSlave:
+    """Make the I/O module f-palette-CANopen.
+
+    Args:
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+
+    Returns:
+        A slave that boots in its first tick.
+
+    Raises:
+        ValueError: an impossible node-ID.
+    """
+    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+
+
 def dictionary() -> Dictionary:
-    """Make the object dictionary."""
+    """Return the objects with default values, for one slave; their description is shared."""
+    return _template().copy()
+
+
+@cache
+def _template() -> Dictionary:
     objects = ObjectTable()
     add_communication(objects, PROFILE)
     _add_digital(objects)
@@ -57,7 +81,7 @@ def dictionary() -> Dictionary:
     return Dictionary(objects, objects.objects)
 
 
-def make(node: CanopenSlave, slot: int) -> Ds401:
+def make_application(node: CanopenSlave, slot: int) -> Ds401:
     """Make the application, for `make_slave`."""
     return Ds401(node, slot, inputs=(ADC,) * ANALOGUE_INPUTS)
 

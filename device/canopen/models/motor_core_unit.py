@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.communication_profile import (
     OFF,
@@ -45,12 +49,35 @@ PROFILE: Final = CommunicationProfile(
     tpdos=[Pdo(OFF | 0x180), Pdo(0x280, _channels(0x6401)), Pdo(OFF | 0x380), Pdo(OFF | 0x480)],
 )
 
-make: Final = MotorCoreUnit
+make_application: Final = MotorCoreUnit
 """What the unit does with its objects."""
 
 
+def make_motor_core_unit(
+    node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None
+) -> CanopenSlave:
+    """Make a motor core unit with its motor.
+
+    Args:
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+
+    Returns:
+        A slave that boots in its first tick.
+
+    Raises:
+        ValueError: an impossible node-ID.
+    """
+    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+
+
 def dictionary() -> Dictionary:
-    """Make the objects with their defaults."""
+    """Return the objects with default values, for one slave; their description is shared."""
+    return _template().copy()
+
+
+@cache
+def _template() -> Dictionary:
     objects = ObjectTable()
     add_communication(objects, PROFILE)
     objects.variable(0x2000, "Mode", U8, RW, high=3)

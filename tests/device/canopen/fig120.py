@@ -10,7 +10,6 @@ from tests.emulators.can.can_bench import Log
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import f_palette, motor_core_unit
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
@@ -41,9 +40,7 @@ class Seen(NamedTuple):
 
 
 def make_motor() -> CanopenSlave:
-    return make_slave(
-        motor_core_unit.dictionary(), motor_core_unit.NODE_ID, application=motor_core_unit.make
-    )
+    return motor_core_unit.make_motor_core_unit(motor_core_unit.NODE_ID)
 
 
 class Demo:
@@ -54,7 +51,7 @@ class Demo:
     """
 
     def __init__(self, *, dense: bool = False) -> None:
-        palette = make_slave(f_palette.dictionary(), f_palette.NODE_ID, application=f_palette.make)
+        palette = f_palette.make_f_palette(f_palette.NODE_ID)
         self.wire, self.slave = CanWire(), make_motor()
         self.log, self.master = Log(self.wire), self.wire.end()
         self.palette, self.motor = Application.of(palette), Application.of(self.slave)

@@ -74,7 +74,7 @@ def test_an_rpdo_of_a_copy_writes_the_copy(copied: Callable[[CanopenSlave], Cano
 def test_a_copy_of_a_drive_that_moves_moves_on(
     copied: Callable[[CanopenSlave], CanopenSlave],
 ) -> None:
-    slave = make_slave(epos.dictionary(), 5, application=epos.make)
+    slave = epos.make_epos(5)
     now_us = 0
     script = ("000#0105", "205#060000000000", "205#070000000000", "205#0F0000000000")
     for frame in (*script, "205#1F0010270000"):

@@ -10,7 +10,6 @@ from canopen.profiles.p402 import BaseNode402
 
 from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
@@ -24,7 +23,7 @@ class Bench:
 
     def __init__(self) -> None:
         wire = CanWire()
-        self.slave = make_slave(epos.dictionary(), RIGHT_WHEEL, application=epos.make)
+        self.slave = epos.make_epos(RIGHT_WHEEL)
         self.emulated = epos.Epos.of(self.slave)
         self.rig = Rig(Station(self.slave, wire.end()))
         self.network = SimNetwork(self.rig, wire.end())

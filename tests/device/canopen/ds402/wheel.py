@@ -39,7 +39,7 @@ def make_lenient(node: CanopenSlave, slot: int) -> Lenient:
 
 
 class Wheel(Bus):
-    def __init__(self, application: ServiceMaker = epos.make) -> None:
+    def __init__(self, application: ServiceMaker = epos.make_application) -> None:
         plain, access = epos.dictionary(), Access.READ | Access.WRITE
         end_velocity = EntryDescription(0x6082, 0, "End velocity", DataType.UNSIGNED32, access)
         dictionary = Dictionary([*plain.description, end_velocity], plain.objects)

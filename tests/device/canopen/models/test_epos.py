@@ -5,7 +5,6 @@ import pytest
 from tests.device.canopen.ds402.wheel import Wheel
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.object_table import RO, ROT, RW, RWW
 
@@ -41,7 +40,7 @@ def test_an_object_is_as_the_table_says(index: int, sub: int, access: object, va
 
 @pytest.mark.parametrize("node_id", [1, 2])
 def test_a_wheel_of_beego_has_the_pdos_of_k21(node_id: int) -> None:
-    slave = make_slave(epos.dictionary(), node_id, application=epos.make)
+    slave = epos.make_epos(node_id)
     slave.tick(1_000, ())
     slave.tick(2_000, (CanFrame.parse("000#0100"),))
     velocity = CanFrame(0x200 + node_id, bytes.fromhex("060058020000"))

@@ -64,7 +64,7 @@ class Palette(Bus):
     """A palette after boot."""
 
     def __init__(self) -> None:
-        make = f_palette.make
+        make = f_palette.make_application
         slave = make_slave(f_palette.dictionary(), f_palette.NODE_ID, application=make)
         super().__init__(slave)
         assert self.step() == ["710#00"]

@@ -22,7 +22,7 @@ class UnitBench(Bus):
     """
 
     def __init__(self) -> None:
-        application = motor_core_unit.make
+        application = motor_core_unit.make_application
         node_id = motor_core_unit.NODE_ID
         super().__init__(make_slave(motor_core_unit.dictionary(), node_id, application=application))
         self.unit = MotorCoreUnit.of(self.slave)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
@@ -53,7 +52,7 @@ class RigSession(Session):
 
     def __init__(self, *, eds: bool = True, bit_rate: int | None = None) -> None:
         wire = CanWire()
-        slave = make_slave(epos.dictionary(), NODE, application=epos.make)
+        slave = epos.make_epos(NODE)
         self.drive = epos.Epos.of(slave)
         self._host = host = CanHost(Rig(Station(slave, wire.end())), wire.end())
         self.frames: list[str] = []

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from tests.host.canmon.tui.rig_session import EPOS, NODE
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
@@ -31,7 +30,7 @@ def until(session: Session, done: Callable[[], bool]) -> None:
 
 def test_tasks_reach_our_drive_over_an_interface_of_python_can() -> None:
     wire = CanWire()
-    rig = Rig(Station(make_slave(epos.dictionary(), NODE, application=epos.make), wire.end()))
+    rig = Rig(Station(epos.make_epos(NODE), wire.end()))
     with CHANNELS.offer("desk", rig, wire):
         session = open_session(
             ["sim:desk"], BusOptions(), Model({NODE: read_eds_objects(EPOS, NODE)})

@@ -3,7 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
@@ -22,7 +21,7 @@ START = EXAMPLES / "sequences/start_drive.toml"
 def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
     """Carry out a sequence on our drive, in virtual time."""
     wire = CanWire()
-    slave = make_slave(epos.dictionary(), 5, application=epos.make)
+    slave = epos.make_epos(5)
     drive = epos.Epos.of(slave)
     host = CanHost(Rig(Station(slave, wire.end())), wire.end())
     watch = Watch({5: read_eds_objects(EXAMPLES / "eds/epos.eds", 5)})

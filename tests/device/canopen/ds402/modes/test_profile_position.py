@@ -36,7 +36,7 @@ def wheel() -> Wheel:
     return make_wheel()
 
 
-def make_wheel(application: ServiceMaker = epos.make) -> Wheel:
+def make_wheel(application: ServiceMaker = epos.make_application) -> Wheel:
     wheel = Wheel(application)
     wheel.write(0x6081, VELOCITY)
     wheel.write(0x6083, ACCELERATION)
