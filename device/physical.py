@@ -24,7 +24,7 @@ class SignalType(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Input(Immutable):
+class InputSignal(Immutable):
     """A physical input.
 
     Attributes:
@@ -49,7 +49,7 @@ class Input(Immutable):
 
 
 @dataclass(frozen=True, slots=True)
-class Output(Immutable):
+class OutputSignal(Immutable):
     """A physical output: what an observer would see on the device."""
 
     name: str
@@ -76,11 +76,11 @@ class QuantityBank:
 
     def __init__(
         self,
-        table: Iterable[Input] = (),
+        table: Iterable[InputSignal] = (),
         groups: Mapping[str, tuple[str, ...]] | None = None,
         on_change: Callable[[], None] | None = None,
     ) -> None:
-        self.table: Mapping[str, Input] = {item.name: item for item in table}
+        self.table: Mapping[str, InputSignal] = {item.name: item for item in table}
         self.groups: Mapping[str, tuple[str, ...]] = dict(groups or {})
         self._values = {name: item.initial for name, item in self.table.items()}
         self._on_change, self.changed = on_change, True
@@ -117,7 +117,7 @@ class QuantityBank:
         """Return the names of all inputs of a type."""
         return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
-    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
         """Return the description of an input.
 
         Raises:

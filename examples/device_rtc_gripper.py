@@ -6,9 +6,9 @@ NMT Start activates it; while its motor is hot it ends in Error.
 
 from __future__ import annotations
 
+from tickrig import InputSignal
 from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result  # internal
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort  # internal
-from tickrig.device.physical import Input  # internal
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT  # internal
 
 STEP_UM, HOT_DC = 500, 900
@@ -19,7 +19,7 @@ class Gripper(CanopenComponent):
 
     type_name = "Gripper"
     category = "actuator"
-    physical = (Input("motor_dc", "at the motor", low=-400, high=1_250, unit="0.1 degC"),)
+    physical = (InputSignal("motor_dc", "at the motor", low=-400, high=1_250, unit="0.1 degC"),)
     target_um = CanopenInPort("target_um", SHORT)
     width_um = CanopenOutPort("width_um", SHORT)
     moving = CanopenOutPort("moving", BOOLEAN)

@@ -6,7 +6,7 @@ temperature each period, and ends in Error while the sensor is broken.
 
 from __future__ import annotations
 
-from tickrig.device.physical import Input, SignalType  # internal
+from tickrig import InputSignal, SignalType
 from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result  # internal
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort  # internal
 from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT  # internal
@@ -17,8 +17,8 @@ class Thermometer(LiteComponent):
 
     type_name = "Thermometer"
     physical = (
-        Input("temperature_dc", "at the sensor", low=-400, high=1_250, unit="0.1 degC"),
-        Input("sensor_broken", "the cable of the sensor is cut", SignalType.FAULT),
+        InputSignal("temperature_dc", "at the sensor", low=-400, high=1_250, unit="0.1 degC"),
+        InputSignal("sensor_broken", "the cable of the sensor is cut", SignalType.FAULT),
     )
     limit = LiteInPort("limit", FLOAT)
     celsius = LiteOutPort("celsius", FLOAT)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from tickrig.device.modbus.slave import ModbusSlave
-from tickrig.device.physical import Output, QuantityBank
+from tickrig.device.physical import OutputSignal, QuantityBank
 from tickrig.device.rh3.driver import Driver
 from tickrig.device.rh3.ground import Ground
 from tickrig.device.rh3.look import READ, Look
@@ -67,7 +67,7 @@ class Rh3Base(Copyable):
         return due_us
 
     @property
-    def outputs(self) -> Mapping[str, Output]:
+    def outputs(self) -> Mapping[str, OutputSignal]:
         """What `read` knows."""
         return _OUTPUTS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.physical import InputBank, Output
+from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.controller import chosen_mode, look_at_buttons
@@ -81,7 +81,7 @@ class Rrc(Copyable):
         return 0 if self.inputs.changed else self._due_us
 
     @property
-    def outputs(self) -> dict[str, Output]:
+    def outputs(self) -> dict[str, OutputSignal]:
         """What `read` knows."""
         return OUTPUTS
 

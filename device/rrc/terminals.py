@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.device.physical import Input, InputBank, Output, SignalType
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.wire.rrc.replies import RrcEvent
 
 BUTTON: Final = SignalType.BUTTON
 FAULT: Final = SignalType.FAULT
 
 INPUTS: Final = (
-    Input("rrc_power", "supply of the RRC, from the VR2 battery or USB", initial=1),
-    Input("power_button", "power button of the controller", BUTTON),
-    Input("alarm_button", "alarm button of the controller", BUTTON),
-    Input("speed_up_button", "speed mode up, on the controller", BUTTON),
-    Input("speed_down_button", "speed mode down, on the controller", BUTTON),
-    Input("stick_v_pct", "stick, forward is positive", low=-100, high=100, unit="%"),
-    Input("stick_w_pct", "stick, right is positive", low=-100, high=100, unit="%"),
-    Input("gauge", "voltage gauge of the battery", low=1, high=10, initial=10),
-    Input("extra_load_pct", "work of the RRC beside its own, per period", high=1_000, unit="%"),
-    Input("bus_noise", "noise on the VR2 bus", FAULT),
-    Input("joystick_fault", "the joystick module says nonsense", FAULT),
-    Input("power_module_fault", "the power module says nonsense", FAULT),
-    Input("vr2_fault", "VR2 has an error of its own, as a motor without its cable", FAULT),
-    Input("bus_unplugged", "a connector of the VR2 bus is out", FAULT),
+    InputSignal("rrc_power", "supply of the RRC, from the VR2 battery or USB", initial=1),
+    InputSignal("power_button", "power button of the controller", BUTTON),
+    InputSignal("alarm_button", "alarm button of the controller", BUTTON),
+    InputSignal("speed_up_button", "speed mode up, on the controller", BUTTON),
+    InputSignal("speed_down_button", "speed mode down, on the controller", BUTTON),
+    InputSignal("stick_v_pct", "stick, forward is positive", low=-100, high=100, unit="%"),
+    InputSignal("stick_w_pct", "stick, right is positive", low=-100, high=100, unit="%"),
+    InputSignal("gauge", "voltage gauge of the battery", low=1, high=10, initial=10),
+    InputSignal(
+        "extra_load_pct", "work of the RRC beside its own, per period", high=1_000, unit="%"
+    ),
+    InputSignal("bus_noise", "noise on the VR2 bus", FAULT),
+    InputSignal("joystick_fault", "the joystick module says nonsense", FAULT),
+    InputSignal("power_module_fault", "the power module says nonsense", FAULT),
+    InputSignal("vr2_fault", "VR2 has an error of its own, as a motor without its cable", FAULT),
+    InputSignal("bus_unplugged", "a connector of the VR2 bus is out", FAULT),
 )
 
 RUNNING_FAULTS: Final = {
@@ -47,16 +49,18 @@ POWER_ON_FAULTS: Final = {
 OUTPUTS: Final = {
     output.name: output
     for output in (
-        Output("state", "state of the RRC"),
-        Output("vr2_power", "1 while VR2 runs"),
-        Output("error_led", "1 while the controller's LED blinks an error"),
-        Output("stick_drives", "1 while the stick drives, 0 while it waits or the host drives"),
-        Output("out_v_pct", "translation to the power module", "%"),
-        Output("out_w_pct", "rotation to the power module", "%"),
-        Output("speed_mode", "speed mode of VR2, 1 to 5"),
-        Output("gear", "imitated gear: N, F or R"),
-        Output("buzzer", "1 while the RRC's buzzer sounds"),
-        Output("backlog_pct", "work that the RRC is behind, in per cent of a period", "%"),
+        OutputSignal("state", "state of the RRC"),
+        OutputSignal("vr2_power", "1 while VR2 runs"),
+        OutputSignal("error_led", "1 while the controller's LED blinks an error"),
+        OutputSignal(
+            "stick_drives", "1 while the stick drives, 0 while it waits or the host drives"
+        ),
+        OutputSignal("out_v_pct", "translation to the power module", "%"),
+        OutputSignal("out_w_pct", "rotation to the power module", "%"),
+        OutputSignal("speed_mode", "speed mode of VR2, 1 to 5"),
+        OutputSignal("gear", "imitated gear: N, F or R"),
+        OutputSignal("buzzer", "1 while the RRC's buzzer sounds"),
+        OutputSignal("backlog_pct", "work that the RRC is behind, in per cent of a period", "%"),
     )
 }
 

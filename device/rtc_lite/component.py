@@ -8,7 +8,7 @@ from copy import copy
 from typing import Any, ClassVar, Final
 
 from tickrig.device.declared import declared
-from tickrig.device.physical import Input, InputBank
+from tickrig.device.physical import InputBank, InputSignal
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort, LitePort
 from tickrig.device.twin import Copyable
 from tickrig.wire.errors import FieldError
@@ -54,7 +54,7 @@ class LiteComponent(Copyable):
     """
 
     type_name: ClassVar[str] = ""
-    physical: ClassVar[tuple[Input, ...]] = ()
+    physical: ClassVar[tuple[InputSignal, ...]] = ()
 
     def __init__(self) -> None:
         self.inputs = InputBank(self.physical)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.physical import InputBank, Output
+from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
@@ -86,7 +86,7 @@ class RtcLiteNode(Copyable):
         return self._life.component
 
     @property
-    def outputs(self) -> dict[str, Output]:
+    def outputs(self) -> dict[str, OutputSignal]:
         """What `read` knows."""
         return output_table(self.component)
 

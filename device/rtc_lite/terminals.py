@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from tickrig.device.physical import Input, InputBank, Output, SignalType
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.ports import LitePort
 
 INPUTS: Final = (
-    Input("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
-    Input("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
-    Input("slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT),
+    InputSignal("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
+    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+    InputSignal(
+        "slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT
+    ),
 )
 """Every node has these; a component may add its own."""
 
 OUTPUTS: Final = (
-    Output("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
-    Output("callback", "the callback that ran last"),
-    Output("executed", "how often on_execute ran"),
-    Output("dropped_bytes", "bytes that found the receive buffer full"),
+    OutputSignal("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
+    OutputSignal("callback", "the callback that ran last"),
+    OutputSignal("executed", "how often on_execute ran"),
+    OutputSignal("dropped_bytes", "bytes that found the receive buffer full"),
 )
 """Every node has these; each port adds its value."""
 
@@ -42,11 +44,17 @@ def new_inputs(component: LiteComponent) -> InputBank:
     return InputBank((*INPUTS, *component.physical))
 
 
-def output_table(component: LiteComponent) -> dict[str, Output]:
+def output_table(component: LiteComponent) -> dict[str, OutputSignal]:
     """Return the outputs of a node: its own, and the ports as `in.NAME` and `out.NAME`."""
     ports = [
-        *(Output(f"in.{name.decode()}", "value of this in-port") for name in component.in_ports),
-        *(Output(f"out.{name.decode()}", "value of this out-port") for name in component.out_ports),
+        *(
+            OutputSignal(f"in.{name.decode()}", "value of this in-port")
+            for name in component.in_ports
+        ),
+        *(
+            OutputSignal(f"out.{name.decode()}", "value of this out-port")
+            for name in component.out_ports
+        ),
     ]
     return {output.name: output for output in (*OUTPUTS, *ports)}
 

@@ -7,7 +7,7 @@ from math import inf
 from typing import Final
 
 from tickrig.device.body.pose import Pose
-from tickrig.device.physical import Output, QuantityBank
+from tickrig.device.physical import OutputSignal, QuantityBank
 from tickrig.device.twin import Copyable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.scip_server import ScipServer
@@ -56,7 +56,7 @@ class Urg(Copyable):
         return self._server.due_us
 
     @property
-    def outputs(self) -> Mapping[str, Output]:
+    def outputs(self) -> Mapping[str, OutputSignal]:
         """What `read` knows."""
         return _OUTPUTS
 

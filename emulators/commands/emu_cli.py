@@ -15,7 +15,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
-    from tickrig.device.physical import Input
+    from tickrig.device.physical import InputSignal
     from tickrig.emulators.commands.device_type import DeviceType
 
 OURS: Final = {
@@ -80,7 +80,7 @@ def device_command(device_type: DeviceType) -> click.Command:
     return command
 
 
-def _inputs(device_type: DeviceType) -> Iterable[Input]:
+def _inputs(device_type: DeviceType) -> Iterable[InputSignal]:
     return device_type.build({}).inputs.table.values()
 
 

@@ -46,18 +46,15 @@ how it is built, connected and shown.
 DEVICE: Final = '''\
 """The machine: time and bytes in, bytes out; it reads no clock and does no I/O."""
 
-from tickrig.device.physical import Input, InputBank, Output, SignalType
-from tickrig.device.twin import Copyable
-from tickrig.wire.instant import NEVER
-from tickrig.wire.lines import LineSplitter
+from tickrig import NEVER, Copyable, InputBank, InputSignal, LineSplitter, OutputSignal, SignalType
 
 INPUTS = (
-    Input("button", "a button: it says so when it is pressed", SignalType.BUTTON),
-    Input("no_power", "its supply is cut", SignalType.FAULT),
+    InputSignal("button", "a button: it says so when it is pressed", SignalType.BUTTON),
+    InputSignal("no_power", "its supply is cut", SignalType.FAULT),
 )
 OUTPUTS = {
-    "state": Output("state", "On or Off"),
-    "lines": Output("lines", "lines heard since it was switched on"),
+    "state": OutputSignal("state", "On or Off"),
+    "lines": OutputSignal("lines", "lines heard since it was switched on"),
 }
 
 
@@ -108,17 +105,18 @@ class $cls(Copyable):
 DEVICE_TYPE: Final = '''\
 """How tickrig builds, connects and shows it; the entry point in pyproject.toml names DEVICE."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import click
-from tickrig.emulators.commands.device_type import DeviceType
-from tickrig.emulators.record.trace import Config
-from tickrig.emulators.serial.emulator import LineSettings
+from tickrig import DeviceType, LineSettings
 
 from $module.device import $cls
 
 
-def build(config: Config) -> $cls:
+def build(config: Mapping[str, Any]) -> $cls:
     """Make a device of the options below, from a command line or a trace."""
-    return $cls(str(config.get("greeting", "ready")))
+    return $cls(**config)
 
 
 DEVICE = DeviceType(

@@ -11,7 +11,7 @@ from tickrig.host.cli.options import PATH, Decorator, add_options, version_optio
 from tickrig.host.cli.start import load, loading
 
 if TYPE_CHECKING:
-    from tickrig.device.physical import Input
+    from tickrig.device.physical import InputSignal
 
 Faults = Callable[[click.Context], Iterable[str]]
 """Gives the faults of a device as the command line has it so far."""
@@ -46,7 +46,7 @@ def run_options(wire_faults: str, device_faults: Faults) -> Decorator:
     )
 
 
-def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[Input]]) -> Decorator:
+def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSignal]]) -> Decorator:
     """Return a decorator that adds the options of a device on a serial line, and --version.
 
     Args:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from tickrig.device.physical import Output
+from tickrig.device.physical import OutputSignal
 from tickrig.device.twin import NonCopyable, itself
 from tickrig.emulators.record.trace import RESET, Header, Mark, Record
 from tickrig.emulators.rig.emulated import Emulated, Inputs
@@ -101,7 +101,7 @@ class TracedDevice:
         return self._device.inputs
 
     @property
-    def outputs(self) -> Mapping[str, Output]:
+    def outputs(self) -> Mapping[str, OutputSignal]:
         """The device's outputs."""
         return self._device.outputs
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from tickrig.device.core import Device, W
-from tickrig.device.physical import Input, Output, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.host.text.values import Setting
 
 
@@ -20,7 +20,7 @@ class Inputs(Protocol):
     changed: bool
 
     @property
-    def table(self) -> Mapping[str, Input]:
+    def table(self) -> Mapping[str, InputSignal]:
         """All inputs, in order of declaration."""
         ...
 
@@ -44,7 +44,7 @@ class Inputs(Protocol):
         """Return the names of all inputs of a type."""
         ...
 
-    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
         """Return the description of an input; ValueError if there is none of this type."""
         ...
 
@@ -63,7 +63,7 @@ class HasSignals(Protocol):
         ...
 
     @property
-    def outputs(self) -> Mapping[str, Output]:
+    def outputs(self) -> Mapping[str, OutputSignal]:
         """What the world sees of the device."""
         ...
 

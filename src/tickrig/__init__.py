@@ -7,31 +7,44 @@ __version__ = "0.1.0"
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.device.core import Device as Device
+    from tickrig.device.physical import InputBank as InputBank
+    from tickrig.device.physical import InputSignal as InputSignal
+    from tickrig.device.physical import OutputSignal as OutputSignal
+    from tickrig.device.physical import SignalType as SignalType
+    from tickrig.device.twin import Copyable as Copyable
     from tickrig.emulators.can.wire import CanWire as CanWire
     from tickrig.emulators.canopen.eds import read_eds as read_eds
+    from tickrig.emulators.commands.device_type import DeviceType as DeviceType
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.rig import Rig as Rig
     from tickrig.emulators.rig.rig import Station as Station
     from tickrig.emulators.rig.sim_link import SimLink as SimLink
+    from tickrig.emulators.serial.emulator import LineSettings as LineSettings
     from tickrig.emulators.serial.rs485_line import Rs485Line as Rs485Line
     from tickrig.emulators.serial.serial_line import SerialLine as SerialLine
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
+    from tickrig.wire.lines import LineSplitter as LineSplitter
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
             "tickrig.device.core": ("Device",),
+            "tickrig.device.physical": ("InputBank", "InputSignal", "OutputSignal", "SignalType"),
+            "tickrig.device.twin": ("Copyable",),
             "tickrig.emulators.can.wire": ("CanWire",),
             "tickrig.emulators.canopen.eds": ("read_eds",),
+            "tickrig.emulators.commands.device_type": ("DeviceType",),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
             "tickrig.emulators.rig.rig": ("Rig", "Station"),
             "tickrig.emulators.rig.sim_link": ("SimLink",),
+            "tickrig.emulators.serial.emulator": ("LineSettings",),
             "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
             "tickrig.emulators.serial.serial_line": ("SerialLine",),
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),
+            "tickrig.wire.lines": ("LineSplitter",),
         },
     )

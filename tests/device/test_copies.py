@@ -25,7 +25,7 @@ from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.modbus.slave import ModbusSlave
-from tickrig.device.physical import Input, Output
+from tickrig.device.physical import InputSignal, OutputSignal
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.config import RrcConfig
@@ -138,7 +138,7 @@ def test_every_type_of_machine_is_copied_or_refuses() -> None:
 FROZEN: Final = (
     *(RrcConfig(), LiteConfig(), UrgParameters(), BaseParameters(), WHEELS, OmniParameters()),
     *(World(posts=(Post(1, 0, 0.2),)), room(4, 3), Pose(1, 2, 3), EPOS_WHEEL),
-    *(Input("lamp", "lamp"), Output("state", "state"), CanFrame.parse("123#00")),
+    *(InputSignal("lamp", "lamp"), OutputSignal("state", "state"), CanFrame.parse("123#00")),
 )
 
 

@@ -2,12 +2,14 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.physical import Input, InputBank, SignalType
+from tickrig.device.physical import InputBank, InputSignal, SignalType
 
 
 def bank() -> InputBank:
-    level = Input("level_v", "a level", low=-5, high=5, unit="V", initial=1)
-    return InputBank([level, Input("key", "a key", SignalType.BUTTON), Input("gauge", "", high=9)])
+    level = InputSignal("level_v", "a level", low=-5, high=5, unit="V", initial=1)
+    return InputBank(
+        [level, InputSignal("key", "a key", SignalType.BUTTON), InputSignal("gauge", "", high=9)]
+    )
 
 
 def test_an_input_begins_at_its_initial_value() -> None:

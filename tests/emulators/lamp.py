@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from tickrig.device.physical import Input, InputBank, Output, SignalType
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.wire.instant import NEVER
 
-OUTPUTS = {"state": Output("state", "Lit or Dark"), "count": Output("count", "bytes heard", "B")}
+OUTPUTS = {
+    "state": OutputSignal("state", "Lit or Dark"),
+    "count": OutputSignal("count", "bytes heard", "B"),
+}
 
 
 class Lamp:
@@ -14,11 +17,11 @@ class Lamp:
     def __init__(self, greeting: bytes = b"hi\n") -> None:
         self.inputs = InputBank(
             (
-                Input("lamp", "lamp", initial=1),
-                Input("key", "key", SignalType.BUTTON),
-                Input("x_mm", "x", low=-10, high=10, unit="mm"),
-                Input("y_mm", "y", low=-10, high=10, unit="mm"),
-                Input("dead", "broken", SignalType.FAULT),
+                InputSignal("lamp", "lamp", initial=1),
+                InputSignal("key", "key", SignalType.BUTTON),
+                InputSignal("x_mm", "x", low=-10, high=10, unit="mm"),
+                InputSignal("y_mm", "y", low=-10, high=10, unit="mm"),
+                InputSignal("dead", "broken", SignalType.FAULT),
             ),
             {"place": ("x_mm", "y_mm")},
         )

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 import click
 
-from tickrig.device.physical import Input, InputBank, Output, SignalType
-from tickrig.device.twin import Copyable
-from tickrig.emulators.commands.device_type import DeviceType
-from tickrig.emulators.record.trace import Config
-from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.wire.instant import NEVER
-from tickrig.wire.lines import LineSplitter
+from tickrig import (
+    NEVER,
+    Copyable,
+    DeviceType,
+    InputBank,
+    InputSignal,
+    LineSettings,
+    LineSplitter,
+    OutputSignal,
+    SignalType,
+)
 
 ROOM_C: Final = 20
 BOILING_C: Final = 100
 INPUTS: Final = (
-    Input("lid_open", "the lid is open: it stops heating", SignalType.BUTTON),
-    Input("water_ml", "water in it", high=1_500, unit="ml", initial=1_000),
-    Input("sensor_broken", "the wire of the thermometer is cut", SignalType.FAULT),
+    InputSignal("lid_open", "the lid is open: it stops heating", SignalType.BUTTON),
+    InputSignal("water_ml", "water in it", high=1_500, unit="ml", initial=1_000),
+    InputSignal("sensor_broken", "the wire of the thermometer is cut", SignalType.FAULT),
 )
 OUTPUTS: Final = {
-    "state": Output("state", "Cold, Heating or Boiling"),
-    "temperature_c": Output("temperature_c", "of the water", "degC"),
+    "state": OutputSignal("state", "Cold, Heating or Boiling"),
+    "temperature_c": OutputSignal("temperature_c", "of the water", "degC"),
 }
 
 
@@ -99,12 +103,12 @@ class Kettle(Copyable):
         return {"state": hot if self._degree_us == NEVER else "Heating"}[name]
 
 
-def _build(config: Config) -> Kettle:
-    return Kettle(int(config.get("power_w") or 2_000))
+def _build(config: Mapping[str, Any]) -> Kettle:
+    return Kettle(**config)
 
 
-def _is_event(line: WireLine) -> bool:
-    return line.data == b"boils"
+def _ask(text: bytes) -> bytes:
+    return text + b"?\n"
 
 
 DEVICE: Final = DeviceType(
@@ -114,6 +118,6 @@ DEVICE: Final = DeviceType(
     build=_build,
     options=(click.Option(["--power-w"], type=int, default=2_000, help="Of its heater.  [2000]"),),
     line=LineSettings(baud=9_600),
-    encoders={"ask": lambda text: text + b"?\n"},
-    is_event=_is_event,
+    encoders={"ask": _ask},
+    is_event=lambda line: line.data == b"boils",
 )

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Input, Output, QuantityBank
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank
 from tickrig.wire.instant import NEVER
 
 
@@ -27,14 +27,14 @@ class Application(Service):
         outputs: what the world sees of it; `read` gives the values.
     """
 
-    outputs: Mapping[str, Output] = MappingProxyType({})
+    outputs: Mapping[str, OutputSignal] = MappingProxyType({})
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.inputs = QuantityBank()
 
     def has_inputs(
-        self, table: Iterable[Input], groups: Mapping[str, tuple[str, ...]] | None = None
+        self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None
     ) -> None:
         """Give it physical inputs; setting one asks for `on_execute`."""
         self.inputs = QuantityBank(table, groups, self.request)

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Final
 
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort, CanopenPort
 from tickrig.device.declared import declared
-from tickrig.device.physical import Input, QuantityBank
 from tickrig.device.twin import Copyable
+from tickrig.device.physical import InputSignal, QuantityBank
 from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
@@ -74,7 +74,7 @@ class CanopenComponent(Copyable):
     rate_hz: ClassVar[int] = 100
     product_code: ClassVar[int] = 0
     strict_cia301: ClassVar[bool] = False
-    physical: ClassVar[tuple[Input, ...]] = ()
+    physical: ClassVar[tuple[InputSignal, ...]] = ()
 
     def __init__(self) -> None:
         self.inputs = QuantityBank(self.physical)

@@ -7,12 +7,12 @@ from typing import Final
 
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
-from tickrig.device.physical import Input, Output, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 
 SHUT_DOWN: Final = "shut_down"
 
 INPUTS: Final = (
-    Input(
+    InputSignal(
         SHUT_DOWN,
         "button: the component ends, and the node is silent until a power cut",
         SignalType.BUTTON,
@@ -21,14 +21,14 @@ INPUTS: Final = (
 """Every DeviceRTC has these; a component may add its own."""
 
 OUTPUTS: Final = (
-    Output("rtc_state", "Created, Inactive, Active, Error or Finalized"),
-    Output("callback", "the callback that ran last"),
-    Output("executed", "how often on_execute ran"),
+    OutputSignal("rtc_state", "Created, Inactive, Active, Error or Finalized"),
+    OutputSignal("callback", "the callback that ran last"),
+    OutputSignal("executed", "how often on_execute ran"),
 )
 """Every DeviceRTC has these; each port adds its value as in.NAME or out.NAME."""
 
 
-def inputs_of(kind: type[CanopenComponent]) -> tuple[Input, ...]:
+def inputs_of(kind: type[CanopenComponent]) -> tuple[InputSignal, ...]:
     """Return the physical inputs of a component; ValueError if two have the same name."""
     table = (*INPUTS, *kind.physical)
     name, count = Counter(item.name for item in table).most_common(1)[0]
@@ -37,10 +37,12 @@ def inputs_of(kind: type[CanopenComponent]) -> tuple[Input, ...]:
     return table
 
 
-def outputs_of(component: CanopenComponent) -> dict[str, Output]:
+def outputs_of(component: CanopenComponent) -> dict[str, OutputSignal]:
     """Return the physical outputs of a component."""
     ports = [
-        Output(f"{port.direction.value}.{port.name}", f"value of this {port.direction.value}-port")
+        OutputSignal(
+            f"{port.direction.value}.{port.name}", f"value of this {port.direction.value}-port"
+        )
         for port in component.ports.values()
     ]
     return {output.name: output for output in (*OUTPUTS, *ports)}

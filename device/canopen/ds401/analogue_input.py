@@ -18,7 +18,7 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.canopen.ds401.quantity import quantity, show
-from tickrig.device.physical import Input
+from tickrig.device.physical import InputSignal
 
 DEFAULT_TRIGGER: Final = 7
 """Limits and delta (6421h)."""
@@ -56,12 +56,12 @@ class AnalogueInput:
         return self.channel.name
 
     @property
-    def input(self) -> Input:
+    def input(self) -> InputSignal:
         """The physical input."""
         (low, high), whole = self.channel.bounds, self.channel.whole
         text = f"analogue input {self.number}"
         start = min(max(0, low), high)
-        return Input(
+        return InputSignal(
             self.channel.name,
             text,
             low=low,

@@ -16,7 +16,7 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.canopen.ds401.quantity import limits, quantity
-from tickrig.device.physical import Output
+from tickrig.device.physical import OutputSignal
 
 
 class AnalogueOutput:
@@ -46,9 +46,9 @@ class AnalogueOutput:
             entry.watch(self._write)
 
     @property
-    def output(self) -> Output:
+    def output(self) -> OutputSignal:
         """The physical output."""
-        return Output(self.channel.name, f"analogue output {self.number}", self.channel.unit)
+        return OutputSignal(self.channel.name, f"analogue output {self.number}", self.channel.unit)
 
     def objects(self) -> list[Entry]:
         """Return the objects that change what is put out."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.errors.error_behaviour import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
-from tickrig.device.physical import Input, QuantityBank, SignalType
+from tickrig.device.physical import InputSignal, QuantityBank, SignalType
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 
 NO_BEHAVIOUR: Final = 0
@@ -36,9 +36,9 @@ class DeviceFault:
     stops_outputs: bool
 
     @property
-    def input(self) -> Input:
+    def input(self) -> InputSignal:
         """The physical input."""
-        return Input(self.name, self.text, SignalType.FAULT)
+        return InputSignal(self.name, self.text, SignalType.FAULT)
 
 
 INPUT_OVERCURRENT: Final = DeviceFault(

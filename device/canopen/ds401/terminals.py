@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
 from tickrig.device.canopen.ds401.digital_outputs import DigitalOutputs
-from tickrig.device.physical import Input, Output
+from tickrig.device.physical import InputSignal, OutputSignal
 
 GROUP_LINES: Final = 8
 
@@ -34,10 +34,10 @@ def digital_input_names(lines: int) -> tuple[str, ...]:
     return tuple(f"di{line}" for line in range(1, lines + 1))
 
 
-def digital_inputs(names: Sequence[str]) -> Iterator[Input]:
+def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
     """Give the digital inputs; 1 is high."""
     for line, name in enumerate(names, 1):
-        yield Input(name, f"digital input {line}")
+        yield InputSignal(name, f"digital input {line}")
 
 
 def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402.motion import switches
-from tickrig.device.physical import Input, Output, QuantityBank, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -17,31 +17,35 @@ ENCODER_UNPLUGGED: Final = "encoder_unplugged"
 
 DRIVE_INPUTS: Final = (
     *switches.INPUTS,
-    Input(SHORT_CIRCUIT, "the motor cable has a short circuit", SignalType.FAULT),
-    Input(ENCODER_UNPLUGGED, "the encoder cable is pulled", SignalType.FAULT),
+    InputSignal(SHORT_CIRCUIT, "the motor cable has a short circuit", SignalType.FAULT),
+    InputSignal(ENCODER_UNPLUGGED, "the encoder cable is pulled", SignalType.FAULT),
 )
 """Of any drive."""
 
 PLANT_INPUTS: Final = (
-    Input("supply_v", "supply of the power stage", high=100, unit="V", initial=24, real=True),
-    Input("load_nm", "torque on the shaft, forward", low=-1_000, high=1_000, unit="Nm", real=True),
-    Input("load_kg_m2", "inertia on the shaft", high=1_000, unit="kg m2", real=True),
-    Input("ambient_c", "air temperature", low=-40, high=85, unit="degC", initial=25, real=True),
-    Input("shaft_blocked", "the shaft is held", SignalType.FAULT),
-    Input("motor_phase_open", "a wire of the motor is broken", SignalType.FAULT),
+    InputSignal("supply_v", "supply of the power stage", high=100, unit="V", initial=24, real=True),
+    InputSignal(
+        "load_nm", "torque on the shaft, forward", low=-1_000, high=1_000, unit="Nm", real=True
+    ),
+    InputSignal("load_kg_m2", "inertia on the shaft", high=1_000, unit="kg m2", real=True),
+    InputSignal(
+        "ambient_c", "air temperature", low=-40, high=85, unit="degC", initial=25, real=True
+    ),
+    InputSignal("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    InputSignal("motor_phase_open", "a wire of the motor is broken", SignalType.FAULT),
 )
 """Of a drive whose motor has physics."""
 
 OUTPUTS: Final = {
     item.name: item
     for item in (
-        Output("shaft_deg", "angle of the output shaft", "deg"),
-        Output("shaft_deg_s", "speed of the output shaft", "deg/s"),
-        Output("position", "position actual value", "user units"),
-        Output("current_a", "current of the motor", "A"),
-        Output("winding_c", "temperature of the winding", "degC"),
-        Output("drive_state", "state of the drive"),
-        Output("mode", "mode of operation, as in 6061h"),
+        OutputSignal("shaft_deg", "angle of the output shaft", "deg"),
+        OutputSignal("shaft_deg_s", "speed of the output shaft", "deg/s"),
+        OutputSignal("position", "position actual value", "user units"),
+        OutputSignal("current_a", "current of the motor", "A"),
+        OutputSignal("winding_c", "temperature of the winding", "degC"),
+        OutputSignal("drive_state", "state of the drive"),
+        OutputSignal("mode", "mode of operation, as in 6061h"),
     )
 }
 

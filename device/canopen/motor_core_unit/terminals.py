@@ -6,30 +6,32 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from tickrig.device.physical import Input, Output, QuantityBank, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.servo.servo import Servo
 
 LOAD: Final = "torque from outside at the shaft, positive drives it forward"
 
 INPUTS: Final = (
-    Input("supply_v", "supply of the motor", high=80, unit="V", initial=60, real=True),
-    Input("shaft_load_nm", LOAD, low=-100, high=100, unit="Nm", real=True),
-    Input("load_kg_m2", "inertia of what is on the shaft", high=10, unit="kg m2", real=True),
-    Input("ambient_c", "air around it", low=-40, high=125, unit="degC", initial=25, real=True),
-    Input("shaft_blocked", "the shaft is held", SignalType.FAULT),
-    Input("encoder_unplugged", "the plug of the motor encoder is off", SignalType.FAULT),
-    Input("motor_phase_open", "a wire of the motor is off", SignalType.FAULT),
-    Input("short_circuit", "two wires of the motor touch", SignalType.FAULT),
+    InputSignal("supply_v", "supply of the motor", high=80, unit="V", initial=60, real=True),
+    InputSignal("shaft_load_nm", LOAD, low=-100, high=100, unit="Nm", real=True),
+    InputSignal("load_kg_m2", "inertia of what is on the shaft", high=10, unit="kg m2", real=True),
+    InputSignal(
+        "ambient_c", "air around it", low=-40, high=125, unit="degC", initial=25, real=True
+    ),
+    InputSignal("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    InputSignal("encoder_unplugged", "the plug of the motor encoder is off", SignalType.FAULT),
+    InputSignal("motor_phase_open", "a wire of the motor is off", SignalType.FAULT),
+    InputSignal("short_circuit", "two wires of the motor touch", SignalType.FAULT),
 )
 
 OUTPUTS: Final = (
-    Output("angle_deg", "angle of the shaft, without the offset 2011h", "deg"),
-    Output("velocity_deg_s", "velocity of the shaft", "deg/s"),
-    Output("current_a", "current in the motor", "A"),
-    Output("winding_c", "temperature of the winding", "degC"),
-    Output("target_deg", "where the reference wants the shaft in angle mode", "deg"),
-    Output("mode", "free, current, velocity or angle"),
-    Output("status", "off, on, or the faults that are there"),
+    OutputSignal("angle_deg", "angle of the shaft, without the offset 2011h", "deg"),
+    OutputSignal("velocity_deg_s", "velocity of the shaft", "deg/s"),
+    OutputSignal("current_a", "current in the motor", "A"),
+    OutputSignal("winding_c", "temperature of the winding", "degC"),
+    OutputSignal("target_deg", "where the reference wants the shaft in angle mode", "deg"),
+    OutputSignal("mode", "free, current, velocity or angle"),
+    OutputSignal("status", "off, on, or the faults that are there"),
 )
 
 READINGS: Final[Mapping[str, Callable[[Servo], float]]] = MappingProxyType(

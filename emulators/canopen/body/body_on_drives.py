@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from tickrig.device.body.wheeled_body import WheeledBody
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.physical import Input, Output, QuantityBank, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.signals import Signal
 from tickrig.host.text.values import Setting
@@ -33,7 +33,7 @@ class PoseSignal:
 
     def __init__(self, body: WheeledBody, name: str, text: str, unit: str) -> None:
         most = 180 if name == "heading_deg" else FAR_M
-        self.item = Input(name, text, SignalType.LEVEL, -most, most, unit, real=True)
+        self.item = InputSignal(name, text, SignalType.LEVEL, -most, most, unit, real=True)
         self._body, self._bank = body, QuantityBank([self.item])
 
     def read(self) -> float:
@@ -68,7 +68,7 @@ class FrictionSignal:
 
     def __init__(self, body: WheeledBody) -> None:
         text = "coefficient of friction between wheels and ground"
-        self.item = Input("friction", text, high=MOST_FRICTION, real=True)
+        self.item = InputSignal("friction", text, high=MOST_FRICTION, real=True)
         self._body, self._bank = body, QuantityBank([self.item])
 
     def read(self) -> float:
@@ -89,12 +89,12 @@ class FrictionSignal:
 NAME: Final = "body"
 
 BODY_OUTPUTS: Final = (
-    Output("x_m", "place", "m"),
-    Output("y_m", "place, to the left of x", "m"),
-    Output("heading_deg", "from x towards y, -180..180", "deg"),
-    Output("speed_m_s", "speed forward", "m/s"),
-    Output("turn_deg_s", "turning speed, positive to the left", "deg/s"),
-    Output("slipping", "1 while a wheel slips"),
+    OutputSignal("x_m", "place", "m"),
+    OutputSignal("y_m", "place, to the left of x", "m"),
+    OutputSignal("heading_deg", "from x towards y, -180..180", "deg"),
+    OutputSignal("speed_m_s", "speed forward", "m/s"),
+    OutputSignal("turn_deg_s", "turning speed, positive to the left", "deg/s"),
+    OutputSignal("slipping", "1 while a wheel slips"),
 )
 
 SHAFTS: Final = (
@@ -145,7 +145,7 @@ class BodyOnDrives:
         }
         if body.parameters.friction is not None:
             self.physical = {**self.physical, "friction": FrictionSignal(body)}
-        self.outputs: Mapping[str, Output] = {item.name: item for item in BODY_OUTPUTS}
+        self.outputs: Mapping[str, OutputSignal] = {item.name: item for item in BODY_OUTPUTS}
         self.groups: Mapping[str, tuple[str, ...]] = {"pose": ("x_m", "y_m", "heading_deg")}
         self._load()
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Output
+from tickrig.device.physical import OutputSignal
 from tickrig.device.twin import Copyable
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
@@ -44,9 +44,9 @@ NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
 """Every node has these beside those of its device."""
 
 NODE_OUTPUTS: Final = (
-    Output("state", "NMT state, or Off"),
-    Output("node_id", "active node-ID, 255 while it has none"),
-    Output("can_state", "fault confinement of its CAN controller"),
+    OutputSignal("state", "NMT state, or Off"),
+    OutputSignal("node_id", "active node-ID, 255 while it has none"),
+    OutputSignal("can_state", "fault confinement of its CAN controller"),
 )
 
 
@@ -88,7 +88,7 @@ class Node(Copyable):
             **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
         }
         self.groups = bank.groups
-        self.outputs: Mapping[str, Output] = {
+        self.outputs: Mapping[str, OutputSignal] = {
             **{item.name: item for item in NODE_OUTPUTS},
             **self.application.outputs,
         }

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.physical import Input, Output, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.signals import Signal
@@ -27,7 +27,7 @@ class Part(Protocol):
     name: str
     physical: Mapping[str, Signal]
     groups: Mapping[str, tuple[str, ...]]
-    outputs: Mapping[str, Output]
+    outputs: Mapping[str, OutputSignal]
 
     def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
@@ -57,7 +57,7 @@ class Nodes:
         self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
         self._by_name: Mapping[str, Part] = {part.name: part for part in self.parts}
         self.inputs = NodeInputs(self)
-        self.outputs: Mapping[str, Output] = {
+        self.outputs: Mapping[str, OutputSignal] = {
             self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
             for part in self.parts
             for item in part.outputs.values()
@@ -103,7 +103,7 @@ class NodeInputs:
 
     def __init__(self, nodes: Nodes) -> None:
         self.changed = False
-        self.table: Mapping[str, Input] = _Table(nodes)
+        self.table: Mapping[str, InputSignal] = _Table(nodes)
         self.groups: Mapping[str, tuple[str, ...]] = {
             nodes.full_name(part, name): tuple(nodes.full_name(part, item) for item in members)
             for part in nodes.parts
@@ -123,7 +123,7 @@ class NodeInputs:
         """Return the value, or raise ValueError as `set` would, as far as can be known before."""
         return self._signal(name).check(value)
 
-    def find(self, name: str, signal_type: SignalType | None = None) -> Input:
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
         """Return the description of an input; ValueError if there is none of this type."""
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
@@ -151,13 +151,13 @@ class NodeInputs:
         return signal
 
 
-class _Table(Mapping[str, Input]):
+class _Table(Mapping[str, InputSignal]):
     """The descriptions, made when they are asked for: nodes have many objects."""
 
     def __init__(self, nodes: Nodes) -> None:
         self._nodes = nodes
 
-    def __getitem__(self, name: str) -> Input:
+    def __getitem__(self, name: str) -> InputSignal:
         part, rest = self._nodes.find(name)
         signal = part.signal(rest) if part else None
         if part is None or signal is None:

@@ -11,7 +11,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Input, QuantityBank, SignalType
+from tickrig.device.physical import InputSignal, QuantityBank, SignalType
 from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access, ObjectCode
@@ -31,7 +31,7 @@ class Signal(Protocol):
     """A named value of a device that can be read and set between ticks."""
 
     @property
-    def item(self) -> Input:
+    def item(self) -> InputSignal:
         """What it is."""
         ...
 
@@ -86,12 +86,12 @@ class ObjectSignal:
         self._name, self._entry, self._later = name, entry, later
 
     @property
-    def item(self) -> Input:
+    def item(self) -> InputSignal:
         """Name, type and range; the unit is the data type."""
         entry, data_type = self._entry, self._entry.data_type
         low, high = self._limits()
         shape = SignalType.LEVEL if _is_number(data_type) else SignalType.TEXT
-        return Input(
+        return InputSignal(
             self._name,
             f"{entry.description.name} ({_access(entry)})",
             shape,
@@ -198,7 +198,7 @@ class Switch:
     """
 
     def __init__(self, name: str, text: str, switch: Callable[[int], None]) -> None:
-        self.item = Input(name, text, SignalType.FAULT)
+        self.item = InputSignal(name, text, SignalType.FAULT)
         self._switch, self._value = switch, 0
 
     def read(self) -> int:
@@ -227,7 +227,7 @@ class Emergency:
 
     def __init__(self, slave: CanopenSlave, later: Later) -> None:
         text = "error seen by the application: emergency error code, 0 when it is gone"
-        self.item = Input("emergency", text, high=0xFFFF)
+        self.item = InputSignal("emergency", text, high=0xFFFF)
         self._slave, self._later, self._code = slave, later, 0
 
     def read(self) -> int:
@@ -258,7 +258,9 @@ class Quantity:
         on_change: called after each change.
     """
 
-    def __init__(self, bank: QuantityBank, item: Input, on_change: Callable[[], None]) -> None:
+    def __init__(
+        self, bank: QuantityBank, item: InputSignal, on_change: Callable[[], None]
+    ) -> None:
         self._bank, self.item, self._on_change = bank, item, on_change
 
     def read(self) -> float:

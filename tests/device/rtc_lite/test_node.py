@@ -8,7 +8,7 @@ import pytest
 
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.physical import Input
+from tickrig.device.physical import InputSignal
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
@@ -323,7 +323,7 @@ def test_parity_instead_of_a_sum() -> None:
 
 class Thermometer(LiteComponent):
     type_name = "Thermo"
-    physical = (Input("temperature_dc", "temperature", low=-400, high=1_250),)
+    physical = (InputSignal("temperature_dc", "temperature", low=-400, high=1_250),)
     temperature = LiteOutPort("t", LONG)
     warm = LiteOutPort("warm", BOOLEAN)
     history = LiteOutPort("history", LONG_SEQ, 4)
@@ -367,15 +367,15 @@ def component(**attributes: Any) -> type[LiteComponent]:
             "Mine: 9 out-ports, at most 8 fit",
         ),
         (
-            {"physical": (Input("power_cut", ""),)},
+            {"physical": (InputSignal("power_cut", ""),)},
             "Mine: two inputs are called 'power_cut'",
         ),
         (
-            {"physical": (Input("volt", "", real=True),)},
+            {"physical": (InputSignal("volt", "", real=True),)},
             "Mine: input 'volt' takes fractions; give it a finer unit",
         ),
         (
-            {"physical": (Input("light", ""), Input("light", ""))},
+            {"physical": (InputSignal("light", ""), InputSignal("light", ""))},
             "Mine: two inputs are called 'light'",
         ),
     ],

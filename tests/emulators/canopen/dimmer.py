@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import Input, Output, SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 
 TABLE = (
-    Input("knob_v", "voltage of the knob", high=5, unit="V", real=True),
-    Input("di1", "first line"),
-    Input("di2", "second line"),
-    Input("bell", "a button", SignalType.BUTTON),
-    Input("burnt", "its filament is gone", SignalType.FAULT),
+    InputSignal("knob_v", "voltage of the knob", high=5, unit="V", real=True),
+    InputSignal("di1", "first line"),
+    InputSignal("di2", "second line"),
+    InputSignal("bell", "a button", SignalType.BUTTON),
+    InputSignal("burnt", "its filament is gone", SignalType.FAULT),
 )
 
 
@@ -21,7 +21,7 @@ class Dimmer(Application):
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.has_inputs(TABLE, {"di": ("di1", "di2")})
-        self.outputs = {"lamp_pct": Output("lamp_pct", "brightness", "%")}
+        self.outputs = {"lamp_pct": OutputSignal("lamp_pct", "brightness", "%")}
         self._lamp_pct = 0.0
 
     def start(self) -> None:

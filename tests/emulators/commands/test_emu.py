@@ -16,7 +16,7 @@ MODULE = """\
 import click
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.commands.device_type import DeviceType
+from tickrig import DeviceType
 
 
 def build(config):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Final
 
-from tickrig.device.physical import Input, QuantityBank
+from tickrig.device.physical import InputSignal, QuantityBank
 
 FAR_DEG: Final = 1e9
 """An angle that no shaft ever reaches."""
@@ -16,11 +16,11 @@ HOME: Final = 0x04
 """Bits of 60FDh."""
 
 INPUTS: Final = (
-    Input("negative_limit_switch", "limit switch in negative direction is pressed by hand"),
-    Input("positive_limit_switch", "limit switch in positive direction is pressed by hand"),
-    Input("home_switch", "home switch is pressed by hand"),
+    InputSignal("negative_limit_switch", "limit switch in negative direction is pressed by hand"),
+    InputSignal("positive_limit_switch", "limit switch in positive direction is pressed by hand"),
+    InputSignal("home_switch", "home switch is pressed by hand"),
     *(
-        Input(name, text, low=-FAR_DEG, high=FAR_DEG, unit="deg", initial=initial, real=True)
+        InputSignal(name, text, low=-FAR_DEG, high=FAR_DEG, unit="deg", initial=initial, real=True)
         for name, text, initial in (
             ("negative_limit_at", "angle at and below which the shaft presses it", -FAR_DEG),
             ("positive_limit_at", "angle at and above which the shaft presses it", FAR_DEG),

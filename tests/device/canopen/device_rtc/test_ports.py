@@ -12,7 +12,7 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.device_rtc.component import CanopenComponent, CanopenEcho
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
-from tickrig.device.physical import Input
+from tickrig.device.physical import InputSignal
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, CHARACTER, DOUBLE, LONG, SHORT
 
@@ -164,7 +164,7 @@ def test_a_component_runs_at_its_rate_without_drift(rate_hz: int) -> None:
 
 def test_a_component_reads_the_physical_inputs_that_it_declares() -> None:
     class Scale(CanopenEcho):
-        physical = (Input("weight_g", "on the scale", high=5_000, unit="g"),)
+        physical = (InputSignal("weight_g", "on the scale", high=5_000, unit="g"),)
 
         def on_execute(self) -> None:
             self.outlet.write(int(self.inputs["weight_g"]))
@@ -176,7 +176,7 @@ def test_a_component_reads_the_physical_inputs_that_it_declares() -> None:
 
 def test_two_inputs_of_one_name_are_refused() -> None:
     class Twice(CanopenEcho):
-        physical = (Input("shut_down", "mine"),)
+        physical = (InputSignal("shut_down", "mine"),)
 
     with pytest.raises(ValueError, match="Twice: 2 inputs are called 'shut_down'"):
         make_device_rtc(Twice, 16)
