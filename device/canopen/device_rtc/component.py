@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Final
 
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort, CanopenPort
 from tickrig.device.declared import declared
-from tickrig.device.twin import Copyable
 from tickrig.device.physical import InputSignal, QuantityBank
+from tickrig.device.twin import Copyable
 from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 

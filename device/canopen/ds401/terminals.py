@@ -15,7 +15,7 @@ GROUP_LINES: Final = 8
 class DigitalTerminal(NamedTuple):
     """One digital output, or all of them."""
 
-    output: Output
+    output: OutputSignal
     outputs: DigitalOutputs
     shift: int
     mask: int
@@ -52,11 +52,11 @@ def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
 def outputs(digital: DigitalOutputs, analogue: Iterable[AnalogueOutput]) -> dict[str, Terminal]:
     """Return the outputs by name: `do1`.., `do` and `ao1`.."""
     found: list[Terminal] = [
-        DigitalTerminal(Output(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
+        DigitalTerminal(OutputSignal(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
         for line in range(1, digital.lines + 1)
     ]
     if found:
-        everything = Output("do", "all digital outputs as a number, output 1 is bit 0")
+        everything = OutputSignal("do", "all digital outputs as a number, output 1 is bit 0")
         found.append(DigitalTerminal(everything, digital, 0, (1 << digital.lines) - 1))
     found += analogue
     return {terminal.output.name: terminal for terminal in found}
