@@ -19,7 +19,7 @@ GRIPPER = "examples/device_rtc_gripper.py:Gripper"
 COMPONENT = """
 from tickrig.device.canopen.device_rtc.component import Component
 from tickrig.device.canopen.device_rtc.ports import InPort
-from tickrig.device.physical import Input
+from tickrig.device.physical import InputSignal
 from tickrig.wire.rtc_canopen.port_types import CHARACTER, STRING
 
 class Mine(Component):
@@ -34,7 +34,7 @@ class Wordy(Component):
 
 class Greedy(Component):
     type_name = "Greedy"
-    physical = (Input("power_off", "mine"),)
+    physical = (InputSignal("power_off", "mine"),)
 
 class Broken(Component):
     type_name = "Broken"
