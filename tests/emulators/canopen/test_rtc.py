@@ -17,26 +17,26 @@ from tickrig.emulators.canopen.eds import read_eds
 ROOT = Path(__file__).parents[3]
 GRIPPER = "examples/device_rtc_gripper.py:Gripper"
 COMPONENT = """
-from tickrig.device.canopen.device_rtc.component import Component
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.ports import InPort
 from tickrig.device.physical import InputSignal
 from tickrig.wire.rtc_canopen.port_types import CHARACTER, STRING
 
-class Mine(Component):
+class Mine(CanopenComponent):
     type_name = "Mine"
     letter = InPort("letter", CHARACTER)
     def on_execute(self):
         raise RuntimeError("no idea")
 
-class Wordy(Component):
+class Wordy(CanopenComponent):
     type_name = "Wordy"
     words = InPort("words", STRING)
 
-class Greedy(Component):
+class Greedy(CanopenComponent):
     type_name = "Greedy"
     physical = (InputSignal("power_off", "mine"),)
 
-class Broken(Component):
+class Broken(CanopenComponent):
     type_name = "Broken"
     def __init__(self):
         super().__init__()
