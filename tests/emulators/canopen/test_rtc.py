@@ -18,19 +18,19 @@ ROOT = Path(__file__).parents[3]
 GRIPPER = "examples/device_rtc_gripper.py:Gripper"
 COMPONENT = """
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.ports import InPort
+from tickrig.device.canopen.device_rtc.ports import CanopenInPort
 from tickrig.device.physical import InputSignal
 from tickrig.wire.rtc_canopen.port_types import CHARACTER, STRING
 
 class Mine(CanopenComponent):
     type_name = "Mine"
-    letter = InPort("letter", CHARACTER)
+    letter = CanopenInPort("letter", CHARACTER)
     def on_execute(self):
         raise RuntimeError("no idea")
 
 class Wordy(CanopenComponent):
     type_name = "Wordy"
-    words = InPort("words", STRING)
+    words = CanopenInPort("words", STRING)
 
 class Greedy(CanopenComponent):
     type_name = "Greedy"
