@@ -108,3 +108,12 @@ def test_what_is_not_public_is_marked_in_examples(page: Path) -> None:
 
 def test_the_first_page_imports_public_names_alone() -> None:
     assert [line for line, _ in inner_imports(programs(ROOT / "README.md"))] == []
+
+
+def test_what_the_upgrading_page_says_to_import_is_there() -> None:
+    page = (ROOT / "docs" / "upgrading.md").read_text("utf-8")
+    lines = re.findall(r"`(from (tickrig[\w.]*) import [^`]+)`", page)
+    assert {place for _, place in lines} <= {*PLACES}
+    assert len(lines) > 20
+    for line, _ in lines:
+        exec(line, {})

@@ -14,7 +14,7 @@ from tickrig.wire.rtc_canopen.port_types import LONG
 from tickrig.wire.rtc_canopen.profile import RtcProfile
 
 
-class ReturnCode(IntEnum):
+class CanopenReturnCode(IntEnum):
     """What a callback returns (OMG RTC 1.1, ReturnCode_t)."""
 
     RTC_OK = 0
@@ -25,10 +25,10 @@ class ReturnCode(IntEnum):
     PRECONDITION_NOT_MET = 5
 
 
-ERROR: Final = ReturnCode.RTC_ERROR
+ERROR: Final = CanopenReturnCode.RTC_ERROR
 """What a callback returns that failed."""
 
-Result = ReturnCode | None
+Result = CanopenReturnCode | None
 """What a callback returns; nothing means that all went well."""
 
 

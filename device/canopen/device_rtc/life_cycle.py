@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import CanopenComponent, Result, ReturnCode
+from tickrig.device.canopen.device_rtc.component import CanopenComponent, CanopenReturnCode, Result
 from tickrig.device.canopen.device_rtc.transitions import (
     ACTIVITIES,
     ADMITTED,
@@ -111,4 +111,4 @@ class CanopenLifeCycle:
         self.latest = callback
         self.executed += callback == "on_execute"
         result: Result = getattr(self.component, callback)()
-        return result in (None, ReturnCode.RTC_OK)
+        return result in (None, CanopenReturnCode.RTC_OK)
