@@ -1,51 +1,40 @@
-"""A stretch of CAN bus on which all hear each other: what is sent when, and how it ends."""
+"""A stretch of CAN bus on which all hear each other: what is sent next, and when."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from math import gcd
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Cache, Listeners
-from tickrig.emulators.can.arbitration import CanArbiter, dominant, first_difference
-from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
+from tickrig.emulators.can.arbitration import dominant, first_difference
 from tickrig.emulators.can.faults import CanFaults, Verdict
-from tickrig.emulators.can.routes import CanRoutes
+from tickrig.emulators.can.transmission_outcomes import (
+    RECESSIVE_BITS,
+    Observer,
+    TransmissionOutcomes,
+)
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import INTERFRAME_BITS, frame_bits
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, ErrorState
+from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
-Observer = Callable[[int, CanFrame | ErrorFrame], None]
-"""Told each frame and each error frame with the time at which it had ended."""
-
-RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
 ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
 ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
-SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 HEADER_BITS: Final = 19  # from start of frame to DLC
-KEPT_SPANS: Final = 32_768
 KEPT_LENGTHS: Final = 8_192
 
 
-class CanSegment:
+class CanSegment(TransmissionOutcomes):
     """A bus in virtual time, moved on by whoever looks at it.
 
-    Time inside is counted in units of which a bit and a microsecond are whole
-    multiples; only time stamps are rounded, up to the next microsecond. Which
-    frame goes next is a plan until its first bit is out: a frame sent at that
-    very time still takes part in the arbitration.
+    Which frame goes next is a plan until its first bit is out: a frame sent at
+    that very time still takes part in the arbitration.
 
     Attributes:
-        unit: units in a microsecond.
-        bit: units in a bit.
         now_us: how far the bus was moved on.
-        routes: the ends and who of them receives what.
-        busy: from when to when the latest frames kept the bus busy, in units.
         shorted: nobody can send.
         heard: a frame woke a station since `advance_until_heard` was called.
     """
@@ -53,22 +42,9 @@ class CanSegment:
     def __init__(
         self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
     ) -> None:
-        common = gcd(bit_rate, 1_000_000)
-        self.unit, self.bit = bit_rate // common, 1_000_000 // common
+        super().__init__(bit_rate, start_us, faults, observers)
         self.now_us, self.shorted, self.heard = start_us, False, False
-        self.routes = CanRoutes()
-        self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
-        self._faults, self._observers = faults, observers
-        self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
-        self._recovery = Recovery(self.bit)
-        self._arbiter = CanArbiter(start_us * self.unit)
-        self._on_bus = 0  # ends that acknowledge
-        self._repeating = False  # a node is alone, and nothing changes any more
-        self._news: list[tuple[int, CanEnd]] = []  # whose error state changed when
         self._lengths: Cache[CanFrame, int] = Cache()
-        self._stale = True  # the plan that follows is to be made
-        self._winners: list[CanEnd] = []
-        self._start = self._free = self._due_us = NEVER
         self._finish: Callable[[], None] = self._come_back
 
     @property
@@ -165,15 +141,6 @@ class CanSegment:
             self._withdraw()
         self._recount(now_us)
 
-    def _recount(self, now_us: int) -> None:
-        """Count who acknowledges; a node that was alone begins anew."""
-        states = [end.controller.state for end in self.routes.ends]
-        self._on_bus = len(states) - states.count(ErrorState.BUS_OFF)
-        self.routes.forget()
-        if self._repeating:
-            self._repeating, self._stale = False, True
-            self._arbiter.free = max(self._arbiter.free, now_us * self.unit)
-
     def _enter(self, end: CanEnd, now: int) -> None:
         arbiter = self._arbiter
         if not arbiter.heads and not self._winners and arbiter.free < now:
@@ -256,107 +223,3 @@ class CanSegment:
         self._finish = finish
         self._free = free = self._start + bits * self.bit
         self._due_us = -((INTERFRAME_BITS * self.bit - free) // self.unit)
-
-    # What a plan ends in.
-
-    def _deliver(self) -> None:
-        """Hand a frame to all that accept it."""
-        at_us, winners = self._due_us, self._winners
-        frame = winners[0].queue[0]
-        self._take_off(frame)
-        for end in self.routes.receivers(frame):
-            if end not in winners:
-                end.receive(at_us, frame)
-
-    def _drop(self) -> None:
-        """Let a frame be acknowledged, and lost."""
-        self._take_off(self._winners[0].queue[0])
-
-    def _duplicate(self) -> None:
-        """Hand a frame out that its sender will send again."""
-        at_us, winners = self._due_us, self._winners
-        frame = winners[0].queue[0]
-        for end in self.routes.receivers(frame):
-            if end not in winners:
-                end.receive(at_us, frame)
-        self._tell(frame)
-        self._confinement.failed_to_send(at_us, winners)
-        self._end_attempt()
-
-    def _override(self) -> None:
-        """Let the dominant frame through; the error flags of passive nodes are not heard."""
-        frame = dominant([end.queue[0] for end in self._winners])
-        losers = [end for end in self._winners if end.queue[0] != frame]
-        self._winners = [end for end in self._winners if end not in losers]
-        self._confinement.failed_to_send(self._due_us, losers)
-        self._suspend(losers)
-        self._arbiter.put_back(losers)
-        self._deliver()
-
-    def _fail(self) -> None:
-        """Tell all that a frame was broken; its senders will send again."""
-        self._confinement.failed(self._due_us, self._winners)
-        self._tell(BIT_ERROR)
-        self._end_attempt()
-
-    def _fail_alone(self) -> None:
-        """The same, but nobody else hears anything."""
-        self._confinement.failed_to_send(self._due_us, self._winners)
-        self._tell(BIT_ERROR)
-        self._end_attempt()
-
-    def _go_unheard(self) -> None:
-        """Find nobody to acknowledge; once that changes nothing more, it is not looked at."""
-        passive = all(end.controller.state is ErrorState.PASSIVE for end in self._winners)
-        self._confinement.unheard(self._due_us, self._winners)
-        self._tell(NO_ACK)
-        self._end_attempt()
-        self._repeating = passive
-
-    def _come_back(self) -> None:
-        """Let nodes return from bus-off."""
-        for end in self._recovery.take(self._start):
-            self._confinement.count(self._due_us, end, ErrorCounters.restart)
-
-    def _take_off(self, frame: CanFrame) -> None:
-        """Take a frame that went well from its queues."""
-        for end in self._winners:
-            end.queue.popleft()
-        if self._confinement.marked:
-            self._confinement.sent(self._due_us, self._winners)
-        self._tell(frame)
-        self._end_attempt()
-
-    def _end_attempt(self) -> None:
-        """Let the bus be free for the next frame."""
-        self._arbiter.free = self._free
-        self.busy.append((self._start, self._free))
-        if self._confinement.marked:
-            self._suspend(self._winners)
-        if self._recovery.active:
-            self._recovery.interrupt(self._start, self._free - RECESSIVE_BITS * self.bit)
-        if self._faults.active:
-            self._faults.spend()
-        self._arbiter.put_back(self._winners)
-        self._winners = []
-
-    def _suspend(self, senders: list[CanEnd]) -> None:
-        """Let passive nodes that have sent wait for the others."""
-        for end in senders:
-            if end.controller.state is ErrorState.PASSIVE:
-                end.held = max(end.held, self._free + SUSPEND_BITS * self.bit)
-                self._arbiter.slow = True
-
-    def _tell(self, heard: CanFrame | ErrorFrame) -> None:
-        for observe in self._observers:
-            observe(self._due_us, heard)
-
-    def _state_changed(self, at_us: int, end: CanEnd) -> None:
-        end.open(on_bus=end.controller.state is not ErrorState.BUS_OFF)
-        self._recount(at_us)
-        self._news.append((at_us, end))
-
-    def _tell_news(self) -> None:
-        news, self._news = self._news, []
-        for at_us, end in news:
-            end.error_state_changed(at_us)

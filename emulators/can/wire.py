@@ -8,7 +8,8 @@ from typing import Final
 from tickrig.device.twin import Copyable, Listeners
 from tickrig.emulators.can.end import Accepted, CanEnd
 from tickrig.emulators.can.faults import CanFaults
-from tickrig.emulators.can.segment import CanSegment, Observer
+from tickrig.emulators.can.segment import CanSegment
+from tickrig.emulators.can.transmission_outcomes import Observer
 from tickrig.wire.can import CanFrame
 
 BIT_RATES: Final = range(10_000, 1_000_001)

@@ -1,0 +1,172 @@
+"""What a transmission on a CAN bus ends in: delivery, error frames, return from bus-off."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from math import gcd
+from typing import TYPE_CHECKING, Final
+
+from tickrig.device.twin import Listeners
+from tickrig.emulators.can.arbitration import CanArbiter, dominant
+from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
+from tickrig.emulators.can.faults import CanFaults
+from tickrig.emulators.can.routes import CanRoutes
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_bits import INTERFRAME_BITS
+from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, ErrorState
+from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.emulators.can.end import CanEnd
+
+Observer = Callable[[int, CanFrame | ErrorFrame], None]
+"""Told each frame and each error frame with the time at which it had ended."""
+
+RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
+SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
+KEPT_SPANS: Final = 32_768
+
+
+class TransmissionOutcomes:
+    """What a transmission on the bus can end in, and what all nodes make of it.
+
+    Times are in units of which a bit and a microsecond are whole multiples; only time
+    stamps are rounded, up to the next microsecond. Which transmission it is, and in which
+    of these methods it ends, is planned by `CanSegment`.
+
+    Attributes:
+        unit: units in a microsecond.
+        bit: units in a bit.
+        routes: the ends and who of them receives what.
+        busy: from when to when the latest frames kept the bus busy, in units.
+    """
+
+    def __init__(
+        self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
+    ) -> None:
+        common = gcd(bit_rate, 1_000_000)
+        self.unit, self.bit = bit_rate // common, 1_000_000 // common
+        self.routes = CanRoutes()
+        self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
+        self._faults, self._observers = faults, observers
+        self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
+        self._recovery = Recovery(self.bit)
+        self._arbiter = CanArbiter(start_us * self.unit)
+        self._on_bus = 0  # ends that acknowledge
+        self._repeating = False  # a node is alone, and nothing changes any more
+        self._news: list[tuple[int, CanEnd]] = []  # whose error state changed when
+        self._stale = True  # the plan that follows is to be made
+        self._winners: list[CanEnd] = []
+        self._start = self._free = self._due_us = NEVER
+
+    def _deliver(self) -> None:
+        """Hand a frame to all that accept it."""
+        at_us, winners = self._due_us, self._winners
+        frame = winners[0].queue[0]
+        self._take_off(frame)
+        for end in self.routes.receivers(frame):
+            if end not in winners:
+                end.receive(at_us, frame)
+
+    def _drop(self) -> None:
+        """Let a frame be acknowledged, and lost."""
+        self._take_off(self._winners[0].queue[0])
+
+    def _duplicate(self) -> None:
+        """Hand a frame out that its sender will send again."""
+        at_us, winners = self._due_us, self._winners
+        frame = winners[0].queue[0]
+        for end in self.routes.receivers(frame):
+            if end not in winners:
+                end.receive(at_us, frame)
+        self._tell(frame)
+        self._confinement.failed_to_send(at_us, winners)
+        self._end_attempt()
+
+    def _override(self) -> None:
+        """Let the dominant frame through; the error flags of passive nodes are not heard."""
+        frame = dominant([end.queue[0] for end in self._winners])
+        losers = [end for end in self._winners if end.queue[0] != frame]
+        self._winners = [end for end in self._winners if end not in losers]
+        self._confinement.failed_to_send(self._due_us, losers)
+        self._suspend(losers)
+        self._arbiter.put_back(losers)
+        self._deliver()
+
+    def _fail(self) -> None:
+        """Tell all that a frame was broken; its senders will send again."""
+        self._confinement.failed(self._due_us, self._winners)
+        self._tell(BIT_ERROR)
+        self._end_attempt()
+
+    def _fail_alone(self) -> None:
+        """The same, but nobody else hears anything."""
+        self._confinement.failed_to_send(self._due_us, self._winners)
+        self._tell(BIT_ERROR)
+        self._end_attempt()
+
+    def _go_unheard(self) -> None:
+        """Find nobody to acknowledge; once that changes nothing more, it is not looked at."""
+        passive = all(end.controller.state is ErrorState.PASSIVE for end in self._winners)
+        self._confinement.unheard(self._due_us, self._winners)
+        self._tell(NO_ACK)
+        self._end_attempt()
+        self._repeating = passive
+
+    def _come_back(self) -> None:
+        """Let nodes return from bus-off."""
+        for end in self._recovery.take(self._start):
+            self._confinement.count(self._due_us, end, ErrorCounters.restart)
+
+    def _take_off(self, frame: CanFrame) -> None:
+        """Take a frame that went well from its queues."""
+        for end in self._winners:
+            end.queue.popleft()
+        if self._confinement.marked:
+            self._confinement.sent(self._due_us, self._winners)
+        self._tell(frame)
+        self._end_attempt()
+
+    def _end_attempt(self) -> None:
+        """Let the bus be free for the next frame."""
+        self._arbiter.free = self._free
+        self.busy.append((self._start, self._free))
+        if self._confinement.marked:
+            self._suspend(self._winners)
+        if self._recovery.active:
+            self._recovery.interrupt(self._start, self._free - RECESSIVE_BITS * self.bit)
+        if self._faults.active:
+            self._faults.spend()
+        self._arbiter.put_back(self._winners)
+        self._winners = []
+
+    def _suspend(self, senders: list[CanEnd]) -> None:
+        """Let passive nodes that have sent wait for the others."""
+        for end in senders:
+            if end.controller.state is ErrorState.PASSIVE:
+                end.held = max(end.held, self._free + SUSPEND_BITS * self.bit)
+                self._arbiter.slow = True
+
+    def _tell(self, heard: CanFrame | ErrorFrame) -> None:
+        for observe in self._observers:
+            observe(self._due_us, heard)
+
+    def _state_changed(self, at_us: int, end: CanEnd) -> None:
+        end.open(on_bus=end.controller.state is not ErrorState.BUS_OFF)
+        self._recount(at_us)
+        self._news.append((at_us, end))
+
+    def _tell_news(self) -> None:
+        news, self._news = self._news, []
+        for at_us, end in news:
+            end.error_state_changed(at_us)
+
+    def _recount(self, now_us: int) -> None:
+        """Count who acknowledges; a node that was alone begins anew."""
+        states = [end.controller.state for end in self.routes.ends]
+        self._on_bus = len(states) - states.count(ErrorState.BUS_OFF)
+        self.routes.forget()
+        if self._repeating:
+            self._repeating, self._stale = False, True
+            self._arbiter.free = max(self._arbiter.free, now_us * self.unit)
