@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.check.rule import FrameSelection, Rule
+    from tickrig.host.monitor.check.rule import FrameSelection
     from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.decode.decoder import Decoder, FrameDecoder
     from tickrig.host.monitor.decode.node_memory import EdsObjects
@@ -90,7 +91,7 @@ class _CheckedDecoder:
             return None
 
 
-class _CheckedRule:
+class _CheckedRule(Rule):
     """A foreign rule; what it raises ends the command in one line."""
 
     def __init__(self, name: str, rule: Rule) -> None:

@@ -45,6 +45,21 @@ def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")
 
 
+def time_option(option: str, name: str, **attributes: Any) -> Decorator:
+    """Return the option of a time, as `10s`; in microseconds, None where it is not given."""
+
+    def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
+        from tickrig.host.cli.refused import Refused  # noqa: PLC0415 - a TAB needs none
+        from tickrig.host.text.values import parse_time_us  # noqa: PLC0415
+
+        try:
+            return None if text is None else parse_time_us(text)
+        except ValueError as error:
+            raise Refused(f"{option} {error}") from None
+
+    return click.option(option, name, metavar="TIME", callback=parsed, **attributes)
+
+
 def time_us(option: str, word: str) -> int:
     """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
     from tickrig.host.cli.refused import refused_at  # noqa: PLC0415 - a TAB needs none

@@ -7,16 +7,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final, TypeVar
 
-import click
-
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import until_interrupted
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.options import Decorator
-from tickrig.host.cli.refused import Refused
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.cli.options import time_option
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
@@ -28,16 +24,7 @@ PATIENCE_US: Final = 5_000_000
 """How long a bus is heard where nothing else ends it."""
 
 
-def _span(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
-    try:
-        return None if text is None else parse_time_us(text)
-    except ValueError as error:
-        raise Refused(f"--for {error}") from None
-
-
-span_option: Final[Decorator] = click.option(
-    "--for", "span_us", metavar="TIME", callback=_span, help="End after 10s, 500ms."
-)
+span_option: Final = time_option("--for", "span_us", help="End after 10s, 500ms.")
 """Add the option `--for`, in microseconds."""
 
 

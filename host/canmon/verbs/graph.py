@@ -7,10 +7,10 @@ import re
 import shutil
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import click
 
@@ -22,13 +22,12 @@ from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
 from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.can_options import BusOptions, bus_options
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import Series, View
 from tickrig.host.monitor.graph.signal_spec import ObjectName, parse_signal
-from tickrig.host.text.values import parse_time_us
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
 _RANGE: Final = re.compile(r"([1-9])=(-?[0-9.eE+-]+?)\.\.(-?[0-9.eE+-]+)")
@@ -58,23 +57,6 @@ class GraphRequest:
     window_us: int
     span_us: int | None
 
-    @classmethod
-    def of(cls, options: dict[str, Any]) -> Self:
-        """Take the options that are its own; Refused if one is wrong."""
-        files = options.pop("files")
-        for file in files:
-            check_graph_path(file)
-        return cls(
-            files=files,
-            from_us=_time_us("--from", options.pop("from_")),
-            to_us=_time_us("--to", options.pop("to")),
-            at_us=_time_us("--at", options.pop("at")),
-            ranges=dict(map(_range, options.pop("ranges"))),
-            size=_size(options.pop("size")),
-            window_us=_time_us("--window", options.pop("window")) or 1,
-            span_us=options.pop("span_us"),
-        )
-
     def view(self, series: Sequence[Series]) -> View:
         """Return the view that is asked for; Refused if nothing is in it."""
         whole = View.of(series)
@@ -91,14 +73,15 @@ class GraphRequest:
             raise Refused(str(error)) from None
 
 
-def _time_us(option: str, text: str | None) -> int | None:
-    try:
-        return None if text is None else parse_time_us(text)
-    except ValueError as error:
-        raise Refused(f"{option} {error}") from None
+def _checked_files(
+    context: click.Context, parameter: click.Parameter, files: tuple[Path, ...]
+) -> tuple[Path, ...]:
+    for file in files:
+        check_graph_path(file)
+    return files
 
 
-def _size(text: str) -> tuple[int, int]:
+def _size(context: click.Context, parameter: click.Parameter, text: str) -> tuple[int, int]:
     match = _SIZE.fullmatch(text)
     if match is None:
         raise Refused(f"--size {text!r} is not WIDTHxHEIGHT in pixels, as 960x400")
@@ -129,13 +112,26 @@ SIZE: Final = (100, 28)
 @click.argument("source")
 @click.argument("signals", nargs=-1, required=True, metavar="SIGNAL...")
 @decode_options
-@click.option("-o", "files", multiple=True, type=PATH, metavar="FILE", help=".svg .html .png .csv")
-@click.option("--from", "from_", metavar="TIME", help="Begin 3s after the first sample.")
-@click.option("--to", metavar="TIME", help="End 9s after the first sample.")
-@click.option("--at", metavar="TIME", help="Read out the values there.")
+@click.option(
+    *("-o", "files"),
+    multiple=True,
+    type=PATH,
+    callback=_checked_files,
+    metavar="FILE",
+    help=".svg .html .png .csv",
+)
+@time_option("--from", "from_us", help="Begin 3s after the first sample.")
+@time_option("--to", "to_us", help="End 9s after the first sample.")
+@time_option("--at", "at_us", help="Read out the values there.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
-@click.option("--size", metavar="WxH", default="960x400", help="Of a picture; 960x400 pixels.")
-@click.option("--window", metavar="TIME", default="10s", help="Shown of a bus; 10s.")
+@click.option(
+    "--size",
+    metavar="WxH",
+    default="960x400",
+    callback=_size,
+    help="Of a picture; 960x400 pixels.",
+)
+@time_option("--window", "window_us", default="10s", help="Shown of a bus; 10s.")
 @span_option
 @strict_option
 @bus_options
@@ -158,7 +154,8 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    request = GraphRequest.of(options)
+    options["ranges"] = dict(map(_range, options["ranges"]))
+    request = GraphRequest(**{one.name: options.pop(one.name) for one in fields(GraphRequest)})
     try:
         words = [parse_signal(text) for text in signals]
     except ValueError as error:
@@ -192,7 +189,7 @@ def _collect(
 def _live(
     series: Sequence[Series], request: GraphRequest, now_us: int, width: int, height: int
 ) -> list[str]:
-    view = View(now_us - request.window_us, now_us, request.ranges, None, now_us)
+    view = View(now_us - max(1, request.window_us), now_us, request.ranges, None, now_us)
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
 
 

@@ -20,7 +20,7 @@ from tickrig.host.monitor.transmit.frame_fields import (
     parse_counter,
 )
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
-from tickrig.host.monitor.transmit.transmit_list import Cyclic
+from tickrig.host.monitor.transmit.transmit_list import TransmitRow
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
@@ -99,21 +99,24 @@ def _period_us(every: str | None, count: int | None) -> int:
             raise Refused("--count says how often --every sends; give --every TIME")
         return NEVER
     try:
-        return parse_time_us(every)
+        period_us = parse_time_us(every)
     except ValueError as error:
         raise Refused(f"--every {error}") from None
+    if not period_us:
+        raise Refused("a period of 0 us; 1 us is the least")
+    return period_us
 
 
 def _cyclic(
     frames: Sequence[CanFrame], period_us: int, count: int, fields: FrameFields
-) -> list[Cyclic]:
+) -> list[TransmitRow]:
     try:
-        return [Cyclic(frame, period_us, 0, count, fields) for frame in frames]
+        return [TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
     except ValueError as error:
         raise Refused(str(error)) from None
 
 
-def _run(cyclic: Sequence[Cyclic], out: Transmitter, quiet: bool) -> None:
+def _run(cyclic: Sequence[TransmitRow], out: Transmitter, quiet: bool) -> None:
     pace = Pace()
     while (due_us := min(one.due_us for one in cyclic)) < NEVER:
         pace.wait_until(due_us)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.monitor.check.rule import FrameSelection
+from tickrig.host.monitor.check.rule import FrameSelection, Rule
 from tickrig.host.monitor.check.time_rules import BOOT_UP
 from tickrig.host.monitor.frames.ident import ERROR, ident_of, ident_text, sender_of
 from tickrig.host.monitor.frames.record import Record
@@ -24,25 +24,7 @@ REQUEST_IDS: Final = range(0x601, 0x680)
 NODE_MASK: Final = 0x7F
 
 
-class FrameRule:
-    """A rule that sees all frames it wants, and has nothing to say at the end.
-
-    Attributes:
-        name: as findings have it.
-    """
-
-    name = ""
-
-    def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect all."""
-        return FrameSelection()
-
-    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Say nothing."""
-        return ()
-
-
-class NoEmcy(FrameRule):
+class NoEmcy(Rule):
     """No EMCY but error reset, on the default COB-IDs."""
 
     name = "no-emcy"
@@ -65,7 +47,7 @@ class NoEmcy(FrameRule):
         return f"node {node}: EMCY {emcy.code:04X}h {describe(emcy.code)}"
 
 
-class NoSdoAbort(FrameRule):
+class NoSdoAbort(Rule):
     """No aborted transfer at a default SDO server."""
 
     name = "no-sdo-abort"
@@ -93,7 +75,7 @@ class NoSdoAbort(FrameRule):
         return f"node {node}: {side} aborts {which}, {reason}"
 
 
-class NoErrorFrames(FrameRule):
+class NoErrorFrames(Rule):
     """No error frame."""
 
     name = "no-error-frames"
@@ -109,7 +91,7 @@ class NoErrorFrames(FrameRule):
         return describe_error_frame(frame)
 
 
-class KnownIds(FrameRule):
+class KnownIds(Rule):
     """No other identifiers than these; each other one is told once a bus.
 
     Args:
@@ -143,7 +125,7 @@ RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION
 ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
 
 
-class NodesPresent(FrameRule):
+class NodesPresent(Rule):
     """These nodes are heard."""
 
     name = "nodes"
@@ -167,7 +149,7 @@ class NodesPresent(FrameRule):
                 yield f"node {node} was never heard"
 
 
-class NoReboot(FrameRule):
+class NoReboot(Rule):
     """No node that was heard before boots without an NMT reset."""
 
     name = "no-reboot"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 from tickrig.host.monitor.frames.record import Record
 
@@ -56,25 +56,22 @@ class FrameSelection(NamedTuple):
     firsts: bool = False
 
 
-class Rule(Protocol):
-    """One rule.
+class Rule:
+    """One rule; this one sees all frames that it wants, and has nothing to say at the end.
 
     Attributes:
         name: as findings and reports have it.
     """
 
-    @property
-    def name(self) -> str:
-        """As findings and reports have it."""
-        ...
+    name = ""
 
     def wants(self, ident: int, /) -> bool:
         """Say whether frames of an identifier matter; error frames have `ident.ERROR`."""
-        ...
+        raise NotImplementedError
 
     def selection(self, ident: int, /) -> FrameSelection:
         """Say which frames of an identifier that it wants it must see."""
-        ...
+        return FrameSelection()
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Say what is wrong with a frame.
@@ -83,7 +80,7 @@ class Rule(Protocol):
             record: the frame.
             gap_us: since the one before it with this identifier on this bus; None for the first.
         """
-        ...
+        raise NotImplementedError
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Say what is missing.
@@ -92,4 +89,4 @@ class Rule(Protocol):
             latest_us: when each identifier was heard last, on any bus.
             end_us: when listening ended.
         """
-        ...
+        return ()

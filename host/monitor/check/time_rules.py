@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.check.rule import FrameSelection
+from tickrig.host.monitor.check.rule import FrameSelection, Rule
 from tickrig.host.monitor.frames.ident import ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
@@ -54,7 +54,7 @@ class HeartbeatTimes(NamedTuple):
     high_us: int
 
 
-class Heartbeat:
+class Heartbeat(Rule):
     """A heartbeat comes in time, the first one after a boot-up whenever it likes.
 
     Attributes:
@@ -100,7 +100,7 @@ class Heartbeat:
         return f"node {node}: {ms_text(gap_us)} ms since its last heartbeat, {said}"
 
 
-class MaxGap:
+class MaxGap(Rule):
     """An identifier comes again in time.
 
     Attributes:

@@ -22,13 +22,7 @@ from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 
 MOST_CHANNELS: Final = 256
 
-_Parts = tuple[
-    npt.NDArray[np.int64],
-    npt.NDArray[np.uint32],
-    npt.NDArray[np.uint8],
-    npt.NDArray[np.uint64],
-    npt.NDArray[np.uint8],
-]
+_Parts = tuple[npt.NDArray[Any], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +46,11 @@ class Columns:
     channel: npt.NDArray[np.uint8]
     channels: tuple[str, ...] = ()
     tally: Tally = field(default_factory=Tally)
+
+    @property
+    def parts(self) -> _Parts:
+        """The arrays of the frames' properties."""
+        return self.at_us, self.ident, self.dlc, self.payload, self.channel
 
     def __len__(self) -> int:
         """Return how many frames there are."""
@@ -111,42 +110,21 @@ class Rows:
 
     def columns(self) -> _Parts:
         """Return the columns of the rows that are known."""
-        columns = (self.at_us, self.ident, self.dlc, self.payload, self.channel)
-        if self.known.all():
-            return columns
-        return (
-            self.at_us[self.known],
-            self.ident[self.known],
-            self.dlc[self.known],
-            self.payload[self.known],
-            self.channel[self.known],
-        )
+        parts = self.at_us, self.ident, self.dlc, self.payload, self.channel
+        return parts if self.known.all() else tuple(part[self.known] for part in parts)
 
 
 def joined(parts: Iterable[Rows], channels: ChannelNames, tally: Tally) -> Columns:
     """Return the rows that are known as columns."""
     kept = [Rows(0).columns(), *(rows.columns() for rows in parts)]
-    return Columns(
-        np.concatenate([columns[0] for columns in kept]),
-        np.concatenate([columns[1] for columns in kept]),
-        np.concatenate([columns[2] for columns in kept]),
-        np.concatenate([columns[3] for columns in kept]),
-        np.concatenate([columns[4] for columns in kept]),
-        channels.names,
-        tally,
-    )
+    at_us, ident, dlc, payload, channel = map(np.concatenate, zip(*kept, strict=True))
+    return Columns(at_us, ident, dlc, payload, channel, channels.names, tally)
 
 
 def select(columns: Columns, rows: npt.NDArray[np.int64]) -> Columns:
     """Return some rows."""
-    return Columns(
-        columns.at_us[rows],
-        columns.ident[rows],
-        columns.dlc[rows],
-        columns.payload[rows],
-        columns.channel[rows],
-        columns.channels,
-    )
+    at_us, ident, dlc, payload, channel = (part[rows] for part in columns.parts)
+    return Columns(at_us, ident, dlc, payload, channel, columns.channels)
 
 
 def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
@@ -164,15 +142,8 @@ def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
 def records(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Record]:
     """Return rows as they were heard; who sent them is not in them."""
     names = columns.channels
-    parts = zip(
-        columns.at_us[rows].tolist(),
-        columns.channel[rows].tolist(),
-        columns.ident[rows].tolist(),
-        columns.dlc[rows].tolist(),
-        columns.payload[rows].tolist(),
-        strict=True,
-    )
-    return [Record(at_us, names[channel], _frame(*frame)) for at_us, channel, *frame in parts]
+    parts = zip(*(part[rows].tolist() for part in columns.parts), strict=True)
+    return [Record(at_us, names[channel], _frame(*frame)) for at_us, *frame, channel in parts]
 
 
 def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[CanFrame | ErrorFrame]:

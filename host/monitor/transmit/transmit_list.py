@@ -10,69 +10,23 @@ from tickrig.host.monitor.transmit.frame_fields import FrameFields
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
-
-@dataclass(slots=True)
-class Cyclic:
-    """Sends a frame each period; the deadlines are absolute, so it does not drift.
-
-    A period that has passed whole is not made up for, it is counted.
-
-    Args:
-        frame: what is sent.
-        period_us: at least 1.
-        due_us: when it is first sent.
-        count: how often it is sent, 0 for ever.
-        fields: what changes in it each time.
-
-    Attributes:
-        sent: how often it was.
-        missed: how many periods passed without it.
-
-    Raises:
-        ValueError: a period below 1 us, or a field that is not in the frame.
-    """
-
-    frame: CanFrame
-    period_us: int
-    due_us: int = 0
-    count: int = 0
-    fields: FrameFields = field(default_factory=FrameFields)
-    sent: int = field(default=0, init=False)
-    missed: int = field(default=0, init=False)
-
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        if self.period_us < 1:
-            raise ValueError(f"a period of {self.period_us} us; 1 us is the least")
-        self.fields.check(len(self.frame.data))
-
-    def tick(self, now_us: int) -> Frames:
-        """Return the frame if it is due."""
-        if now_us < self.due_us:
-            return ()
-        late = (now_us - self.due_us) // self.period_us
-        self.missed += late
-        self.due_us += (late + 1) * self.period_us
-        data = self.fields.put(self.frame.data, self.sent)
-        self.sent += 1
-        if self.sent == self.count:
-            self.due_us = NEVER
-        return (self.frame._replace(data=data),)
-
-
 ONCE: Final = 0
 """As a period: a row that is sent when somebody says so."""
 
 
 @dataclass(slots=True)
 class TransmitRow:
-    """One frame of the list.
+    """A frame that is sent by hand, or each period; the deadlines are absolute: it does not drift.
+
+    A period that has passed whole is not made up for, it is counted.
 
     Args:
         name: what people call it.
         frame: what is sent.
         period_us: of a cyclic row, else `ONCE`.
         fields: what changes in it each time.
+        due_us: when it is sent next, `NEVER` while it is not enabled.
+        count: how often it is sent, 0 for ever.
 
     Attributes:
         sent: how often it was.
@@ -86,9 +40,10 @@ class TransmitRow:
     frame: CanFrame
     period_us: int = ONCE
     fields: FrameFields = field(default_factory=FrameFields)
+    due_us: int = NEVER
+    count: int = 0
     sent: int = field(default=0, init=False)
     missed: int = field(default=0, init=False)
-    _cyclic: Cyclic | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the arguments."""
@@ -99,12 +54,7 @@ class TransmitRow:
     @property
     def enabled(self) -> bool:
         """Whether it is sent cyclically."""
-        return self._cyclic is not None
-
-    @property
-    def due_us(self) -> int:
-        """When it is sent next."""
-        return NEVER if self._cyclic is None else self._cyclic.due_us
+        return self.due_us < NEVER
 
     def enable(self, now_us: int) -> None:
         """Send it from now on in each period; counters go on where they were.
@@ -114,12 +64,12 @@ class TransmitRow:
         """
         if self.period_us == ONCE:
             raise ValueError(f"{self.name} has no period")
-        if self._cyclic is None:
-            self._cyclic = Cyclic(self.frame, self.period_us, now_us)
+        if not self.enabled:
+            self.due_us = now_us
 
     def disable(self) -> None:
         """Send it no more."""
-        self._cyclic = None
+        self.due_us = NEVER
 
     def once(self) -> Frames:
         """Return it, to be sent now."""
@@ -129,10 +79,15 @@ class TransmitRow:
 
     def tick(self, now_us: int) -> Frames:
         """Return it if it is due."""
-        if self._cyclic is None or not self._cyclic.tick(now_us):
+        if now_us < self.due_us:
             return ()
-        self.missed, self._cyclic.missed = self.missed + self._cyclic.missed, 0
-        return self.once()
+        late = (now_us - self.due_us) // self.period_us
+        self.missed += late
+        self.due_us += (late + 1) * self.period_us
+        out = self.once()
+        if self.sent == self.count:
+            self.disable()
+        return out
 
 
 @dataclass(slots=True)
@@ -156,10 +111,6 @@ class TransmitList:
     def due_us(self) -> int:
         """When a row is sent next."""
         return min((row.due_us for row in self.rows), default=NEVER)
-
-    def arm(self) -> None:
-        """Let rows send."""
-        self.armed = True
 
     def stop(self) -> None:
         """Send nothing more, whatever was enabled."""

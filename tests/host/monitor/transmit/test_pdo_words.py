@@ -16,7 +16,7 @@ EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 
 
 @pytest.fixture(scope="module")
-def messages() -> PdoFrames:
+def words() -> PdoFrames:
     return PdoFrames({5: read_eds_objects(EPOS, 5), 6: made()})
 
 

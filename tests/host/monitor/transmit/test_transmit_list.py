@@ -12,7 +12,7 @@ SYNC = CanFrame.parse("080#")
 
 def armed(*rows: TransmitRow) -> TransmitList:
     made = TransmitList(list(rows))
-    made.arm()
+    made.armed = True
     return made
 
 
@@ -26,7 +26,7 @@ def test_nothing_is_sent_until_it_is_armed() -> None:
         rows.enable(0, 0)
     with pytest.raises(ValueError, match="not armed: nothing is sent"):
         rows.once(0)
-    rows.arm()
+    rows.armed = True
     assert (rows.due_us, sent(rows, 0, 50_000)) == (NEVER, [])
 
 
@@ -52,7 +52,7 @@ def test_stopping_disables_all_rows_also_for_the_next_time() -> None:
     rows.enable(1, 0)
     rows.stop()
     assert (rows.armed, [row.enabled for row in rows.rows]) == (False, [False, False])
-    rows.arm()
+    rows.armed = True
     assert sent(rows, 0, 10_000) == []
 
 
