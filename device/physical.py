@@ -15,7 +15,14 @@ from tickrig.device.twin import Immutable
 
 
 class SignalType(Enum):
-    """What a physical input is."""
+    """What a physical input is.
+
+    Attributes:
+        LEVEL: a quantity, such as a stick, a voltage or a load.
+        BUTTON: 1 while pressed.
+        TEXT: words, or bytes in hex.
+        FAULT: 1 while the physical fault is present.
+    """
 
     LEVEL = "level"  # a quantity: a stick, a voltage, a load
     BUTTON = "button"  # 1 while pressed
@@ -50,7 +57,13 @@ class InputSignal(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class OutputSignal(Immutable):
-    """A physical output: what an observer would see on the device."""
+    """A physical output: what an observer would see on the device.
+
+    Attributes:
+        name: what scenario files and panels call it.
+        text: what it is, for people.
+        unit: unit of the value, empty for a plain number.
+    """
 
     name: str
     text: str
@@ -69,6 +82,7 @@ class QuantityBank:
 
     Attributes:
         table: the inputs by name, in order of declaration.
+        groups: names of several inputs that are set together.
         changed: whether anything was set since the device last looked.
     """
 
@@ -92,6 +106,10 @@ class QuantityBank:
     def set(self, name: str, value: float | str) -> None:
         """Set an input.
 
+        Args:
+            name: which.
+            value: what it becomes, in its unit and range.
+
         Raises:
             ValueError: no such input, no number of its kind, or one out of its range.
         """
@@ -101,7 +119,18 @@ class QuantityBank:
             self._on_change()
 
     def check(self, name: str, value: float | str) -> float:
-        """Return the value that the input would be set to, or raise as `set` does."""
+        """Check a value, without setting it.
+
+        Args:
+            name: of the input.
+            value: what it would become.
+
+        Returns:
+            What it would be set to.
+
+        Raises:
+            ValueError: as `set`.
+        """
         item = self.find(name)
         whole = isinstance(value, int) and not isinstance(value, bool)
         fraction = item.real and isinstance(value, float) and isfinite(value)
@@ -114,11 +143,25 @@ class QuantityBank:
         return value
 
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
-        """Return the names of all inputs of a type."""
+        """List the inputs of a type.
+
+        Args:
+            signal_type: which type.
+
+        Returns:
+            Their names, in order of declaration.
+        """
         return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input.
+        """Look the description of an input up.
+
+        Args:
+            name: of the input.
+            signal_type: what it must be, if given.
+
+        Returns:
+            The description.
 
         Raises:
             ValueError: no such input, or none of this type.
@@ -132,7 +175,20 @@ class QuantityBank:
 
 
 class InputBank(QuantityBank):
-    """The values of a device whose inputs are all whole numbers."""
+    """The values of a device whose physical inputs are all whole numbers.
+
+    A change takes effect at the device's next tick.
+
+    Args:
+        table: the inputs.
+        groups: names of several inputs that are set together, as `stick`.
+        on_change: called after each change.
+
+    Attributes:
+        table: the inputs by name, in order of declaration.
+        groups: names of several inputs that are set together.
+        changed: whether anything was set since the device last looked.
+    """
 
     __slots__ = ()
 

@@ -20,7 +20,14 @@ class LineSplitter:
         self._max_bytes = max_bytes
 
     def push(self, data: bytes) -> list[bytes]:
-        """Take bytes in; give whole lines out, without LF and one CR before it."""
+        """Take bytes in, and give whole lines out.
+
+        Args:
+            data: what came.
+
+        Returns:
+            The lines that have ended, without LF and one CR before it.
+        """
         *lines, tail = (self._tail + data).split(b"\n")
         out = []
         for line in lines:

@@ -62,6 +62,12 @@ def make_slave(
         nonvolatile: what it kept from an earlier life.
         application: what the device does with its objects: a device profile, or nothing.
         sdo: what its SDO servers put up with.
+
+    Returns:
+        A slave that boots in its first tick; put it on a `CanWire` in a `Station`.
+
+    Raises:
+        ValueError: an impossible node-ID.
     """
     own: dict[ServiceMaker, ServiceMaker] = {
         Application: application,

@@ -83,11 +83,29 @@ class Rh3Base(Copyable):
         self._on = self.inputs.changed = True
 
     def read(self, name: str, /) -> float:
-        """Return one of `outputs`; KeyError if unknown."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return READ[name](self._seen)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Let time pass up to now."""
+        """Let time pass up to now.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the bytes that arrived since the latest tick.
+
+        Returns:
+            The bytes that it sends in this tick.
+        """
         self._catch_up(now_us)
         if self.inputs.changed:
             self._inputs_changed()

@@ -94,7 +94,17 @@ class Rrc(Copyable):
         self._due_us = 0
 
     def read(self, name: str, /) -> int | str:
-        """Return one of `outputs` as it was left by the latest tick; KeyError if unknown."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return {
             "state": self.state.value,
             "vr2_power": int(self.state in POWERED_ON),
@@ -109,7 +119,15 @@ class Rrc(Copyable):
         }[name]
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Run one period, in the order of DECISION R28."""
+        """Run one period, in the order of DECISION R28.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the bytes that arrived since the latest tick.
+
+        Returns:
+            The bytes that it sends in this tick.
+        """
         tick = now_us // TICK_US
         self.inputs.changed = False
         if not self.inputs["rrc_power"]:

@@ -104,7 +104,17 @@ class RtcLiteNode(Copyable):
         self.inputs.changed = True
 
     def read(self, name: str, /) -> float | str:
-        """Return one of `outputs` as it was left by the latest tick; KeyError if unknown."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         life = self._life
         own: dict[str, float | str] = {
             "state": life.state.name.capitalize() if self._on else "Off",
@@ -115,7 +125,15 @@ class RtcLiteNode(Copyable):
         return own[name] if name in own else port_text(life.component, name)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Run one pass of the main loop."""
+        """Run one pass of the main loop.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the bytes that arrived since the latest tick.
+
+        Returns:
+            The bytes that it sends in this tick.
+        """
         if self.inputs["power_cut"]:
             if self._on:
                 self.reset()

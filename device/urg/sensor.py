@@ -76,11 +76,29 @@ class Urg(Copyable):
         self._restarted = True
 
     def read(self, name: str, /) -> float:
-        """Return one of `outputs`; KeyError if unknown."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Take what arrived, and go on to now."""
+        """Take what arrived, and go on to now.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the bytes that arrived since the latest tick.
+
+        Returns:
+            The bytes that it sends in this tick.
+        """
         if self._restarted:
             self._power_up(now_us)
         sent = self._inputs_changed(now_us) if self.inputs.changed else b""

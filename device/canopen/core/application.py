@@ -36,20 +36,42 @@ class Application(Service):
     def has_inputs(
         self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None
     ) -> None:
-        """Give it physical inputs; setting one asks for `on_execute`."""
+        """Give it physical inputs; setting one asks for `on_execute`.
+
+        Args:
+            table: the inputs.
+            groups: names of several inputs that are set together.
+        """
         self.inputs = QuantityBank(table, groups, self.request)
 
     def read(self, name: str) -> float | str:
-        """Return the present value of a physical output; KeyError if there is none."""
+        """Look at a physical output.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its present value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         raise KeyError(name)
 
     def on_execute(self, now_us: int) -> None:
-        """Read inputs, work, write outputs."""
+        """Read inputs, work, write outputs; a device profile overrides it.
+
+        Args:
+            now_us: time of the tick.
+        """
 
     def without_power(self, now_us: int) -> int:
         """Let time pass while the supply is cut: what moves coasts.
 
         Called in the first tick without power, and when a physical input was set.
+
+        Args:
+            now_us: time of the tick.
 
         Returns:
             When it wants to be called again, `NEVER` if nothing will change by itself.
@@ -61,7 +83,11 @@ class Application(Service):
         self.schedule(self.node.now_us)
 
     def watch(self, entries: Iterable[Entry]) -> None:
-        """Call `on_execute` whenever one of these objects has changed."""
+        """Call `on_execute` whenever one of some objects has changed.
+
+        Args:
+            entries: the objects.
+        """
         changed = self._object_changed
         for entry in entries:
             entry.watch(changed)
@@ -70,7 +96,7 @@ class Application(Service):
         self.request()
 
     def tick(self, now_us: int) -> None:
-        """Execute."""
+        """Execute; `on_execute` says what."""
         self.on_execute(now_us)
 
 

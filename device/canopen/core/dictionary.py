@@ -78,8 +78,7 @@ class Dictionary:
         by_multiplexer: readable entries that an SDO has named, by the three bytes that do.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
-    >>> from tickrig.device.twin import Immutable
-    from tickrig.wire.canopen.eds.object_table import RW
+    >>> from tickrig.wire.canopen.eds.object_table import RW
     >>> dictionary = Dictionary([EntryDescription(0x2000, 0, "Gain", DataType.UNSIGNED8, RW)])
     >>> dictionary[0x2000, 0].value = 5
     >>> dictionary[0x2000, 0].value, dictionary.copy()[0x2000, 0].value
@@ -131,12 +130,30 @@ class Dictionary:
         return entry
 
     def find(self, index: int, sub: int = 0) -> Entry | None:
-        """Return an entry, None if there is none."""
+        """Look an entry up.
+
+        Args:
+            index: of the object, 0x0000..0xFFFF.
+            sub: sub-index, 0x00..0xFF.
+
+        Returns:
+            The entry, None if there is none.
+        """
         place = self._places.get(index << 8 | sub)
         return None if place is None else self._entries[place]
 
     def look_up(self, multiplexer: bytes) -> Entry:
-        """Return the entry that an SDO names by three bytes; SdoAbort if there is none."""
+        """Look up the entry that an SDO names.
+
+        Args:
+            multiplexer: three bytes, the index with its low byte first and the sub-index.
+
+        Returns:
+            The entry.
+
+        Raises:
+            SdoAbort: there is no such object, or no such sub-index.
+        """
         entry = self.by_multiplexer.get(multiplexer)
         if entry is None:
             index = int.from_bytes(multiplexer[:2], "little")
@@ -149,15 +166,37 @@ class Dictionary:
         return entry
 
     def object(self, index: int) -> list[Entry]:
-        """Return all entries of an object, sorted; none if there is no such object."""
+        """List the entries of an object.
+
+        Args:
+            index: of the object.
+
+        Returns:
+            All of them, sorted; none if there is no such object.
+        """
         span = self.description.spans.get(index)
         return [] if span is None else self._entries[span]
 
     def within(self, area: range) -> list[int]:
-        """Return the indices of the objects in an area, sorted."""
+        """List the objects in an area.
+
+        Args:
+            area: indices, such as `range(0x1000, 0x2000)`.
+
+        Returns:
+            Those of which there is an object, sorted.
+        """
         return [index for index in self.description.spans if index in area]
 
     def elements(self, index: int, most: int = 254) -> list[Entry]:
-        """Return the entries of an object from sub-index 1 on, without a gap."""
+        """List the elements of an array.
+
+        Args:
+            index: of the object.
+            most: no more than so many.
+
+        Returns:
+            Its entries from sub-index 1 on, up to the first gap.
+        """
         places = self.description.elements.get(index)
         return [] if places is None else self._entries[places][:most]

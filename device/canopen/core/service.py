@@ -37,7 +37,17 @@ class Service(Copyable):
 
     @classmethod
     def of(cls, node: CanopenSlave) -> Self:
-        """Return this service of a slave; StopIteration if the slave has none."""
+        """Look this service up in a slave.
+
+        Args:
+            node: the slave.
+
+        Returns:
+            Its first service of this class.
+
+        Raises:
+            StopIteration: it has none.
+        """
         return next(service for service in node.services if isinstance(service, cls))
 
     def power_on(self) -> None:
@@ -50,42 +60,94 @@ class Service(Copyable):
         """Act at the end of Initialising, in a slave that has a node-ID."""
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Give the CAN-IDs of data frames that it wants in an NMT state, each with its handler."""
+        """Give the CAN-IDs of data frames that it wants.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs, each with what handles its frames.
+        """
         return iter(())
 
     def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """The same for remote frames."""
+        """Give the CAN-IDs of remote frames that it wants.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs, each with what handles its frames.
+        """
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
         """Give those of the CAN-IDs whose frames may, when handled, change what the node hears.
 
         An acceptance filter lets everything pass behind such a frame.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs.
         """
         return iter(())
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Hear of each change of the NMT state, after it was made."""
+        """React to a change of the NMT state, after it was made.
+
+        Args:
+            old: the state before.
+            new: the present state.
+        """
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """Hear of an error (see `CanopenSlave.emergency`)."""
+        """React to an error; `CanopenSlave.emergency` has the same arguments.
+
+        Args:
+            code: emergency error code.
+            register: bits of the error register 1001h.
+            text: manufacturer-specific bytes.
+        """
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """Hear that an error is gone."""
+        """React to the end of an error.
+
+        Args:
+            code: emergency error code.
+            text: its manufacturer-specific bytes; None for all errors of this code.
+        """
 
     def communication_error(self) -> None:
-        """Hear of a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
+        """React to a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
 
     def bus_state(self, state: ErrorState) -> None:
-        """Hear of the CAN controller's fault confinement."""
+        """React to the CAN controller's fault confinement.
+
+        Args:
+            state: error active, error passive or bus-off.
+        """
 
     def tick(self, now_us: int) -> None:
-        """Do what is due; called in the tick for which it was scheduled."""
+        """Do what is due; called in the tick for which it was scheduled.
+
+        Args:
+            now_us: time of the tick.
+        """
 
     def follow_cob_id(self, entry: Entry) -> None:
-        """Listen to another CAN-ID: a watcher of a COB-ID."""
+        """Listen to another CAN-ID, as a watcher of a COB-ID does.
+
+        Args:
+            entry: the COB-ID, which has changed.
+        """
         self.node.rewire()
 
     def schedule(self, due_us: int) -> None:
-        """Ask for `tick` at this time, instead of the one asked for before; `NEVER` for none."""
+        """Ask for `tick`, instead of what was asked for before.
+
+        Args:
+            due_us: when; `NEVER` for not at all.
+        """
         self.node.schedule(self.slot, due_us)

@@ -50,7 +50,10 @@ class CanopenSlave(Copyable):
         ValueError: an impossible node-ID.
 
     Attributes:
+        dictionary: its objects.
+        services: its services, in the order of a tick.
         node_id: the active node-ID.
+        configured_id: the node-ID it was made with.
         pending_id: the node-ID that counts from the next reset on (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
@@ -119,7 +122,15 @@ class CanopenSlave(Copyable):
         self._listen_to(None)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Run one tick."""
+        """Run one tick.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the frames that arrived since the latest tick.
+
+        Returns:
+            The frames that it sends in this tick.
+        """
         self.now_us = now_us
         if not self._powered:
             self._power_on()
@@ -142,7 +153,12 @@ class CanopenSlave(Copyable):
         return tuple(out)
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Put a data frame into this tick's traffic."""
+        """Put a data frame into this tick's traffic.
+
+        Args:
+            can_id: 11-bit CAN-ID, 0x000..0x7FF.
+            data: 0 to 8 bytes.
+        """
         self._out.append(CanFrame(can_id, data))
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
@@ -158,7 +174,12 @@ class CanopenSlave(Copyable):
                 service.emergency(code, register, text)
 
     def emergency_clear(self, code: int, text: bytes | None = None) -> None:
-        """Clear an error, without `text` all that have this code."""
+        """Clear an error; one that is not active is no error.
+
+        Args:
+            code: emergency error code, as it was raised.
+            text: the bytes with which it was raised; without them all of this code are cleared.
+        """
         for service in self.services:
             service.emergency_clear(code, text)
 
@@ -168,7 +189,11 @@ class CanopenSlave(Copyable):
             service.communication_error()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Take what the CAN controller reports; for the one that owns the controller."""
+        """Take what the CAN controller reports; for the one that owns the controller.
+
+        Args:
+            state: error active, error passive or bus-off.
+        """
         if self._powered:
             for service in self.services:
                 service.bus_state(state)
@@ -179,7 +204,12 @@ class CanopenSlave(Copyable):
         self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
     def schedule(self, slot: int, due_us: int) -> None:
-        """Enter when a service wants its `tick`."""
+        """Enter when a service wants its `tick`.
+
+        Args:
+            slot: the place of the service.
+            due_us: when; `NEVER` for not at all.
+        """
         before, self._dues[slot] = self._dues[slot], due_us
         if due_us < self._due_us:
             self._due_us = due_us
@@ -206,7 +236,11 @@ class CanopenSlave(Copyable):
             notify()
 
     def enter(self, state: NmtState) -> None:
-        """Change the NMT state; services and application hear of it."""
+        """Change the NMT state; services and application are notified.
+
+        Args:
+            state: the new state; the same one changes nothing.
+        """
         old, self.state = self.state, state
         if old is state:
             return

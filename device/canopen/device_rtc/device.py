@@ -50,7 +50,17 @@ class DeviceRtc(Application):
         node.entered = self._moved
 
     def read(self, name: str) -> float | str:
-        """Return the present value of a physical output."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return text_of(self.life, name)
 
     def power_on(self) -> None:

@@ -47,6 +47,8 @@ class Ds401(Application):
     (6430h, 6450h are kept and mean nothing); the conversion time.
 
     Args:
+        node: the slave.
+        slot: its place in the tick.
         inputs: converters of the analogue inputs, from the first one on; plain counts without.
         outputs: those of the analogue outputs.
     """
@@ -108,7 +110,17 @@ class Ds401(Application):
         self._fail(failed=True)
 
     def read(self, name: str) -> float:
-        """Return the present value of a physical output; KeyError if there is none."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return self._terminals[name].level
 
     def on_execute(self, now_us: int) -> None:

@@ -85,7 +85,14 @@ class Ds402(Application):
         encoder_error: error code of a pulled encoder.
         limits_are_faults: the end of the way is a fault, not just a stop.
         more_targets: objects of a maker whose change is a new target.
+        outputs: what the world sees of it; `read` gives the values.
+        parameters: its objects, by index.
+        offered: the modes that it has and that its dictionary lists, by number.
         axis: motor, reference, settings and zero.
+        limits: of position and velocity, and what they cut.
+        automaton: the state machine of CiA 402.
+        supervision: of supply, temperature, encoder and following error.
+        actual_values: the objects that show what is measured.
         switches: limit switches and home switch.
         mode: the mode of operation at work.
         mode_number: its number, as in 6061h.
@@ -150,7 +157,17 @@ class Ds402(Application):
         return self.automaton.state is DriveState.OPERATION_ENABLED
 
     def read(self, name: str) -> float | str:
-        """Return a physical output."""
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
         return terminals.READ[name](self)
 
     def fault(self, code: int) -> None:
@@ -166,7 +183,7 @@ class Ds402(Application):
         axis.zero, axis.homed = float(axis.motor.counts), False
 
     def without_power(self, now_us: int) -> int:
-        """Let the shaft coast."""
+        """Let the shaft coast; see `Application.without_power`."""
         motor = self.axis.motor
         motor.release()
         motor.step_to(now_us)
