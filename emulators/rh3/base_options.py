@@ -15,30 +15,24 @@ from tickrig.host.cli.start import loading
 if TYPE_CHECKING:
     from tickrig.device.rh3.parameters import BaseParameters
 
-NAMES: Final = (
-    "radius_left_m",
-    "radius_right_m",
-    "tread_m",
-    "friction",
-    "response_s",
-    "delay_ms",
-    "noise",
-)
+_OPTIONS: Final[Mapping[str, str]] = {
+    "radius_left_m": "Effective radius of the left wheel.  [0.0995]",
+    "radius_right_m": "Effective radius of the right wheel.  [0.0995]",
+    "tread_m": "Effective distance between the wheels.  [0.464]",
+    "friction": "Coefficient between wheels and ground; without it they never slip.",
+    "response_s": "Time constant of the speed loop.  [0.05]",
+    "delay_ms": "From a command to its effect.  [0]",
+    "noise": "Spread of a wheel's way over the ground, as a share of it.  [0]",
+}
+NAMES: Final = tuple(_OPTIONS)
 
 
-def _number(name: str, text: str) -> Decorator:
-    return click.option(f"--{name}", type=float, metavar="NUMBER", help=text)
+def _option(name: str, text: str) -> Decorator:
+    kind, metavar = (int, "MS") if name == "delay_ms" else (float, "NUMBER")
+    return click.option(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
 
 
-base_options: Final = add_options(
-    _number("radius-left-m", "Effective radius of the left wheel.  [0.0995]"),
-    _number("radius-right-m", "Effective radius of the right wheel.  [0.0995]"),
-    _number("tread-m", "Effective distance between the wheels.  [0.464]"),
-    _number("friction", "Coefficient between wheels and ground; without it they never slip."),
-    _number("response-s", "Time constant of the speed loop.  [0.05]"),
-    click.option("--delay-ms", type=int, metavar="MS", help="From a command to its effect.  [0]"),
-    _number("noise", "Spread of a wheel's way over the ground, as a share of it.  [0]"),
-)
+base_options: Final = add_options(*(_option(*row) for row in _OPTIONS.items()))
 """Add the parameters in `NAMES` as options."""
 
 

@@ -47,6 +47,7 @@ class MotionChain:
     Attributes:
         position_input: where goals are entered.
         odometry: what the pose is.
+        components: all six, in the order of execution.
         context: their execution context.
     """
 
@@ -64,19 +65,7 @@ class MotionChain:
         self.omni_to_2wd = OmniTo2WD(f"OmniTo2WD{suffix}")
         self.navigation = Navigation(f"Navigation{suffix}")
         self.path_follower = PathFollower(f"PathFollower{suffix}")
-        self.context = ExecutionContext(rate_hz)
-        for component in self.components:
-            manager.add(component, context=self.context)
-        self.context.start()
-        for first, second in CONNECTIONS:
-            manager.connect(self._named(first), self._named(second), _WIDE)
-
-    @property
-    def components(
-        self,
-    ) -> tuple[RefHardRh3, Odometry, PositionInput, OmniTo2WD, Navigation, PathFollower]:
-        """All six, in the order of execution."""
-        return (
+        self.components = (
             self.ref_hard,
             self.odometry,
             self.position_input,
@@ -84,6 +73,12 @@ class MotionChain:
             self.navigation,
             self.path_follower,
         )
+        self.context = ExecutionContext(rate_hz)
+        for component in self.components:
+            manager.add(component, context=self.context)
+        self.context.start()
+        for first, second in CONNECTIONS:
+            manager.connect(self._named(first), self._named(second), _WIDE)
 
     @property
     def in_error(self) -> tuple[str, ...]:

@@ -58,32 +58,28 @@ def components(socket: Path, *names: str) -> list[Any]:
     return described
 
 
-def complete_component(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Complete the name of a component."""
-    return _begun(context, begun, lambda system: [each["name"] for each in system["components"]])
+Complete = Callable[[click.Context, click.Parameter, str], list[str]]
 
 
-def complete_port(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Complete the full name of a port."""
-    return _begun(
-        context,
-        begun,
-        lambda system: [port["name"] for each in system["components"] for port in each["ports"]],
-    )
+def _completer(names: Callable[[Any], list[str]]) -> Complete:
+    """Return what completes a word by names out of the description of a running system."""
+
+    def complete(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+        socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
+        try:
+            known = names(ask_system(Path(socket), "describe"))
+        except Refused:
+            return []
+        return [name for name in known if name.startswith(begun)]
+
+    return complete
 
 
-def complete_type(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Complete the name of a type of components."""
-    return _begun(context, begun, lambda system: system["types"])
-
-
-def _begun(context: click.Context, begun: str, names: Callable[[Any], list[str]]) -> list[str]:
-    socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
-    try:
-        known = names(ask_system(Path(socket), "describe"))
-    except Refused:
-        return []
-    return [name for name in known if name.startswith(begun)]
+complete_component: Final = _completer(lambda system: [one["name"] for one in system["components"]])
+complete_port: Final = _completer(
+    lambda system: [port["name"] for one in system["components"] for port in one["ports"]]
+)
+complete_type: Final = _completer(lambda system: system["types"])
 
 
 def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:

@@ -303,9 +303,7 @@ class Manager(Schedule):
         Raises:
             RtcRefused: no such component, or one cannot from where it is; others stay asked for.
         """
-        for name in names:
-            code = self.context_of(name).activate_component(self.find(name))
-            self._demand(code, name, "activate")
+        self._request("activate", ExecutionContext.activate_component, names)
 
     def deactivate(self, *names: str) -> None:
         """Ask for Inactive.
@@ -316,9 +314,7 @@ class Manager(Schedule):
         Raises:
             RtcRefused: no such component, or one cannot from where it is; others stay asked for.
         """
-        for name in names:
-            code = self.context_of(name).deactivate_component(self.find(name))
-            self._demand(code, name, "deactivate")
+        self._request("deactivate", ExecutionContext.deactivate_component, names)
 
     def reset(self, *names: str) -> None:
         """Ask for Error to Inactive.
@@ -329,9 +325,7 @@ class Manager(Schedule):
         Raises:
             RtcRefused: no such component, or one cannot from where it is; others stay asked for.
         """
-        for name in names:
-            code = self.context_of(name).reset_component(self.find(name))
-            self._demand(code, name, "reset")
+        self._request("reset", ExecutionContext.reset_component, names)
 
     def free_name(self, type_name: str) -> str:
         """Find an instance name that is free.
@@ -373,10 +367,17 @@ class Manager(Schedule):
             raise RtcRefused(f"component type {name!r} calls itself {found.spec.type_name!r}")
         return found
 
-    def _demand(self, code: ReturnCode, name: str, what: str) -> None:
-        if code is not ReturnCode.RTC_OK:
-            state = self.state_of(name).name
-            raise RtcRefused(f"{what} {name}: {code.name}, it is {state}", code)
+    def _request(
+        self,
+        what: str,
+        request: Callable[[ExecutionContext, RtComponent], ReturnCode],
+        names: tuple[str, ...],
+    ) -> None:
+        for name in names:
+            code = request(self.context_of(name), self.find(name))
+            if code is not ReturnCode.RTC_OK:
+                state = self.state_of(name).name
+                raise RtcRefused(f"{what} {name}: {code.name}, it is {state}", code)
 
     def _end(self, component: RtComponent) -> None:
         """End a component, unless that happened meanwhile."""
