@@ -7,8 +7,9 @@ NMT Start activates it; while its motor is hot it ends in Error.
 from __future__ import annotations
 
 from tickrig import InputSignal
-from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result  # internal
+from tickrig.device.canopen.device_rtc.component import CanopenComponent  # internal
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort  # internal
+from tickrig.device.component import ERROR, Result  # internal
 from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT  # internal
 
 STEP_UM, HOT_DC = 500, 900

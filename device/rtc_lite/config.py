@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.twin import Immutable
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 RATE_HZ: Final = range(1, 1_001)
 """Rates that a tick of 1 ms can hold."""
@@ -29,8 +29,8 @@ class LiteConfig(Immutable):
         ValueError: a rate or a delay that a node cannot have.
     """
 
-    framing: LiteFraming = LiteFraming.LITE
-    checksum: LiteChecksum = LiteChecksum.SUM8
+    framing: Framing = Framing.LITE
+    checksum: Checksum = Checksum.SUM8
     context: LiteContextType = LiteContextType.PROXY
     rate_hz: int = DEFAULT_RATE_HZ
     slow_answer_us: int = 200_000
@@ -41,5 +41,5 @@ class LiteConfig(Immutable):
             raise ValueError(f"rate_hz is {self.rate_hz}, 1..{RATE_HZ[-1]} is possible")
         if self.slow_answer_us < 1:
             raise ValueError(f"slow_answer_us is {self.slow_answer_us}, at least 1 is needed")
-        if self.framing is LiteFraming.RTNO and self.checksum is not LiteChecksum.SUM8:
+        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result
+from tickrig.device.component import CallbackRunner
+from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
 
 
@@ -55,23 +55,16 @@ CONTEXT_CALLBACKS: Final = {
 NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
 
 
-@dataclass(slots=True)
-class LiteLifeCycle:
+class LiteLifeCycle(CallbackRunner[LiteComponent]):
     """Runs the callbacks of a component, and keeps its state.
 
     Attributes:
-        component: the component.
         state: its state.
-        latest: name of the callback that ran last, empty before the first.
-        calls: how many callbacks ran.
-        executed: how many of them were `on_execute`.
     """
 
-    component: LiteComponent
-    state: LiteState = field(default=LiteState.CREATED, init=False)
-    latest: str = field(default="", init=False)
-    calls: int = field(default=0, init=False)
-    executed: int = field(default=0, init=False)
+    def __init__(self, component: LiteComponent) -> None:
+        super().__init__(component)
+        self.state = LiteState.CREATED
 
     def obey(self, command: LiteCommand) -> LiteStatus:
         """Do what a command of the life cycle asks for."""
@@ -82,13 +75,13 @@ class LiteLifeCycle:
         move = TRANSITIONS[command]
         if self.state is not move.begin:
             return LiteStatus.WRONG_STATE
-        if self._call(move.callback):
+        if self.call(move.callback):
             self.state = move.good
             return LiteStatus.OK
         if move.bad is LiteState.ERROR and move.begin is not LiteState.ERROR:
             self._enter_error(left=move.callback == "on_deactivated")
         self.state = move.bad
-        return ERROR
+        return LiteStatus.ERROR
 
     def _abort_at_once(self) -> LiteStatus:
         if self.state is not LiteState.ACTIVE:
@@ -100,20 +93,12 @@ class LiteLifeCycle:
     def _enter_error(self, *, left: bool = False) -> None:
         """Run the exit action of Active unless that is what failed, then `on_aborting`."""
         if not left:
-            self._call("on_deactivated")
-        self._call("on_aborting")
+            self.call("on_deactivated")
+        self.call("on_aborting")
 
     def _notify(self, callback: str) -> LiteStatus:
         if getattr(type(self.component), callback) is getattr(LiteComponent, callback):
             return LiteStatus.UNSUPPORTED
         if self.state in NOT_ALIVE:
             return LiteStatus.WRONG_STATE
-        return LiteStatus.OK if self._call(callback) else ERROR
-
-    def _call(self, callback: str) -> bool:
-        """Run a callback; False if it failed."""
-        self.latest = callback
-        self.calls += 1
-        self.executed += callback == "on_execute"
-        result: Result = getattr(self.component, callback)()
-        return result in (None, LiteStatus.OK)
+        return LiteStatus.OK if self.call(callback) else LiteStatus.ERROR

@@ -17,7 +17,7 @@ from tickrig.device.timer import Timer
 from tickrig.device.twin import Copyable
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteLinkFault, LiteState
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFrame, LiteFraming, fault_frame
+from tickrig.wire.rtc_lite.frame import Framing, LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.layout import REQUESTS
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 
@@ -94,7 +94,7 @@ class RtcLiteNode(Copyable):
         """Forget everything but configuration and physical inputs, as a power cut does."""
         component = self.make()
         component.inputs = self.inputs
-        rtno = self.config.framing is LiteFraming.RTNO
+        rtno = self.config.framing is Framing.RTNO
         self._life, self._timer = LiteLifeCycle(component), Timer(self.config.rate_hz)
         self._receiver = LiteReceiver(
             RtnoDecoder() if rtno else LiteDecoder(REQUESTS, self.config.checksum)
@@ -164,7 +164,7 @@ class RtcLiteNode(Copyable):
     def _boot(self) -> None:
         """Begin with power; RTno initializes by itself, RTC-Lite is told to (DECISION L11)."""
         self._on = True
-        if self.config.framing is LiteFraming.RTNO:
+        if self.config.framing is Framing.RTNO:
             self._life.obey(LiteCommand.INITIALIZE)
 
     def _serve(self, now_us: int) -> None:
@@ -193,7 +193,7 @@ class RtcLiteNode(Copyable):
 
     def _send(self, now_us: int, frames: list[LiteFrame], calls: int = 0) -> None:
         """Send frames, once the processor has done what led to them."""
-        if self.config.framing is LiteFraming.RTNO:
+        if self.config.framing is Framing.RTNO:
             self._unsent += b"".join(map(encode_packet, frames))
         else:
             self._unsent += b"".join(frame.encode(self.config.checksum) for frame in frames)

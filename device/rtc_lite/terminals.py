@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from tickrig.device.component import shown
 from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.ports import LitePort
@@ -66,7 +67,4 @@ def port_text(component: LiteComponent, name: str) -> float | str:
         "in": component.in_ports,
         "out": component.out_ports,
     }
-    value = ports[side][port.encode()].value
-    if isinstance(value, tuple):
-        return " ".join(str(+element) for element in value)
-    return int(value) if isinstance(value, bool) else value
+    return shown(ports[side][port.encode()].value)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
 def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:
@@ -39,14 +39,14 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
 )
 @click.option(
     "--framing",
-    type=click.Choice([framing.value for framing in LiteFraming]),
-    default=LiteFraming.LITE.value,
+    type=click.Choice([framing.value for framing in Framing]),
+    default=Framing.LITE.value,
     help="Frames of RTC-Lite, or packets of RTno.  [lite]",
 )
 @click.option(
     "--checksum",
-    type=click.Choice([checksum.value for checksum in LiteChecksum]),
-    default=LiteChecksum.SUM8.value,
+    type=click.Choice([checksum.value for checksum in Checksum]),
+    default=Checksum.SUM8.value,
     help="How frames are summed up.  [sum8]",
 )
 @line_options("flip, drop, dup, cut, noise, ping", "tickrig.device.rtc_lite.terminals:INPUTS")

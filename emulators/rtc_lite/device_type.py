@@ -19,7 +19,7 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import refused_at
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 ROUTINE: Final = tuple(
     command.value
@@ -58,8 +58,8 @@ def build_rtc_lite(config: Config) -> RtcLiteNode:
     return RtcLiteNode(
         find_component(settings["node"]),
         LiteConfig(
-            LiteFraming(settings["framing"]),
-            LiteChecksum(settings["checksum"]),
+            Framing(settings["framing"]),
+            Checksum(settings["checksum"]),
             _context(settings["context"]),
             settings["rate_hz"],
             settings["slow_answer_us"],
@@ -101,8 +101,8 @@ def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
     node, timer_hz = options["node"], options["timer_hz"]
     with refused_at("--checksum"):
         config = LiteConfig(
-            LiteFraming(options["framing"]),
-            LiteChecksum(options["checksum"]),
+            Framing(options["framing"]),
+            Checksum(options["checksum"]),
             LiteContextType.TIMER if timer_hz else LiteContextType.PROXY,
             timer_hz or DEFAULT_RATE_HZ,
         )

@@ -17,7 +17,7 @@ from tickrig.emulators.record.wire_log import Splitter
 from tickrig.host.links.link import Link
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFraming
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS
 from tickrig.wire.rtc_lite.rtno import RtnoPacketDecoder
 
@@ -33,7 +33,7 @@ def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
     """Return what makes the splitter of each direction."""
 
     def make(mark: Mark) -> Splitter:
-        if config.framing is LiteFraming.RTNO:
+        if config.framing is Framing.RTNO:
             return _PacketSplitter().split
         layouts = REQUESTS if mark is Mark.TO_DEVICE else REPLIES
         receiver = LiteReceiver(LiteDecoder(layouts, config.checksum))

@@ -18,14 +18,14 @@ from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.frame import HEADER, LiteFraming
+from tickrig.wire.rtc_lite.frame import HEADER, Framing
 from tickrig.wire.rtc_lite.messages import LitePortData
 from tickrig.wire.rtc_lite.values import LitePortType
 
 
 def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
     """Return the verbs that send."""
-    lite = config.framing is LiteFraming.LITE
+    lite = config.framing is Framing.LITE
 
     def send(rest: str) -> Send:
         body = unescape(rest)
@@ -48,7 +48,7 @@ def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
 
 def _packed(body: bytes, config: LiteConfig) -> Send:
     """Put a frame, or a packet of RTno, around a command and its data."""
-    if config.framing is LiteFraming.LITE:
+    if config.framing is Framing.LITE:
         return Send(HEADER + body + bytes([config.checksum.of(body)]), body)
     return Send(rtno.pack(body[:1], body[1:]), body)
 

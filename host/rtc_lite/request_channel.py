@@ -18,7 +18,7 @@ from tickrig.wire.rtc_lite.codes import (
     LiteStatus,
 )
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFrame, LiteFraming
+from tickrig.wire.rtc_lite.frame import Framing, LiteFrame
 from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     LitePortData,
@@ -237,7 +237,7 @@ class RequestChannel:
 
 
 def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
-    if settings.framing is LiteFraming.RTNO:
+    if settings.framing is Framing.RTNO:
         return RtnoLink(link)
     checksum = settings.checksum
     return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))

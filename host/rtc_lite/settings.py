@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,8 @@ class ProxySettings:
         ValueError: a number that is too small, or another sum for packets of RTno.
     """
 
-    framing: LiteFraming = LiteFraming.LITE
-    checksum: LiteChecksum = LiteChecksum.SUM8
+    framing: Framing = Framing.LITE
+    checksum: Checksum = Checksum.SUM8
     boot_us: int = 0
     reply_us: int = 100_000
     ping_period_us: int = 1_000_000
@@ -38,7 +38,7 @@ class ProxySettings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
-        if self.framing is LiteFraming.RTNO and self.checksum is not LiteChecksum.SUM8:
+        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
         at_least = {"boot_us": 0, "linger_us": 0}
         for name in (

@@ -19,7 +19,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_lite.frame import LiteFraming
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.values import LONG
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ CONFIGS = [
     LiteConfig(),
     LiteConfig(context=LiteContextType.TIMER, rate_hz=300),
     LiteConfig(context=LiteContextType.TIMER, rate_hz=7),
-    LiteConfig(LiteFraming.RTNO),
+    LiteConfig(Framing.RTNO),
 ]
 
 Act = tuple[int, bytes | tuple[str, int]]

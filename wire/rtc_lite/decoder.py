@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
-from tickrig.wire.rtc_lite.frame import HEADER, LiteChecksum, LiteFrame
+from tickrig.wire.rtc_lite.frame import HEADER, Checksum, LiteFrame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, Layout
 
 _COMMANDS: Final = {command.value: command for command in LiteCommand}
@@ -39,7 +39,7 @@ class LiteDecoder:
     """
 
     layouts: Mapping[LiteCommand, Layout]
-    checksum: LiteChecksum = LiteChecksum.SUM8
+    checksum: Checksum = Checksum.SUM8
     lost: bool = field(default=False, init=False)
     _frame: bytearray = field(default_factory=bytearray, init=False)  # header and what follows
 

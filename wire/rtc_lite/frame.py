@@ -2,7 +2,7 @@
 
 >>> LiteFrame(LiteCommand.STATE).encode().hex(" ")
 '0a 43 58 9b'
->>> LiteFrame(LiteCommand.STATE, b"@C").encode(LiteChecksum.XOR8).hex(" ")
+>>> LiteFrame(LiteCommand.STATE, b"@C").encode(Checksum.XOR8).hex(" ")
 '0a 43 58 40 43 18'
 """
 
@@ -19,7 +19,7 @@ from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFau
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
 
 
-class LiteFraming(StrEnum):
+class Framing(StrEnum):
     """Frames, or the packets of a relative."""
 
     LITE = "lite"  # the frames of RTC-Lite
@@ -30,7 +30,7 @@ HEADER: Final = b"\n"
 """0x0A (DECISION L4). It may occur in data: only the parser's position tells."""
 
 
-class LiteChecksum(StrEnum):
+class Checksum(StrEnum):
     """How Cmnd0, Cmnd1 and data are summed up (DECISION L5)."""
 
     SUM8 = "sum8"  # the figure's word: Checksum
@@ -38,7 +38,7 @@ class LiteChecksum(StrEnum):
 
     def of(self, body: bytes | bytearray) -> int:
         """Return the last byte of a frame from all between it and the header."""
-        return sum(body) & 0xFF if self is LiteChecksum.SUM8 else reduce(xor, body, 0)
+        return sum(body) & 0xFF if self is Checksum.SUM8 else reduce(xor, body, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class LiteFrame:
         """What the checksum is made of."""
         return self.command.value + self.data
 
-    def encode(self, checksum: LiteChecksum = LiteChecksum.SUM8) -> bytes:
+    def encode(self, checksum: Checksum = Checksum.SUM8) -> bytes:
         """Write the frame with header and checksum."""
         return HEADER + self.body + bytes([checksum.of(self.body)])
 

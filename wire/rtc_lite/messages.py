@@ -2,8 +2,8 @@ r"""What the data of frames means, beside a single byte.
 
 >>> LitePortData(b"in", b"\x2a\x00\x00\x00").encode().hex(" ")
 '02 04 69 6e 2a 00 00 00'
->>> from tickrig.wire.rtc_lite.codes import Command
->>> parse_reply(LiteFrame(Command.ACTIVATE, b"xE"))
+>>> from tickrig.wire.rtc_lite.codes import LiteCommand
+>>> parse_reply(LiteFrame(LiteCommand.ACTIVATE, b"xE"))
 LiteReply(status=120, fields=b'E')
 """
 

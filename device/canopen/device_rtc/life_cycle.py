@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import CanopenComponent, CanopenReturnCode, Result
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.transitions import (
     ACTIVITIES,
     ADMITTED,
@@ -15,10 +15,11 @@ from tickrig.device.canopen.device_rtc.transitions import (
     STRICT_ERROR,
     RtcState,
 )
+from tickrig.device.component import CallbackRunner
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 
-class CanopenLifeCycle:
+class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     """Runs the callbacks of a component when its node changes its NMT state, and before.
 
     The NMT state is the state of the component, once that is initialized. Whoever
@@ -31,8 +32,6 @@ class CanopenLifeCycle:
 
     Attributes:
         component: the component as it is; a reset of the node makes a new one.
-        latest: name of the callback that ran last, empty before the first.
-        executed: how often `on_execute` ran.
     """
 
     def __init__(self, node: CanopenSlave, make: Callable[[], CanopenComponent]) -> None:
@@ -41,9 +40,8 @@ class CanopenLifeCycle:
 
     def create(self) -> None:
         """Begin with a new component (M1)."""
-        self.component = self._make()
+        super().__init__(self._make())
         self._initialized = self._finalized = False
-        self.latest, self.executed = "", 0
 
     @property
     def state(self) -> RtcState:
@@ -62,7 +60,7 @@ class CanopenLifeCycle:
     def boots(self) -> bool:
         """Run `on_initialize` if that is due; say whether the node boots (M1, K11)."""
         if not self._initialized and not self._finalized:
-            self._initialized = self._call("on_initialize")
+            self._initialized = self.call("on_initialize")
         return self._initialized and not self._finalized
 
     def admits(self, command: NmtCommand) -> bool:
@@ -86,12 +84,12 @@ class CanopenLifeCycle:
         if well or new is NmtState.STOPPED:
             return
         if old is NmtState.OPERATIONAL:
-            self._call("on_aborting")
+            self.call("on_aborting")
         self._node.enter(NmtState.STOPPED)
 
     def run(self) -> None:
         """Run what the state does; an error leads to Error (M5, M6)."""
-        if not self._call(self.activity) and self.state is not RtcState.ERROR:
+        if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)
 
     def finalize(self) -> None:
@@ -103,12 +101,5 @@ class CanopenLifeCycle:
 
     def _call_all(self, callbacks: tuple[str, ...]) -> bool:
         """Run callbacks, all of them; False if one failed."""
-        results = [self._call(name) for name in callbacks]
+        results = [self.call(name) for name in callbacks]
         return all(results)
-
-    def _call(self, callback: str) -> bool:
-        """Run a callback; False if it failed."""
-        self.latest = callback
-        self.executed += callback == "on_execute"
-        result: Result = getattr(self.component, callback)()
-        return result in (None, CanopenReturnCode.RTC_OK)

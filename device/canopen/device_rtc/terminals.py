@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
+from tickrig.device.component import shown
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 
 SHUT_DOWN: Final = "shut_down"
@@ -57,12 +58,4 @@ def text_of(life: CanopenLifeCycle, name: str) -> float | str:
             return life.latest
         case "executed":
             return life.executed
-    value = life.component.ports[name.partition(".")[2]].value
-    if isinstance(value, tuple):
-        return " ".join(str(_plain(element)) for element in value)
-    return _plain(value)
-
-
-def _plain(value: float | str) -> float | str:
-    """Return a truth value as a number."""
-    return int(value) if isinstance(value, bool) else value
+    return shown(life.component.ports[name.partition(".")[2]].value)

@@ -18,7 +18,7 @@ from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
 from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.host.monitor.logs.tally import Tally
-from tickrig.wire.rtc_lite.frame import LiteChecksum
+from tickrig.wire.rtc_lite.frame import Checksum
 
 Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
 """What decodes a line by its name, and its usual bit/s."""
@@ -26,7 +26,7 @@ Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
 DECODINGS: Final[dict[str, Decoding]] = {
     "rrc": (RrcLines, 115_200),
     "rtc-lite": (RtcLiteLine, 57_600),
-    "rtc-lite-xor8": (partial(RtcLiteLine, checksum=LiteChecksum.XOR8), 57_600),
+    "rtc-lite-xor8": (partial(RtcLiteLine, checksum=Checksum.XOR8), 57_600),
 }
 
 

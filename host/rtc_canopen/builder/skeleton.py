@@ -40,7 +40,7 @@ def _head(project: Project) -> Iterator[str]:
     yield ""
     yield "from __future__ import annotations"
     yield ""
-    yield "from tickrig.device.canopen.device_rtc.component import CanopenComponent, Result"
+    yield "from tickrig.device.canopen.device_rtc.component import CanopenComponent"
     yield from _imports(profile)
     yield ""
     yield ""
@@ -54,6 +54,8 @@ def _imports(profile: RtcProfile) -> Iterator[str]:
     types = sorted({_constant(port.port_type) for port in profile.ports})
     if ports:
         yield f"from tickrig.device.canopen.device_rtc.ports import {', '.join(ports)}"
+    yield "from tickrig.device.component import Result"
+    if ports:
         yield f"from tickrig.wire.rtc_canopen.port_types import {', '.join(types)}"
 
 

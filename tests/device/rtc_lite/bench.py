@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.rtc_lite.component import ERROR, LiteComponent, Result
+from tickrig.device.component import ERROR, Result
+from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort

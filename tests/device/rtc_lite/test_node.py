@@ -15,7 +15,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 from tickrig.wire.rtc_lite.values import BOOLEAN, LONG, LONG_SEQ, OCTET_SEQ
 
 WRITE_42 = "PS\x02\x04in*\0\0\0"
@@ -305,7 +305,7 @@ def test_a_power_cut_makes_a_new_component() -> None:
 
 
 def test_a_node_of_rtno_initializes_at_power_up_and_speaks_packets() -> None:
-    bench = NodeBench(config=LiteConfig(LiteFraming.RTNO))
+    bench = NodeBench(config=LiteConfig(Framing.RTNO))
     assert bench.say("0A 0A 58 00 58") == "0A 0A 58 01 49 A2"
     assert bench.recorder.called == ["on_initialize"]
     assert bench.say("0A 0A 41 00 41") == "0A 0A 41 01 40 82"
@@ -316,7 +316,7 @@ def test_a_node_of_rtno_initializes_at_power_up_and_speaks_packets() -> None:
 
 
 def test_parity_instead_of_a_sum() -> None:
-    bench = NodeBench(config=LiteConfig(checksum=LiteChecksum.XOR8))
+    bench = NodeBench(config=LiteConfig(checksum=Checksum.XOR8))
     assert bench.say("0A 43 58 1B") == "0A 43 58 40 43 18"
     assert bench.say("0A 43 58 9B") == "0A 46 48 03 0D"
 
@@ -409,7 +409,7 @@ def test_a_port_that_does_not_fit_is_refused(name: str, most: int | None, error:
         ({"rate_hz": 1_001}, "rate_hz is 1001"),
         ({"slow_answer_us": 0}, "slow_answer_us is 0, at least 1 is needed"),
         (
-            {"framing": LiteFraming.RTNO, "checksum": LiteChecksum.XOR8},
+            {"framing": Framing.RTNO, "checksum": Checksum.XOR8},
             "checksum is xor8, packets of RTno have sum8",
         ),
     ],

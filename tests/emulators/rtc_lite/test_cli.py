@@ -14,24 +14,25 @@ GOLDEN = ROOT / "tests" / "golden" / "rtc_lite"
 EXAMPLES = ROOT / "examples"
 
 NODE = """
-from tickrig.device.rtc_lite.component import ERROR, Component, Result
-from tickrig.device.rtc_lite.ports import InPort, OutPort
+from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.component import ERROR, Result
+from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.wire.rtc_lite.values import CHAR_SEQ, LONG, SHORT_SEQ
 
-class Divider(Component):
+class Divider(LiteComponent):
     type_name = "Divider"
-    number = InPort("number", LONG)
-    words = InPort("words", CHAR_SEQ)
-    many = InPort("many", SHORT_SEQ)
-    result = OutPort("result", LONG)
+    number = LiteInPort("number", LONG)
+    words = LiteInPort("words", CHAR_SEQ)
+    many = LiteInPort("many", SHORT_SEQ)
+    result = LiteOutPort("result", LONG)
 
     def on_execute(self) -> None:
         self.result.write(100 // self.number.read())
 
-class Big(Component):
+class Big(LiteComponent):
     type_name = "ThisNameIsTooLongForIt"
 
-class Picky(Component):
+class Picky(LiteComponent):
     type_name = "Picky"
 
     def __init__(self, pin):

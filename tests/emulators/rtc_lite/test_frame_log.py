@@ -7,7 +7,7 @@ from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.wire.rtc_lite.frame import LiteFraming
+from tickrig.wire.rtc_lite.frame import Framing
 
 
 def test_frames_of_both_directions_are_shown_without_header_and_checksum() -> None:
@@ -25,7 +25,7 @@ def test_what_is_no_frame_is_named() -> None:
 
 
 def test_packets_of_rtno_are_listened_to_with_the_same_pauses() -> None:
-    split = frame_splitter(LiteConfig(LiteFraming.RTNO))(Mark.TO_DEVICE)
+    split = frame_splitter(LiteConfig(Framing.RTNO))(Mark.TO_DEVICE)
     state = raw("0A 0A 58 00 58")
     assert split(0, raw("0A 0A 58 00 59") + state) == [b"(wrong checksum)", b"X"]
     assert split(1_000, raw("0A 0A 58 FF 00")) == [b"(unknown frame)"]

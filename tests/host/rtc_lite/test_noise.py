@@ -21,7 +21,7 @@ from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc_lite import ProxySettings, RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_lite.frame import LiteFraming
+from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 NOISY_US = 3_000_000
@@ -74,7 +74,7 @@ SPOILS = st.lists(
 CONFIGS = [
     LiteConfig(),
     LiteConfig(context=LiteContextType.TIMER),
-    LiteConfig(framing=LiteFraming.RTNO),
+    LiteConfig(framing=Framing.RTNO),
 ]
 
 

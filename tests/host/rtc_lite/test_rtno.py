@@ -10,14 +10,14 @@ from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc_lite import ProxySettings
 from tickrig.host.rtc_lite.proxy import RtcLiteProxy
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFraming
+from tickrig.wire.rtc_lite.frame import Checksum, Framing
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
-RTNO = ProxySettings(framing=LiteFraming.RTNO, rediscover=True)
+RTNO = ProxySettings(framing=Framing.RTNO, rediscover=True)
 
 
 def active() -> tuple[Bench, RtcLiteProxy, Recorder]:
-    bench = Bench(Recorder, config=LiteConfig(LiteFraming.RTNO))
+    bench = Bench(Recorder, config=LiteConfig(Framing.RTNO))
     proxy = bench.attach(0, "RTno", RTNO)
     bench.context.start()
     bench.manager.activate("RTno0")
@@ -102,4 +102,4 @@ def test_a_line_that_is_gone_is_a_lost_device() -> None:
 
 def test_its_packets_have_one_kind_of_sum() -> None:
     with pytest.raises(ValueError, match="checksum is xor8, packets of RTno have sum8"):
-        ProxySettings(framing=LiteFraming.RTNO, checksum=LiteChecksum.XOR8)
+        ProxySettings(framing=Framing.RTNO, checksum=Checksum.XOR8)

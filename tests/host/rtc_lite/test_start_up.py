@@ -12,7 +12,7 @@ from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.host.rtc import ExecutionContext, Manager, ReturnCode, RtcRefused
 from tickrig.host.rtc_lite import ProxySettings, RtcLiteProxy, attach
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
+from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame
 from tickrig.wire.rtc_lite.values import LONG
 
 EC = ExecutionContext()
@@ -142,8 +142,8 @@ def test_a_board_that_boots_is_waited_for() -> None:
 
 
 def test_parity_in_place_of_a_sum() -> None:
-    bench = Bench(LiteEcho, config=LiteConfig(checksum=LiteChecksum.XOR8))
-    proxy = bench.attach(0, "Echo", ProxySettings(checksum=LiteChecksum.XOR8))
+    bench = Bench(LiteEcho, config=LiteConfig(checksum=Checksum.XOR8))
+    proxy = bench.attach(0, "Echo", ProxySettings(checksum=Checksum.XOR8))
     assert proxy.device is not None
     assert proxy.device.type_name == "Echo0"
 

@@ -9,7 +9,7 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite import layout
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteStatus
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame, fault_frame
+from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, Layout
 
 DIRECTIONS = {"request": layout.REQUESTS, "reply": layout.REPLIES}
@@ -47,9 +47,9 @@ def test_a_golden_frame_is_read_and_written_back(data: bytes, direction: str) ->
     assert frame.encode() == data
 
 
-@given(st.lists(requests, max_size=5), st.sampled_from(LiteChecksum), st.integers(1, 9))
+@given(st.lists(requests, max_size=5), st.sampled_from(Checksum), st.integers(1, 9))
 def test_requests_come_back_however_they_are_cut(
-    sent: list[LiteFrame], checksum: LiteChecksum, size: int
+    sent: list[LiteFrame], checksum: Checksum, size: int
 ) -> None:
     decoder = LiteDecoder(layout.REQUESTS, checksum)
     data = b"".join(frame.encode(checksum) for frame in sent)
@@ -58,8 +58,8 @@ def test_requests_come_back_however_they_are_cut(
     assert not decoder.begun
 
 
-@given(st.lists(replies, max_size=5), st.sampled_from(LiteChecksum))
-def test_replies_come_back(sent: list[LiteFrame], checksum: LiteChecksum) -> None:
+@given(st.lists(replies, max_size=5), st.sampled_from(Checksum))
+def test_replies_come_back(sent: list[LiteFrame], checksum: Checksum) -> None:
     data = b"".join(frame.encode(checksum) for frame in sent)
     assert LiteDecoder(layout.REPLIES, checksum).push(data) == sent
 
@@ -118,10 +118,8 @@ def test_a_frame_of_more_than_60_data_bytes_is_refused() -> None:
 
 
 def test_parity_is_another_checksum() -> None:
-    assert LiteFrame(LiteCommand.STATE).encode(LiteChecksum.XOR8) == raw("0A 43 58 1B")
-    assert LiteDecoder(layout.REQUESTS, LiteChecksum.XOR8).push(REQUESTS[0]) == [
-        LiteLinkFault.CHECKSUM
-    ]
+    assert LiteFrame(LiteCommand.STATE).encode(Checksum.XOR8) == raw("0A 43 58 1B")
+    assert LiteDecoder(layout.REQUESTS, Checksum.XOR8).push(REQUESTS[0]) == [LiteLinkFault.CHECKSUM]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.wire.errors import WireError
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteState, LiteStatus
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
+from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame
 from tickrig.wire.rtc_lite.layout import REPLIES, REQUESTS, WITH_STATE
 from tickrig.wire.rtc_lite.messages import (
     parse_component_profile,
@@ -35,7 +35,7 @@ class RtcLiteLine:
         checksum: how frames are summed up.
     """
 
-    def __init__(self, channel: str, checksum: LiteChecksum = LiteChecksum.SUM8) -> None:
+    def __init__(self, channel: str, checksum: Checksum = Checksum.SUM8) -> None:
         self._channel = channel
         self._decoders = {
             True: LiteDecoder(REQUESTS, checksum),

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.canopen.device_rtc.component import ERROR, CanopenComponent, Result
+from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
+from tickrig.device.component import ERROR, Result
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_canopen.port_types import OCTET, SHORT
 

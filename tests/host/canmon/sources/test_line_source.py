@@ -19,7 +19,7 @@ from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.frames.record import AnyRecord, LineRecord
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
+from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame
 
 PATIENCE_S = 10.0
 
@@ -126,7 +126,7 @@ def test_both_directions_of_a_line_and_a_bus_are_one_trace(ports: tuple[Port, Po
 def test_frames_of_rtc_lite_are_told_with_their_checksum(ports: tuple[Port, Port]) -> None:
     port, _ = ports
     source = open_any([f"serial:{port.path},rtc-lite-xor8,host"], BusOptions())
-    frame = LiteFrame(LiteCommand.ACTIVATE).encode(LiteChecksum.XOR8)
+    frame = LiteFrame(LiteCommand.ACTIVATE).encode(Checksum.XOR8)
     first = wait(source, bool, lambda: port.write(frame))[0]
     source.close()
     assert isinstance(first, LineRecord)

@@ -6,7 +6,7 @@ from tickrig.host.monitor.decode.filter import parse_filter
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.frame import LiteChecksum, LiteFrame
+from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame
 from tickrig.wire.rtc_lite.messages import (
     LiteComponentProfile,
     LitePortData,
@@ -131,12 +131,12 @@ def test_an_answer_of_rtc_lite_says_this(frame: LiteFrame, text: str) -> None:
 
 
 def test_bytes_that_are_no_frame_are_said_to_be() -> None:
-    line = RtcLiteLine("ttyS0", LiteChecksum.XOR8)
-    data = LiteFrame(LiteCommand.STATE).encode(LiteChecksum.SUM8)
+    line = RtcLiteLine("ttyS0", Checksum.XOR8)
+    data = LiteFrame(LiteCommand.STATE).encode(Checksum.SUM8)
     (found,) = line.take(0, data, to_device=True)
     assert found.decoded.text == "no frame: checksum"
     assert line.take(1_000, b"\nZZZ", to_device=True)[0].decoded.text == "no frame: unknown"
-    whole = LiteFrame(LiteCommand.STATE).encode(LiteChecksum.XOR8)
+    whole = LiteFrame(LiteCommand.STATE).encode(Checksum.XOR8)
     assert line.take(2_000, whole, to_device=True) == []
     assert [found.decoded.text for found in line.take(30_000, whole, to_device=True)] == ["state"]
 

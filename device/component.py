@@ -1,0 +1,132 @@
+"""RT components on devices: what a developer writes, and what runs its callbacks (OMG RTC 1.1).
+
+RTC-Lite nodes and DeviceRTCs on CANopen have them. Each adds its ports, where their values
+are, and what moves the life cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from enum import IntEnum
+from typing import Any, ClassVar, Final, Generic, TypeVar
+
+from tickrig.device.physical import InputSignal, QuantityBank
+from tickrig.device.twin import Copyable
+
+P = TypeVar("P")
+
+
+class DeviceReturnCode(IntEnum):
+    """What a callback returns (OMG RTC 1.1, ReturnCode_t)."""
+
+    RTC_OK = 0
+    RTC_ERROR = 1
+    BAD_PARAMETER = 2
+    UNSUPPORTED = 3
+    OUT_OF_RESOURCES = 4
+    PRECONDITION_NOT_MET = 5
+
+
+ERROR: Final = DeviceReturnCode.RTC_ERROR
+"""What a callback returns that failed."""
+
+Result = DeviceReturnCode | None
+"""What a callback returns; nothing means that all went well."""
+
+
+class DeviceComponent(Copyable):
+    """A component on a device; a subclass says what it is and does.
+
+    Ports are declared as attributes of the class; each component has its own. Callbacks
+    may be left out. One that cannot fail is declared `-> None`; one that can returns
+    `ERROR`. Power-on makes a new component: what a callback keeps in `self` is the
+    device's RAM.
+
+    Attributes:
+        type_name: type of the component.
+        physical: physical inputs that the device has beside its wire.
+        inputs: their values.
+    """
+
+    type_name: ClassVar[str] = ""
+    physical: ClassVar[tuple[InputSignal, ...]] = ()
+    inputs: QuantityBank
+
+    def _own_ports(self, port_class: type[P]) -> list[P]:
+        """Give the component ports of its own, as its class declares them; return them."""
+        own = {name: copy(port) for name, port in declared(type(self), port_class)}
+        for name, port in own.items():
+            setattr(self, name, port)
+        return list(own.values())
+
+    def on_initialize(self) -> Result:
+        """Begin: Created becomes Inactive; after an error it stays Created."""
+
+    def on_finalize(self) -> Result:
+        """End, once."""
+
+    def on_activated(self) -> Result:
+        """Become Active; an error leads to Error."""
+
+    def on_deactivated(self) -> Result:
+        """Leave Active; an error leads to Error, unless that is where it goes anyway."""
+
+    def on_execute(self) -> Result:
+        """Work, once a period while Active; an error leads to Error."""
+
+    def on_aborting(self) -> Result:
+        """Come from Active to Error; the result does not matter."""
+
+    def on_error(self) -> Result:
+        """Work, once a period while in Error; the result does not matter on CANopen."""
+
+    def on_reset(self) -> Result:
+        """Leave Error; after an error it stays there."""
+
+
+C = TypeVar("C", bound=DeviceComponent)
+
+
+class CallbackRunner(Generic[C]):
+    """Runs the callbacks of a component, and keeps in mind what ran.
+
+    Attributes:
+        component: the component.
+        latest: name of the callback that ran last, empty before the first.
+        calls: how many callbacks ran.
+        executed: how many of them were `on_execute`.
+    """
+
+    def __init__(self, component: C) -> None:
+        self.component = component
+        self.latest, self.calls, self.executed = "", 0, 0
+
+    def call(self, callback: str) -> bool:
+        """Run a callback by its name; False if it failed."""
+        self.latest = callback
+        self.calls += 1
+        self.executed += callback == "on_execute"
+        result: Result = getattr(self.component, callback)()
+        return result in (None, DeviceReturnCode.RTC_OK)
+
+
+def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
+    """Give the attributes of a class and its bases that are of a kind, the bases first.
+
+    >>> class Lamp:
+    ...     bright, name = 5, "lamp"
+    >>> list(declared(Lamp, int))
+    [('bright', 5)]
+    """
+    for base in reversed(owner.__mro__):
+        for name, value in vars(base).items():
+            if isinstance(value, kind):
+                yield name, value
+
+
+def shown(value: Any) -> float | str:
+    """Return the value of a port as an output: truth values as numbers, sequences as text."""
+    if isinstance(value, tuple):
+        return " ".join(str(shown(element)) for element in value)
+    return int(value) if isinstance(value, bool) else value
