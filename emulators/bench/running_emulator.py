@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from tickrig.emulators.bench.operator import Operator, WireFaults
+from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.wire_log import WireLog
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -21,6 +23,7 @@ class RunningEmulator(ABC):
         device: the physical side.
         wire: where faults of the wire are armed.
         link: where the host finds it, for people.
+        trace: where the run is recorded, to be closed in the end.
 
     Attributes:
         operator: sets inputs, presses buttons, makes faults.
@@ -33,9 +36,16 @@ class RunningEmulator(ABC):
 
     rig: Rig
 
-    def __init__(self, name: str, device: HasSignals, wire: WireFaults, link: str) -> None:
+    def __init__(
+        self,
+        name: str,
+        device: HasSignals,
+        wire: WireFaults,
+        link: str,
+        trace: TraceFile | CandumpFile | None,
+    ) -> None:
         self.name, self.wire, self.link, self.running = name, wire, link, True
-        self._touched = device
+        self._device, self._trace = device, trace
         self.event_queue, self.log = EventQueue(), WireLog()
         self.after_step: list[Callable[[int], None]] = []
         self.operator = Operator(device.inputs, device.tick_us, self.event_queue, wire)
@@ -43,7 +53,7 @@ class RunningEmulator(ABC):
     @property
     def device(self) -> HasSignals:
         """The physical side of the device."""
-        return self._touched
+        return self._device
 
     @property
     def effective_us(self) -> int:
@@ -83,17 +93,18 @@ class RunningEmulator(ABC):
         """What found a buffer full."""
 
     @property
-    @abstractmethod
     def trace_error(self) -> str:
         """Why the recording ended early, empty while all is well."""
+        return self._trace.error if self._trace else ""
 
     def stop(self) -> None:
         """Let whoever runs it end after this step."""
         self.running = False
 
-    @abstractmethod
     def close(self) -> None:
         """End the recording."""
+        if self._trace is not None:
+            self._trace.close(self.rig.now_us)
 
     def status(self) -> dict[str, str | int]:
         """Return how the run is going."""

@@ -50,8 +50,8 @@ class CanEmulator(RunningEmulator):
         trace: CandumpFile | None = None,
         link: str = "",
     ) -> None:
-        super().__init__(name, physical, wire.faults, link)
-        self._wire, self._outside, self._trace = wire, outside, trace
+        super().__init__(name, physical, wire.faults, link, trace)
+        self._wire, self._outside = wire, outside
         self._ends = [station.port for station in stations]
         self._host = self._open_end()
         beyond = self._open_end(None if outside else frozenset())
@@ -93,13 +93,3 @@ class CanEmulator(RunningEmulator):
         """Frames that found a queue full, at an end of the bus or outside."""
         ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
         return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}
-
-    @property
-    def trace_error(self) -> str:
-        """Why the record ended early, empty while all is well."""
-        return self._trace.error if self._trace else ""
-
-    def close(self) -> None:
-        """End the record."""
-        if self._trace is not None:
-            self._trace.close()

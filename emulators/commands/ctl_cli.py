@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from functools import wraps
 from typing import Any, Final
 
 import click
@@ -61,7 +62,7 @@ def complete(names: Names) -> Complete:
 EMULATOR: Final = "emulator"
 SERVER: Final = "server"
 
-as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+AS_JSON: Final = "Print the answer as JSON."
 
 
 @click.group()
@@ -78,106 +79,6 @@ def ctl(context: click.Context, /, socket: str) -> None:
     tickrig ctl /tmp/rrc.ctl get state out_v_pct
     """  # noqa: D301 - click wants the backspace
     context.obj = socket
-
-
-@ctl.command()
-@as_json
-@click.pass_obj
-def describe(socket: str, as_json: bool) -> None:
-    """List inputs, groups, outputs and faults."""
-    _show(ask(socket, EMULATOR, "describe"), _describe, as_json)
-
-
-@ctl.command()
-@click.argument("names", nargs=-1, shell_complete=complete(seen))
-@as_json
-@click.pass_obj
-def get(socket: str, names: tuple[str, ...], as_json: bool) -> None:
-    """Show inputs and outputs by NAME, all if none is named."""
-    fields = {"names": list(names)} if names else {}
-    _show(ask(socket, EMULATOR, "get", **fields), _values, as_json)
-
-
-@ctl.command("set", context_settings={"ignore_unknown_options": True})
-@click.argument("name", shell_complete=complete(settable))
-@click.argument("values", nargs=-1, required=True)
-@as_json
-@click.pass_obj
-def set_(socket: str, name: str, values: tuple[str, ...], as_json: bool) -> None:
-    """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
-    _show(
-        ask(socket, EMULATOR, "set", name=name, value=[parse_setting(value) for value in values]),
-        _nothing,
-        as_json,
-    )
-
-
-@ctl.command()
-@click.argument("name", shell_complete=complete(buttons))
-@click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
-@as_json
-@click.pass_obj
-def press(socket: str, name: str, duration: str, as_json: bool) -> None:
-    """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
-    duration_us = time_us("--for", duration)
-    _show(ask(socket, EMULATOR, "press", name=name, duration_us=duration_us), _nothing, as_json)
-
-
-@ctl.command()
-@click.argument("spec", shell_complete=complete(faults))
-@as_json
-@click.pass_obj
-def fault(socket: str, spec: str, as_json: bool) -> None:
-    """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
-    _show(ask(socket, EMULATOR, "fault", spec=spec), _nothing, as_json)
-
-
-@ctl.command()
-@click.argument("name", shell_complete=complete(faults))
-@as_json
-@click.pass_obj
-def clear(socket: str, name: str, as_json: bool) -> None:
-    """Let the fault NAME go."""
-    _show(ask(socket, EMULATOR, "clear", name=name), _nothing, as_json)
-
-
-@ctl.command()
-@click.option("--since", type=int, default=0, help="Only those after the line of this number.")
-@as_json
-@click.pass_obj
-def lines(socket: str, since: int, as_json: bool) -> None:
-    """Show the latest lines on the wire, at most 100."""
-    _show(ask(socket, EMULATOR, "lines", since=since), _lines, as_json)
-
-
-@ctl.command()
-@as_json
-@click.pass_obj
-def status(socket: str, as_json: bool) -> None:
-    """Show how the run is going: time, late ticks, lost bytes, faults."""
-    _show(ask(socket, EMULATOR, "status"), _status, as_json)
-
-
-@ctl.command()
-@click.argument("node", type=click.IntRange(1, 127))
-@as_json
-@click.pass_obj
-def restart(socket: str, node: int, as_json: bool) -> None:
-    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
-    _show(ask(socket, SERVER, "restart", node=node), _nothing, as_json)
-
-
-@ctl.command()
-@as_json
-@click.pass_obj
-def stop(socket: str, as_json: bool) -> None:
-    """End the emulator."""
-    _show(ask(socket, EMULATOR, "stop"), _nothing, as_json)
-
-
-def _show(answer: Object, words: Callable[[Any], list[str]], as_json: bool) -> None:
-    for line in [json.dumps(answer)] if as_json else words(answer):
-        click.echo(line)
 
 
 def _nothing(answer: Object) -> list[str]:
@@ -217,3 +118,99 @@ def _describe(answer: Any) -> list[str]:
     for x in answer["wire_faults"]:
         out.append(f"  {x['name'] + ('=RATE' if x['rated'] else ''):<20} {x['text']}")
     return out
+
+
+def verb(
+    show: Callable[[Any], list[str]] = _nothing, whom: str = EMULATOR, **settings: Any
+) -> Callable[[Callable[..., Object]], click.Command]:
+    """Return a decorator that makes a command of what gives the fields of its request.
+
+    Args:
+        show: makes lines for people of the answer.
+        whom: who answers, for people.
+        settings: of the command.
+    """
+
+    def decorate(fields: Callable[..., Object]) -> click.Command:
+        do = fields.__name__.rstrip("_")
+
+        @wraps(fields)
+        def run(socket: str, as_json: bool, **arguments: Any) -> None:
+            answer = ask(socket, whom, do, **fields(**arguments))
+            for line in [json.dumps(answer)] if as_json else show(answer):
+                click.echo(line)
+
+        command = ctl.command(do, **settings)(click.pass_obj(run))
+        command.params.append(click.Option(["--json", "as_json"], is_flag=True, help=AS_JSON))
+        return command
+
+    return decorate
+
+
+@verb(_describe)
+def describe() -> Object:
+    """List inputs, groups, outputs and faults."""
+    return {}
+
+
+@verb(_values)
+@click.argument("names", nargs=-1, shell_complete=complete(seen))
+def get(names: tuple[str, ...]) -> Object:
+    """Show inputs and outputs by NAME, all if none is named."""
+    return {"names": list(names)} if names else {}
+
+
+@verb(context_settings={"ignore_unknown_options": True})
+@click.argument("name", shell_complete=complete(settable))
+@click.argument("values", nargs=-1, required=True)
+def set_(name: str, values: tuple[str, ...]) -> Object:
+    """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
+    return {"name": name, "value": [parse_setting(value) for value in values]}
+
+
+@verb()
+@click.argument("name", shell_complete=complete(buttons))
+@click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
+def press(name: str, duration: str) -> Object:
+    """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
+    return {"name": name, "duration_us": time_us("--for", duration)}
+
+
+@verb()
+@click.argument("spec", shell_complete=complete(faults))
+def fault(spec: str) -> Object:
+    """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
+    return {"spec": spec}
+
+
+@verb()
+@click.argument("name", shell_complete=complete(faults))
+def clear(name: str) -> Object:
+    """Let the fault NAME go."""
+    return {"name": name}
+
+
+@verb(_lines)
+@click.option("--since", type=int, default=0, help="Only those after the line of this number.")
+def lines(since: int) -> Object:
+    """Show the latest lines on the wire, at most 100."""
+    return {"since": since}
+
+
+@verb(_status)
+def status() -> Object:
+    """Show how the run is going: time, late ticks, lost bytes, faults."""
+    return {}
+
+
+@verb(whom=SERVER)
+@click.argument("node", type=click.IntRange(1, 127))
+def restart(node: int) -> Object:
+    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
+    return {"node": node}
+
+
+@verb()
+def stop() -> Object:
+    """End the emulator."""
+    return {}

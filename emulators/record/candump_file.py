@@ -46,8 +46,8 @@ class CandumpFile:
             self.error = f"{self._path}: {error.strerror}"
             _logger.warning("recording ended: %s; the emulator goes on", self.error)
 
-    def close(self) -> None:
-        """Close the file; closing twice is no error."""
+    def close(self, now_us: int = 0) -> None:
+        """Close the file, at a time that it has no line for; closing twice is no error."""
         try:
             self._file.close()
         except OSError as error:

@@ -79,11 +79,11 @@ class Emulator(RunningEmulator):
         link: str = "",
         line: LineSettings | None = None,
     ) -> None:
-        self._trace, self._outside = trace, outside
+        self._outside = outside
         line = line or LineSettings()
         self.line = line.wire(line.baud)
         port = FaultyPort(self.line.a, line.faults, seed)
-        super().__init__(name, device, port, link)
+        super().__init__(name, device, port, link, trace)
         if line.splitter is not None:
             self.log = WireLog(splitter=line.splitter)
         station = Station(TracedDevice(device, trace) if trace else device, port)
@@ -120,13 +120,3 @@ class Emulator(RunningEmulator):
     def lost_bytes(self) -> int:
         """Their number."""
         return self.lost["lost_bytes"]
-
-    @property
-    def trace_error(self) -> str:
-        """Why the recording ended early, empty while all is well."""
-        return self._trace.error if self._trace else ""
-
-    def close(self) -> None:
-        """End the recording."""
-        if self._trace is not None:
-            self._trace.close(self.rig.now_us)

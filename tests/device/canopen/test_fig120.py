@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 
 from tests.device.canopen.fig120 import MEASURED, POTENTIOMETER, SETUP, Demo, look, make_motor
+from tests.wire.candump_port import CandumpPort
 from tickrig.device.canopen.core.application import Application
-from tickrig.emulators.record.candump_port import CandumpPort
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.candump import parse_log
 
