@@ -32,7 +32,7 @@ async def _draw(log: str, keys: Sequence[str]) -> str:
     monitor = Monitor(session, make_panels(session, print))
     async with monitor.run_test(size=SIZE) as pilot:
         await pilot.press(*keys)
-        monitor.look()
+        monitor.refresh_view()
         await pilot.pause()
         svg = monitor.export_screenshot(title="canmon tui")
     session.close()

@@ -94,7 +94,7 @@ def sequences() -> None:
         start = time.perf_counter()
         for now_us in range(0, 20_000_000, 1_000):
             endless.tick(now_us)
-            endless.notes.clear()
+            endless.events.clear()
         values.append(20_000 / (time.perf_counter() - start))
     row("sequence: steps of send and wait", [2 * value for value in values], "steps/s")
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tickrig.host.monitor.decode.filter_terms import MissingSignals
     from tickrig.host.monitor.frames.record import AnyRecord
 
-Meant = tuple["AnyRecord", "Decoded | None"]
+DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 """A frame or a line of a serial port, and what it means where somebody asked."""
 
 
@@ -36,7 +36,7 @@ class FilteredDecoder:
 
             self._missing = MissingSignals(wanted.signals)
 
-    def take(self, records: Sequence[AnyRecord]) -> Iterator[Meant]:
+    def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
         decoder, wanted, missing = self._decoder, self._wanted, self._missing
         for record in records:

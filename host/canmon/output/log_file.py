@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.output.filtered_decoder import Meant
+from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.record import Record
@@ -43,13 +43,13 @@ class LogFile:
         except OSError as error:
             raise SourceFailed(f"{path}: {error.strerror}") from error
 
-    def take(self, meant: Sequence[Meant], lost: int) -> None:
+    def take(self, decoded_frames: Sequence[DecodedFrame], lost: int) -> None:
         """Add frames; what came is with the operating system then."""
         try:
-            for record, _ in meant:
+            for record, _ in decoded_frames:
                 assert isinstance(record, Record), "who opens serial ports does not write a log"
                 self._writer.write(record)
-            if meant:
+            if decoded_frames:
                 self._writer.flush()
         except OSError as error:
             raise SourceFailed(f"{self._path}: {error.strerror}") from error

@@ -8,7 +8,7 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, assert_never
 
-from tickrig.host.canmon.output.filtered_decoder import Meant
+from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import log_line
@@ -161,10 +161,10 @@ class StdoutWriter:
         self._printer, self._output, self._lost = printer, output, 0
         self._header = output is Output.CSV
 
-    def take(self, meant: Sequence[Meant], lost: int) -> None:
+    def take(self, decoded_frames: Sequence[DecodedFrame], lost: int) -> None:
         """Print frames, at once."""
         lines = [DUMP_HEADER] if self._header else []
-        lines += [self._printer(*one) for one in meant]
+        lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and self._output is Output.JSONL:
             lines.append(drop_line(lost - self._lost))
         self._header, self._lost = False, lost

@@ -67,7 +67,7 @@ class Monitor(FramedApp):
     Args:
         session: what is heard, and how to send; it is started by whoever runs the app.
         panels: the tabs.
-        bench: keeps their settings; without one nothing is kept until it is exported.
+        panel_settings: keeps their settings; without one nothing is kept until it is exported.
     """
 
     TITLE = "canmon"
@@ -86,12 +86,12 @@ class Monitor(FramedApp):
     ]
 
     def __init__(
-        self, session: Session, panels: Sequence[Panel], bench: PanelSettings | None = None
+        self, session: Session, panels: Sequence[Panel], panel_settings: PanelSettings | None = None
     ) -> None:
         super().__init__()
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
-        self.bench = bench or PanelSettings(Workspace(), MonitorSetup(), panels)
+        self.panel_settings = panel_settings or PanelSettings(Workspace(), MonitorSetup(), panels)
 
     def compose(self) -> ComposeResult:
         """Lay out the tabs."""
@@ -104,9 +104,9 @@ class Monitor(FramedApp):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.set_interval(PAINT_S, self.look)
+        self.set_interval(PAINT_S, self.refresh_view)
         self.set_interval(SAVE_S, self.save)
-        if unknown := self.bench.unknown():
+        if unknown := self.panel_settings.unknown():
             self.notify(f"not known here, and kept: {', '.join(unknown)}", severity="warning")
 
     def run_session(self) -> None:
@@ -120,14 +120,14 @@ class Monitor(FramedApp):
             self.session.close()
             sys.setswitchinterval(before_s)
         self.session.check()
-        if trouble := self.bench.save():
+        if trouble := self.panel_settings.save():
             click.echo(trouble, err=True)
         if self.return_code:
             raise SystemExit(self.return_code)
 
     def save(self) -> None:
         """Keep the settings."""
-        if trouble := self.bench.save():
+        if trouble := self.panel_settings.save():
             self.notify(trouble, severity="error", timeout=10)
 
     @property
@@ -136,18 +136,18 @@ class Monitor(FramedApp):
         active = self.query_one(TabbedContent).active
         return next(panel for panel in self.panels if _tab(panel) == active)
 
-    def look(self) -> None:
+    def refresh_view(self) -> None:
         """Paint what is on the screen."""
         self.session.check()
         if self.screen_stack and self.query(StatusLine):
-            self.shown.look()
-            self.query_one(StatusLine).look()
+            self.shown.refresh_view()
+            self.query_one(StatusLine).refresh_view()
 
     def on_tabbed_content_tab_activated(self) -> None:
         """Let the keys go to the panel, and paint it at once."""
         if not self.shown.query("*:focus"):
             self.shown.enter()
-        self.look()
+        self.refresh_view()
 
     def action_tab(self, number: int) -> None:
         """Show a tab."""
@@ -165,13 +165,13 @@ class Monitor(FramedApp):
 
     def action_export(self) -> None:
         """Ask for a file and keep the settings there."""
-        path = self.bench.workspace.path
+        path = self.panel_settings.workspace.path
         self.push_screen(ExportScreen("" if path is None else str(path)), self._export)
 
     def _export(self, name: str | None) -> None:
         if name:
             try:
-                self.bench.export(Path(name))
+                self.panel_settings.export(Path(name))
             except WorkspaceError as error:
                 self.notify(str(error), severity="error")
                 return

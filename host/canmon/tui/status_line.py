@@ -82,7 +82,7 @@ class StatusLine(Widget):
         self._counts = [0]
         self.line: Line = ()
 
-    def look(self) -> None:
+    def refresh_view(self) -> None:
         """Show how things are now; called ten times a second."""
         with self._session.lock:
             line = status_line(self._status())

@@ -13,7 +13,7 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report, until_interrupted
-from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder, Meant
+from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
 from tickrig.host.canmon.sources.source import AnySource, open_any
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 POLL_US: Final = 100_000
 
-Take = Callable[[list[Meant], int], None]
+Take = Callable[[list[DecodedFrame], int], None]
 """Takes frames, and how many were lost so far."""
 
 _shown: Final = add_options(
@@ -136,9 +136,9 @@ def pass_on(
     latest_s, left = time.monotonic(), count
     while not source.ended and left != 0:
         records = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
-        meant = list(islice(meaning.take(records), left))
-        take(meant, source.lost)
-        left = None if left is None else left - len(meant)
+        decoded_frames = list(islice(meaning.take(records), left))
+        take(decoded_frames, source.lost)
+        left = None if left is None else left - len(decoded_frames)
         if records:
             latest_s = time.monotonic()
         elif time.monotonic() - latest_s >= quiet_s:

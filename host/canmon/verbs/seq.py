@@ -144,7 +144,7 @@ def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
 
 def _show(run: SequenceRun, quiet: bool) -> None:
     """Print what happened since the last time."""
-    for note in run.notes:
-        if not quiet or note.mark is EventType.MISSED:
-            click.echo(event_line(note))
-    run.notes.clear()
+    for event in run.events:
+        if not quiet or event.mark is EventType.MISSED:
+            click.echo(event_line(event))
+    run.events.clear()

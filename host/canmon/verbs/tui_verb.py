@@ -96,11 +96,11 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
         session = open_session(setup.source, setup.options, model)
         try:
             panels = make_panels(session, say)
-            bench = PanelSettings(workspace, setup, panels)
-            bench.load()
+            panel_settings = PanelSettings(workspace, setup, panels)
+            panel_settings.load()
         except BaseException:
             session.source.close()
             raise
     except WorkspaceError as error:
         raise Refused(str(error)) from None
-    return Monitor(session, panels, bench)
+    return Monitor(session, panels, panel_settings)

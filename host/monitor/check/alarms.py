@@ -100,7 +100,7 @@ class Alarms:
         for finding in self._checker.take(record):
             self._found(finding)
 
-    def look(self, now_us: int, lost: int = 0) -> None:
+    def check_missing(self, now_us: int, lost: int = 0) -> None:
         """See what is missing now.
 
         Args:

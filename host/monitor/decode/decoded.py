@@ -41,7 +41,7 @@ class Decoded(NamedTuple):
         kind: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1.., rpdo1.., lss, dbc,
             error, rrc, rtc-lite; unmapped for a PDO nobody described, raw for all else.
         node: whose object it is; None where it belongs to none.
-        said: one line; None where transfers or else signals say it all.
+        summary: one line; None where transfers or else signals say it all.
         signals: the values in it.
         source: `EDS`, `SEEN`, `DBC`; empty where the standard alone says it.
         entry: index and sub-index that an SDO frame is about.
@@ -50,7 +50,7 @@ class Decoded(NamedTuple):
 
     kind: str
     node: int | None = None
-    said: str | None = ""
+    summary: str | None = ""
     signals: tuple[Signal, ...] = ()
     source: str = ""
     entry: tuple[int, int] | None = None
@@ -59,6 +59,6 @@ class Decoded(NamedTuple):
     @property
     def text(self) -> str:
         """One line for people."""
-        if self.said is not None:
-            return self.said
+        if self.summary is not None:
+            return self.summary
         return "; ".join(map(str, self.transfers)) or " ".join(map(str, self.signals))

@@ -70,7 +70,7 @@ class SequenceRun:
         done: it has ended.
         met: how many expectations were met.
         missed: how many were not.
-        notes: what happened; whoever shows them may take them out.
+        events: what happened; whoever shows them may take them out.
     """
 
     def __init__(self, sequence: Sequence) -> None:
@@ -81,7 +81,7 @@ class SequenceRun:
         self._out: list[CanFrame] = []
         self.done = False
         self.met = self.missed = 0
-        self.notes: list[SequenceEvent] = []
+        self.events: list[SequenceEvent] = []
 
     @property
     def due_us(self) -> int:
@@ -123,7 +123,7 @@ class SequenceRun:
             self._pause = next(self._play) if met is None else self._play.send(met)
         except StopIteration:
             self.done, self._pause = True, _Pause(NEVER)
-            self._note(EventType.END, f"{self.met} met, {self.missed} missed")
+            self._report(EventType.END, f"{self.met} met, {self.missed} missed")
 
     def _all(self, steps: tuple[FrameStep, ...]) -> _Play:
         for step in steps:
@@ -147,32 +147,34 @@ class SequenceRun:
     def _send(self, frames: Frames) -> None:
         self._out += frames
         for frame in frames:
-            self._note(EventType.SENT, str(frame))
+            self._report(EventType.SENT, str(frame))
 
     def _expect(self, step: FrameStep) -> _Play:
         wanted = " and ".join(condition.text for condition in step.wanted)
         if (yield _Pause(self._at_us + step.within_us, step.wanted)):
             self.met += 1
-            self._note(EventType.MET, wanted)
+            self._report(EventType.MET, wanted)
             return True
         self.missed += 1
         missing = " and ".join(condition.text for condition in self._pause.conditions)
         place = self._sequence.locate(step.place)
-        self._note(EventType.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms")
+        self._report(
+            EventType.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms"
+        )
         return (yield from self._all(step.on_fail)) and step.goes_on
 
-    def _note(self, mark: EventType, text: str) -> None:
-        self.notes.append(SequenceEvent(self._at_us, mark, text))
+    def _report(self, mark: EventType, text: str) -> None:
+        self.events.append(SequenceEvent(self._at_us, mark, text))
 
 
-def event_line(note: SequenceEvent) -> str:
+def event_line(event: SequenceEvent) -> str:
     """Write a note: seconds, mark, and what happened.
 
     >>> from tickrig.host.monitor.sequence.sequence_run import EventType
     >>> event_line(SequenceEvent(4_718, EventType.MET, "703#05"))
     '0.004718 ok 703#05'
     """
-    return f"{format_time(note.at_us)} {note.mark} {note.text}"
+    return f"{format_time(event.at_us)} {event.mark} {event.text}"
 
 
 def outline(steps: tuple[FrameStep, ...], depth: int = 0) -> list[str]:

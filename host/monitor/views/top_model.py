@@ -63,9 +63,9 @@ class TopModel:
             else:
                 self._serial.take(record)
 
-    def take_decoded(self, meant: Iterable[tuple[AnyRecord, Decoded | None]]) -> None:
+    def take_decoded(self, decoded_frames: Iterable[tuple[AnyRecord, Decoded | None]]) -> None:
         """Count frames, and keep what the latest of each identifier means."""
-        for record, decoded in meant:
+        for record, decoded in decoded_frames:
             self.take((record,))
             if decoded is not None and isinstance(record.frame, CanFrame):
                 self._meanings[record.channel, ident_of(record.frame)] = decoded

@@ -165,7 +165,7 @@ def test_a_foreign_tab_is_shown() -> None:
 
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("1")
-        monitor.look()
+        monitor.refresh_view()
         await pilot.pause()
         shown.append(str(monitor.shown.query_one("LineView").lines[0]))  # type: ignore[attr-defined]
 

@@ -13,7 +13,7 @@ from textual.widgets import Static, TextArea
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarms import HEAD, Alarms, State, render_alarms
@@ -57,7 +57,7 @@ class AlarmTask(Task):
         self.alarms = Alarms(rules, self.bit_rate)
         self._due_us = NEVER if rules == Rules() else 0
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Take what was heard."""
         if self._due_us == NEVER:
             return ()
@@ -65,7 +65,7 @@ class AlarmTask(Task):
             self.alarms.take(one)
         if now_us >= self._due_us:
             self._due_us = now_us + LOOK_US
-            self.alarms.look(self._model.now_us, self._model.lost)
+            self.alarms.check_missing(self._model.now_us, self._model.lost)
         return ()
 
 
@@ -178,7 +178,7 @@ class AlarmsPanel(Panel):
         """Go back to the alarms."""
         self.query_one(TextArea).display = self.query_one("#wrong").display = False
         self.query_one(LineView).focus()
-        self.look()
+        self.refresh_view()
 
 
 def rules_toml(words: Mapping[str, Any]) -> str:

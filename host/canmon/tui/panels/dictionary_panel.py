@@ -80,7 +80,7 @@ class DictionaryPanel(Panel):
         if self.node is not None:
             self._rows = self.client.objects(self.node).rows(self.filter_text)
         self._lines = render_dictionary(self._rows, model.now_us)
-        left = f"{self.client.left} transfers left" if self.client.left else self.client.said
+        left = f"{self.client.left} transfers left" if self.client.left else self.client.result
         self._state = "   ".join([self._title(), *filter(None, [left])])
 
     def paint(self) -> None:
@@ -156,7 +156,7 @@ class DictionaryPanel(Panel):
 
     def _filter(self, text: str) -> None:
         self.filter_text = text
-        self.look()
+        self.refresh_view()
 
     def _write(self, row: ObjectRow, text: str) -> None:
         data = encode_value(row.text, text)

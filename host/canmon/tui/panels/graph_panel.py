@@ -20,7 +20,7 @@ from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
@@ -60,7 +60,7 @@ class GraphTask(Task):
     def __init__(self, graph: LiveGraph) -> None:
         self._graph = graph
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Take what was heard."""
         if self._graph.words:
             for one, decoded in records:
@@ -178,11 +178,11 @@ class GraphPanel(Panel):
             share = min(max(0.0, (event.x - LABEL_WIDTH - 1) / inner), 1.0)
             self.graph.cursor_us = view.from_us + round(view.span_us * share)
             self.graph.move_cursor(0)
-        self.look()
+        self.refresh_view()
 
     def _add(self, text: str) -> None:
         self._add_signal(text)
-        self.look()
+        self.refresh_view()
 
     def _add_signal(self, text: str) -> None:
         word: SignalSpec = parse_signal(text)
@@ -190,7 +190,14 @@ class GraphPanel(Panel):
             trace = self.session.model.trace
             rows = trace.rows(trace.first, trace.count)
             record = ((row.record, row.decoded) for row in rows)
-            self.graph.add(word, ((one, meant) for one, meant in record if isinstance(one, Record)))
+            self.graph.add(
+                word,
+                (
+                    (one, decoded_frames)
+                    for one, decoded_frames in record
+                    if isinstance(one, Record)
+                ),
+            )
         self._texts.append(text)
 
     def _remove(self, text: str) -> None:
@@ -200,7 +207,7 @@ class GraphPanel(Panel):
         with self.session.lock:
             self.graph.remove(number)
         del self._texts[number]
-        self.look()
+        self.refresh_view()
 
     def _write(self, text: str) -> None:
         path = Path(text)

@@ -16,7 +16,7 @@ from tickrig.host.tui.line_view import LineView
 class Panel(Vertical):
     """A tab.
 
-    While it is shown, the frame calls `look` ten times a second; so may the
+    While it is shown, the frame calls `refresh_view` ten times a second; so may the
     panel itself after a key. Keys are Textual `BINDINGS`, each with a
     description; `HELP` is Markdown. Both are shown by F1.
 
@@ -46,7 +46,7 @@ class Panel(Vertical):
                 widget.focus()
                 return
 
-    def look(self) -> None:
+    def refresh_view(self) -> None:
         """Take a snapshot of the model, and paint it."""
         with self.session.lock:
             self.snapshot(self.session.model)
@@ -56,7 +56,7 @@ class Panel(Vertical):
         """Do something to the model or a task, and show what comes of it."""
         with self.session.lock:
             act()
-        self.look()
+        self.refresh_view()
 
     def may_send(self) -> bool:
         """Say whether frames are sent; where they are not, tell people why."""

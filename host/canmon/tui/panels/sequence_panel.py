@@ -89,7 +89,7 @@ class SequencePanel(SendingPanel):
         super().__init__(session, self.runner)
         self.texts, self.number = [NEW], 0
         self._steps: list[str] = []
-        self._notes: list[SequenceEvent] = []
+        self._events: list[SequenceEvent] = []
         self._going = False
 
     def compose(self) -> ComposeResult:
@@ -103,14 +103,14 @@ class SequencePanel(SendingPanel):
 
     def snapshot(self, model: Model) -> None:
         """Keep what happened."""
-        self._notes, self._going = list(self.runner.notes), self.runner.running
+        self._events, self._going = list(self.runner.events), self.runner.running
 
     def paint(self) -> None:
         """Show it, the latest in view; or the steps."""
         self.query_one("#state", TitleLine).show(self._state())
         view = self.query_one(LineView)
         follows = view.follows
-        lines = [plain(line) for line in self._steps] or list(map(_line, self._notes))
+        lines = [plain(line) for line in self._steps] or list(map(_line, self._events))
         view.show(lines or [plain("F5 runs it, F7 shows its steps")])
         if follows:
             view.show_end()
@@ -140,7 +140,7 @@ class SequencePanel(SendingPanel):
         sequence = self._read()
         if sequence is not None:
             self._steps = outline(sequence.steps)
-            self.look()
+            self.refresh_view()
 
     def action_edit(self) -> None:
         """Go to the editor."""
@@ -191,7 +191,7 @@ class SequencePanel(SendingPanel):
     def _open(self, number: int) -> None:
         self.number, self._steps = number, []
         self.query_one(TextArea).text = self.texts[number]
-        self.look()
+        self.refresh_view()
 
     def _read_file(self, text: str) -> None:
         try:
@@ -218,5 +218,5 @@ class SequencePanel(SendingPanel):
         return "   ".join(words)
 
 
-def _line(note: SequenceEvent) -> Line:
-    return plain(event_line(note), STYLES.get(note.mark, ""))
+def _line(event: SequenceEvent) -> Line:
+    return plain(event_line(event), STYLES.get(event.mark, ""))

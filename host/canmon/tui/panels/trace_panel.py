@@ -12,7 +12,7 @@ from textual.widgets import Input, Static
 
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, text_of, truth
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
@@ -61,7 +61,7 @@ class TracePanel(Panel):
         super().__init__(session)
         self.overwrite, self.filter_text = False, ""
         self.paused: tuple[Ring, list[Latest]] | None = None
-        self._look = TraceLines()
+        self._layout = TraceLines()
         self._display_filter = DisplayFilter(session.model.trace)
         self._follower = _Follower(self)
         session.tasks.append(self._follower)
@@ -91,12 +91,12 @@ class TracePanel(Panel):
         self._fit(passed, latest)
         if self.overwrite:
             self._begin, self._total = 0, len(latest)
-            self._lines = [self._look.line(row, count) for row, count in latest]
+            self._lines = [self._layout.line(row, count) for row, count in latest]
             return
         self._total = passed.count - passed.first
         self._begin = max(0, self._total - view.rows) if self._follows(view) else view.top
         rows = passed.rows(passed.first + self._begin, view.rows)
-        self._lines = [self._look.line(row) for row in rows]
+        self._lines = [self._layout.line(row) for row in rows]
 
     def paint(self) -> None:
         """Show them; the latest one if it was in view."""
@@ -112,12 +112,12 @@ class TracePanel(Panel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take mode, time stamp, filter and what is shown."""
         self.overwrite = truth(settings, "overwrite", self.overwrite)
-        stamp = choice(settings, "time", self._look.stamp, [str(one) for one in STAMPS])
-        self._look = replace(
-            self._look,
+        stamp = choice(settings, "time", self._layout.stamp, [str(one) for one in STAMPS])
+        self._layout = replace(
+            self._layout,
             stamp=Stamp(stamp),
-            bits=truth(settings, "bits", self._look.bits),
-            meaning=truth(settings, "decode", self._look.meaning),
+            bits=truth(settings, "bits", self._layout.bits),
+            meaning=truth(settings, "decode", self._layout.meaning),
         )
         text = text_of(settings, "filter", self.filter_text)
         try:
@@ -129,9 +129,9 @@ class TracePanel(Panel):
         """Return them."""
         return {
             "overwrite": self.overwrite,
-            "time": str(self._look.stamp),
-            "bits": self._look.bits,
-            "decode": self._look.meaning,
+            "time": str(self._layout.stamp),
+            "bits": self._layout.bits,
+            "decode": self._layout.meaning,
             "filter": self.filter_text,
         }
 
@@ -144,7 +144,7 @@ class TracePanel(Panel):
 
     def on_line_view_moved(self) -> None:
         """Bring the lines that came into view."""
-        self.look()
+        self.refresh_view()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Apply the filter, or say what is wrong with it."""
@@ -170,42 +170,42 @@ class TracePanel(Panel):
         field.value, field.display = self.filter_text, bool(self.filter_text)
         self.query_one("#wrong").display = False
         self.query_one(LineView).focus()
-        self.look()
+        self.refresh_view()
 
     def action_pause(self) -> None:
         """Hold the picture, or go on; frames are taken meanwhile."""
         with self.session.lock:
             held = self._display_filter.passed.copy(), self._display_filter.latest()
         self.paused = None if self.paused else held
-        self.look()
+        self.refresh_view()
 
     def action_overwrite(self) -> None:
         """Show the latest frame of each identifier, or all."""
         self.overwrite = not self.overwrite
-        self.look()
+        self.refresh_view()
 
     def action_meaning(self) -> None:
         """Show or hide what frames mean."""
-        self._look = replace(self._look, meaning=not self._look.meaning)
-        self.look()
+        self._layout = replace(self._layout, meaning=not self._layout.meaning)
+        self.refresh_view()
 
     def action_bits(self) -> None:
         """Show bits or bytes."""
-        self._look = replace(self._look, bits=not self._look.bits)
-        self.look()
+        self._layout = replace(self._layout, bits=not self._layout.bits)
+        self.refresh_view()
 
     def action_stamp(self) -> None:
         """Show another time: since the first frame, since the one before, absolute, date."""
-        place = (STAMPS.index(self._look.stamp) + 1) % len(STAMPS)
-        self._look = replace(self._look, stamp=STAMPS[place])
-        self.look()
+        place = (STAMPS.index(self._layout.stamp) + 1) % len(STAMPS)
+        self._layout = replace(self._layout, stamp=STAMPS[place])
+        self.refresh_view()
 
     def action_clear(self) -> None:
         """Begin anew."""
         with self.session.lock:
             self._display_filter.clear()
         self.paused = None
-        self.look()
+        self.refresh_view()
 
     def _follows(self, view: LineView) -> bool:
         return view.follows and self.paused is None
@@ -215,16 +215,16 @@ class TracePanel(Panel):
         buses = {one.row.record.channel for one in latest}
         width = min(CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
         first = passed.rows(0, 1) if passed.first == 0 else []
-        origin_us = first[0].record.at_us if first else self._look.origin_us
-        self._look = replace(
-            self._look, channel_width=width, counts=self.overwrite, origin_us=origin_us
+        origin_us = first[0].record.at_us if first else self._layout.origin_us
+        self._layout = replace(
+            self._layout, channel_width=width, counts=self.overwrite, origin_us=origin_us
         )
 
     def _title(self) -> str:
         words = ["paused"] * (self.paused is not None)
         words += [f"filter {self.filter_text}"] * bool(self.filter_text)
         note = f"   [{', '.join(words)}]" if words else ""
-        return line_text(self._look.head()) + note
+        return line_text(self._layout.head()) + note
 
 
 class _Follower(Task):
@@ -233,7 +233,7 @@ class _Follower(Task):
     def __init__(self, panel: TracePanel) -> None:
         self._panel = panel
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Follow; it sends nothing."""
         self._panel.follow()
         return ()

@@ -15,7 +15,7 @@ from textual.binding import Binding, BindingType
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
 from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
@@ -103,7 +103,7 @@ class TransmitTask(Task):
         self.list.armed = armed
         self._out += self.list.once(number)
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Return what is due."""
         out, self._out = self._out, []
         return (*out, *self.list.tick(now_us))
@@ -219,7 +219,7 @@ class TransmitPanel(SendingPanel):
         except ValueError as error:
             how = "" if self.session.armed else "; A arms"
             self.notify(f"{error}{how}", markup=False)
-        self.look()
+        self.refresh_view()
 
     def _add(self, text: str) -> None:
         words = parse_row_text(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tickrig.host.canmon.tui.tasks.model import Meant
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame
 from tickrig.host.canmon.tui.tasks.session import Task
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.script import Script
@@ -38,13 +38,13 @@ class DictionaryTask(Task):
 
     Attributes:
         channel: the bus it sends on; empty for the first.
-        said: how the latest transfer ended, in words.
+        result: how the latest transfer ended, in words.
         left: transfers that have not ended.
         watched: objects that are read again and again.
     """
 
     def __init__(self, decoder: Decoder) -> None:
-        self.channel, self.said, self.left = "", "", 0
+        self.channel, self.result, self.left = "", "", 0
         self._decoder = decoder
         self._nodes: dict[Node, NodeDictionary] = {}
         self._out: list[CanFrame] = []
@@ -85,7 +85,7 @@ class DictionaryTask(Task):
         self.watched ^= {entry}
         self._watch_us = now_us if self.watched else NEVER
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Take values and answers; return requests."""
         for one, decoded in records:
             if decoded.node is None:
@@ -135,4 +135,4 @@ class DictionaryTask(Task):
 
     def _ended(self, said: str) -> None:
         self.left -= 1
-        self.said = said
+        self.result = said

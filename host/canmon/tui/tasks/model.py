@@ -13,7 +13,7 @@ from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.trace import Trace
 
-Meant = tuple[Record, Decoded]
+DecodedFrame = tuple[Record, Decoded]
 """A frame and what it means."""
 
 
@@ -53,20 +53,20 @@ class Model:
         self.frames = self.now_us = self.lost = self.unread = 0
         self.failed, self.ended = "", False
 
-    def take(self, records: Sequence[AnyRecord]) -> list[Meant]:
+    def take(self, records: Sequence[AnyRecord]) -> list[DecodedFrame]:
         """Take what was heard; return the frames with what they mean."""
-        meant: list[Meant] = []
+        decoded_frames: list[DecodedFrame] = []
         for record in records:
             if isinstance(record, Record):
                 decoded = self.decoder.take(record)
                 self.board.take(record, decoded)
                 self.trace.take(record, decoded)
-                meant.append((record, decoded))
+                decoded_frames.append((record, decoded))
             else:
                 self.trace.take(record, record.decoded)
                 self.top.take((record,))
-        self.top.take_decoded(meant)
-        self.frames += len(meant)
+        self.top.take_decoded(decoded_frames)
+        self.frames += len(decoded_frames)
         if records:
             self.now_us = records[-1].at_us
-        return meant
+        return decoded_frames

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from tickrig.host.canmon.tui.settings import below, tables, text_of
-from tickrig.host.canmon.tui.tasks.model import Meant
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame
 from tickrig.host.canmon.tui.tasks.session import Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.sequence.conditions import DecodedCondition
@@ -84,12 +84,12 @@ class SequenceTask(Task):
         channel: the bus it sends on; empty for the first.
 
     Attributes:
-        notes: what happened, the latest last; times count from the beginning.
+        events: what happened, the latest last; times count from the beginning.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
         self.channel = channel
-        self.notes: deque[SequenceEvent] = deque(maxlen=KEPT)
+        self.events: deque[SequenceEvent] = deque(maxlen=KEPT)
         self._pdos, self._heard = PdoFrames(eds), DecodedCondition()
         self._run: SequenceRun | None = None
         self._begin_us: int | None = None
@@ -115,10 +115,10 @@ class SequenceTask(Task):
 
     def start(self, sequence: Steps) -> None:
         """Carry it out from the next call on, in the place of one that runs."""
-        self.notes.clear()
+        self.events.clear()
         self._begin_us, self._run = None, SequenceRun(sequence)
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Take what was heard; return what the sequence sends."""
         run = self._run
         if run is None:
@@ -130,8 +130,8 @@ class SequenceTask(Task):
             self._heard.take(one, decoded)
             out += run.tick(now_us, (one,))
         begin_us = self._begin_us
-        self.notes += (note._replace(at_us=note.at_us - begin_us) for note in run.notes)
-        run.notes.clear()
+        self.events += (event._replace(at_us=event.at_us - begin_us) for event in run.events)
+        run.events.clear()
         if run.done:
             self._run = None
         return tuple(out)
@@ -140,5 +140,5 @@ class SequenceTask(Task):
         """Give it up."""
         if self._run is not None:
             self._run = None
-            at_us = self.notes[-1].at_us if self.notes else 0
-            self.notes.append(SequenceEvent(at_us, EventType.END, "stopped"))
+            at_us = self.events[-1].at_us if self.events else 0
+            self.events.append(SequenceEvent(at_us, EventType.END, "stopped"))

@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
@@ -36,7 +36,7 @@ class Task(Protocol):
         """When it next wants to be called without a frame; `NEVER` if not."""
         return NEVER
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Take what was heard, those that this program sent among it; return what to send.
 
         Args:
@@ -152,15 +152,15 @@ class Session:
     def _take(self, records: Sequence[AnyRecord]) -> list[tuple[str, CanFrame]]:
         self._echo = []
         self._watch.take(records)
-        meant = self.model.take(records)
+        decoded_frames = self.model.take(records)
         if self.source.live:
             self.model.now_us = self._source_us()
         now_us = self._clock()
         wanted = [
             (task.channel, frame)
             for task in self.tasks
-            if meant or task.due_us <= now_us
-            for frame in task.tick(now_us, meant)
+            if decoded_frames or task.due_us <= now_us
+            for frame in task.tick(now_us, decoded_frames)
         ]
         if self.armed:
             return wanted

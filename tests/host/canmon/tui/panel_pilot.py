@@ -46,13 +46,13 @@ class Desk(Generic[P]):
 
     def lines(self, selector: str = "LineView") -> list[str]:
         """Return the lines of a view as they are now."""
-        self._monitor.look()
+        self._monitor.refresh_view()
         view = self.panel.query(selector).first(LineView)
         return [line_text(line).rstrip() for line in view.lines]
 
     def static(self, selector: str) -> str:
         """Return what a label says."""
-        self._monitor.look()
+        self._monitor.refresh_view()
         return str(self.panel.query_one(selector, Static).content).strip()
 
     def told(self) -> list[str]:

@@ -63,13 +63,13 @@ def on_monitor(
     *,
     panels: Iterable[type[Panel]] = OURS,
     size: tuple[int, int] = SIZE,
-    bench: Callable[[list[Panel]], PanelSettings] | None = None,
+    panel_settings: Callable[[list[Panel]], PanelSettings] | None = None,
 ) -> Monitor:
     """Run a monitor while something is done with it."""
 
     async def main() -> Monitor:
         made = [panel(session) for panel in panels]
-        monitor = Monitor(session, made, bench(made) if bench else None)
+        monitor = Monitor(session, made, panel_settings(made) if panel_settings else None)
         async with monitor.run_test(size=size) as pilot:
             await pilot.pause()
             await act(monitor, pilot)
@@ -84,7 +84,7 @@ def on_monitor(
 
 def shown(monitor: Monitor) -> list[str]:
     """Return the lines of the panel on the screen, as they are now."""
-    monitor.look()
+    monitor.refresh_view()
     return [line_text(line).rstrip() for line in monitor.shown.query_one(LineView).lines]
 
 

@@ -25,7 +25,7 @@ from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
@@ -45,7 +45,7 @@ def wire() -> Iterator[Wire]:
 
 
 def status(monitor: Monitor) -> str:
-    monitor.look()
+    monitor.refresh_view()
     return line_text(monitor.query_one(StatusLine).line)
 
 
@@ -140,7 +140,7 @@ class Beacon:
     def __init__(self) -> None:
         self.stops = 0
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         return (CanFrame.parse("000#0105"),)
 
     def stop(self) -> None:
@@ -175,7 +175,7 @@ def test_a_click_on_listen_only_arms(wire: Wire) -> None:
     session = wire_session(wire)
 
     async def act(monitor: Monitor, pilot: Any) -> None:
-        monitor.look()
+        monitor.refresh_view()
         await pilot.click("#status", offset=(40, 0))
         assert not session.armed
         await pilot.click("#status", offset=(3, 0))
@@ -208,7 +208,7 @@ def test_the_status_tells_load_controller_errors_and_rate(tmp_path: Path) -> Non
     session = open_session([str(log)], BusOptions(), Model(bit_rate=500_000))
 
     async def act(monitor: Monitor, pilot: Any) -> None:
-        monitor.look()
+        monitor.refresh_view()
         session.step()
         text = status(monitor)
         assert "can0 0.0 % passive 1 error frames  2 frames  2/s  lost 0  end of the log" in text
@@ -262,7 +262,7 @@ def test_w_keeps_all_settings_in_a_file(tmp_path: Path) -> None:
         monitor.screen.query_one("Input").value = str(tmp_path / "no" / "b.toml")  # type: ignore[attr-defined]
         await pilot.press("enter")
         assert "No such file" in said(monitor)[-1]
-        assert monitor.bench.workspace.path == path
+        assert monitor.panel_settings.workspace.path == path
 
     on_monitor(drive_session(), act)
 
@@ -285,7 +285,7 @@ def test_what_a_workspace_has_beside_is_told_and_a_foreign_change_too(tmp_path: 
     on_monitor(
         drive_session(),
         act,
-        bench=lambda panels: PanelSettings(Workspace.read(path), MonitorSetup(), panels),
+        panel_settings=lambda panels: PanelSettings(Workspace.read(path), MonitorSetup(), panels),
     )
 
 
@@ -295,7 +295,7 @@ def test_what_ends_the_session_ends_the_monitor() -> None:
     class Broken(Beacon):
         due_us = 0
 
-        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
             raise ZeroDivisionError
 
     session.tasks.append(Broken())

@@ -45,9 +45,9 @@ def test_whatever_is_heard_can_be_shown(
     else:
         objects.read(0, (0x1008, 0))
     for number, frame in enumerate(frames, 1):
-        meant = model.take([Record(number * 100_000, BUS, frame)])
+        decoded_frames = model.take([Record(number * 100_000, BUS, frame)])
         for task in (objects, alarms, sequence, GraphTask(graph)):
-            task.tick(number * 100_000, meant)
+            task.tick(number * 100_000, decoded_frames)
     assert render_dictionary(objects.objects((BUS, NODE)).rows(), model.now_us)
     assert render_alarms(alarms.alarms, model.now_us)
     assert len(graph.render(60, 12)) == 12

@@ -45,7 +45,7 @@ def test_tasks_reach_our_drive_over_an_interface_of_python_can() -> None:
         client.read(session.now_us, (0x1008, 0))
         sender.add(parse_row_text("000#0105"))
         sender.once(0, armed=session.armed)
-        until(session, lambda: client.said == "read 1008h:00: done" and session.sent == 2)
+        until(session, lambda: client.result == "read 1008h:00: done" and session.sent == 2)
         (row,) = client.objects((bus, NODE)).rows("1008")
         session.close()
         session.source.close()

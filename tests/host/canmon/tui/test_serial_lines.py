@@ -36,8 +36,8 @@ def taken() -> Model:
 
 def test_lines_stand_in_the_trace_of_the_frames() -> None:
     model = taken()
-    look = TraceLines(origin_us=1_000_000, channel_width=5)
-    assert [line_text(look.line(row)).strip() for row in model.trace.rows(0, 3)] == [
+    refresh_view = TraceLines(origin_us=1_000_000, channel_width=5)
+    assert [line_text(refresh_view.line(row)).strip() for row in model.trace.rows(0, 3)] == [
         "0.000000        - can0  705       [1] 05                      5 heartbeat operational",
         "0.100000        - ttyS0 <         EV:PowerOn                  rrc event PowerOn",
         "0.200000        - ttyS0 >         output0000                  rrc output v_pct=0 w_pct=0",

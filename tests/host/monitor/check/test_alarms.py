@@ -18,19 +18,19 @@ S = 1_000_000
 
 def alarms(**words: object) -> Alarms:
     made = Alarms(parse_rules(words))
-    made.look(0)
+    made.check_missing(0)
     return made
 
 
 def taken(made: Alarms, text: str) -> Alarms:
     for record in hear(text):
         made.take(record)
-        made.look(record.at_us)
+        made.check_missing(record.at_us)
     return made
 
 
 def states(made: Alarms, now_us: int) -> list[State]:
-    made.look(now_us)
+    made.check_missing(now_us)
     return [alarm.state(now_us) for alarm in made.rows()]
 
 
@@ -46,7 +46,7 @@ def test_a_rule_is_broken_for_a_while_and_then_was_until_it_is_acknowledged() ->
 
 def test_before_any_frame_no_rule_is_said_to_hold() -> None:
     made = alarms(no_emcy=True, nodes=3)
-    made.look(GRACE_US)
+    made.check_missing(GRACE_US)
     shown = [line.split()[:3] for line in render_alarms(made, GRACE_US)[1:3]]
     assert shown == [["no-emcy", "no", "frame"], ["nodes", "BROKEN", "1"]]
 
@@ -64,7 +64,7 @@ def test_a_heartbeat_that_stops_is_one_finding_however_long_it_lasts() -> None:
 
 def test_a_heartbeat_that_is_back_was_broken() -> None:
     made = taken(alarms(heartbeat="5=100ms±20%"), "3.0 705#05")
-    made.look(5 * S)
+    made.check_missing(5 * S)
     for now_us in range(50, 80):
         taken(made, f"{now_us / 10} 705#05")
     assert states(made, 7_950_000) == [State.WAS_BROKEN]
@@ -79,21 +79,21 @@ def test_what_has_never_come_is_missed_after_a_time_of_grace() -> None:
 
 def test_the_grace_begins_with_the_time_of_the_source() -> None:
     made = Alarms(parse_rules({"nodes": 3}))
-    made.look(1_700_000_000 * S)
+    made.check_missing(1_700_000_000 * S)
     assert states(made, 5 * S) == [State.HOLDS]
     assert states(made, 5 * S + GRACE_US) == [State.BROKEN]
 
 
 def test_frames_that_get_lost_are_found_as_they_do() -> None:
     made = alarms(no_loss=True)
-    made.look(S, 5)
-    made.look(2 * S, 5)
+    made.check_missing(S, 5)
+    made.check_missing(2 * S, 5)
     assert [finding.text for finding in made.findings] == ["5 frames were lost"]
 
 
 def test_a_loss_before_the_rules_is_none_of_theirs() -> None:
     made = Alarms(parse_rules({"no_loss": True}))
-    made.look(0, 7)
+    made.check_missing(0, 7)
     assert not made.findings
 
 

@@ -46,7 +46,7 @@ def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
 
 def test_the_example_turns_our_drive() -> None:
     run, drive = carried_out(START.read_text())
-    assert [note.text for note in run.notes if note.mark is EventType.MISSED] == []
+    assert [event.text for event in run.events if event.mark is EventType.MISSED] == []
     assert (run.done, run.met) == (True, 5)
     assert drive.read("shaft_deg") != 0
 
@@ -62,7 +62,7 @@ def test_an_answer_by_sdo_is_expected_by_the_name_of_its_object() -> None:
     within = "20ms"
     """
     run, _ = carried_out(text)
-    assert [note.text for note in run.notes][-1] == "2 met, 0 missed"
+    assert [event.text for event in run.events][-1] == "2 met, 0 missed"
 
 
 def test_a_drive_that_is_not_there_is_missed() -> None:

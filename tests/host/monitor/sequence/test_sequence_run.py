@@ -41,8 +41,8 @@ def frames(*texts: str) -> Frames:
     return tuple(map(CanFrame.parse, texts))
 
 
-def notes(of: SequenceRun) -> list[str]:
-    return [f"{note.at_us} {note.mark} {note.text}" for note in of.notes]
+def events(of: SequenceRun) -> list[str]:
+    return [f"{event.at_us} {event.mark} {event.text}" for event in of.events]
 
 
 def test_a_sequence_sends_waits_expects_and_repeats() -> None:
@@ -63,7 +63,7 @@ def test_what_did_not_come_is_told_with_its_line_and_ends_the_sequence() -> None
     start.tick(0)
     assert start.tick(300_000) == ()
     assert start.done
-    assert notes(start) == [
+    assert events(start) == [
         "0 > 000#0105",
         "300000 ? start.toml:9: no 705#05 within 300 ms",
         "300000 . 0 met, 1 missed",
@@ -112,7 +112,7 @@ def test_several_frames_are_expected_in_any_order() -> None:
     half = run(text)
     half.tick(0, record("702#05"))
     half.tick(1_000_000)
-    assert half.notes[-2].text == "start.toml:2: no 701#05 within 1000 ms"
+    assert half.events[-2].text == "start.toml:2: no 701#05 within 1000 ms"
 
 
 def test_two_answers_in_one_call_meet_two_expectations() -> None:
@@ -159,7 +159,7 @@ def test_calling_more_often_changes_nothing(steps_us: list[int]) -> None:
         other += sparse.tick(sparse.due_us)
     for now_us in range(answer, answer + 60_000, 500):
         sent += dense.tick(now_us)
-    assert (sent, dense.notes) == (other, sparse.notes)
+    assert (sent, dense.events) == (other, sparse.events)
 
 
 def test_lines_send_at_their_times_as_often_as_they_say() -> None:
@@ -168,7 +168,7 @@ def test_lines_send_at_their_times_as_often_as_they_say() -> None:
     assert lines.due_us == 2_600
     assert lines.tick(2_600) == frames("080#", "000#0105")
     assert lines.tick(5_100) == frames("080#")
-    assert (lines.done, lines.notes[-1].mark) == (True, EventType.END)
+    assert (lines.done, lines.events[-1].mark) == (True, EventType.END)
 
 
 def test_lines_may_go_on_for_ever() -> None:

@@ -26,9 +26,9 @@ def ramp() -> RigSession:
 
 def hear(session: RigSession, seconds: range) -> None:
     frames = [Record(s * S, "can0", CanFrame(0x181, bytes([s]))) for s in seconds]
-    meant = session.model.take(frames)
+    decoded_frames = session.model.take(frames)
     for task in session.tasks:
-        task.tick(0, meant)
+        task.tick(0, decoded_frames)
 
 
 def span_s(desk: Desk[GraphPanel]) -> tuple[float, float]:

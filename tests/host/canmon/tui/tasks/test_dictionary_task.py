@@ -41,7 +41,7 @@ def test_an_object_is_read_from_our_drive() -> None:
     client.read(NAME)
     row = client.row(NAME)
     assert (row.value, row.origin, row.trouble) == ("'EPOS'", Origin.SDO, "")
-    assert (client.task.said, client.task.left) == ("read 1008h:00: done", 0)
+    assert (client.task.result, client.task.left) == ("read 1008h:00: done", 0)
 
 
 def test_an_object_is_written_and_the_drive_does_it() -> None:
@@ -64,7 +64,7 @@ def test_a_refusal_stands_beside_the_object_until_it_is_read() -> None:
     client = Client()
     client.write(STATUSWORD, b"\x00\x00")
     assert client.row(STATUSWORD).trouble == "object is read only (06010002h)"
-    assert client.task.said == "6041h:00 aborted: 06010002h READ_ONLY"
+    assert client.task.result == "6041h:00 aborted: 06010002h READ_ONLY"
     client.read(STATUSWORD)
     assert client.row(STATUSWORD).trouble == ""
 
@@ -73,7 +73,7 @@ def test_a_node_that_is_silent_is_told_after_the_time_out() -> None:
     client = Client()
     client.task.choose((BUS, 9))
     client.read(NAME)
-    assert client.task.said == "1008h:00 was not answered"
+    assert client.task.result == "1008h:00 was not answered"
     assert client.session.frames == ["609#4008100000000000", "609#8008100000000405"]
 
 

@@ -24,16 +24,16 @@ class Runner:
     def start(self, text: str) -> None:
         self.task.start(self.task.parse(text, "editor"))
 
-    def notes(self, span_us: int) -> list[str]:
+    def events(self, span_us: int) -> list[str]:
         self.session.run(span_us)
-        return [f"{note.at_us} {note.mark} {note.text}" for note in self.task.notes]
+        return [f"{event.at_us} {event.mark} {event.text}" for event in self.task.events]
 
 
 def test_the_example_turns_our_drive() -> None:
     runner = Runner()
     runner.start(START.read_text())
-    notes = runner.notes(10_000_000)
-    assert (notes[-1].split(" ", 1)[1], runner.task.running) == (". 5 met, 0 missed", False)
+    events = runner.events(10_000_000)
+    assert (events[-1].split(" ", 1)[1], runner.task.running) == (". 5 met, 0 missed", False)
     assert runner.session.drive.read("shaft_deg") != 0
 
 
@@ -41,7 +41,7 @@ def test_plain_lines_send_at_their_times_from_the_beginning() -> None:
     runner = Runner()
     runner.session.run(5_000)
     runner.start("# sync\nloop 2\n+0 080#\n+10 081#\n")
-    assert runner.notes(100_000) == [
+    assert runner.events(100_000) == [
         "0 > 080#",
         "10000 > 081#",
         "10000 > 080#",
@@ -53,24 +53,24 @@ def test_plain_lines_send_at_their_times_from_the_beginning() -> None:
 def test_what_the_sequence_sends_meets_nothing() -> None:
     runner = Runner()
     runner.start('[[step]]\nsend = "123#01"\n[[step]]\nexpect = "123#*"\nwithin = "1s"\n')
-    assert runner.notes(2_000_000)[1] == "1000000 ? editor:4: no 123#* within 1000 ms"
+    assert runner.events(2_000_000)[1] == "1000000 ? editor:4: no 123#* within 1000 ms"
 
 
 def test_stopping_gives_it_up() -> None:
     runner = Runner()
     runner.start("loop forever\n+10 080#")
-    runner.notes(50_000)
+    runner.events(50_000)
     runner.session.disarm()
-    assert runner.notes(1_000_000)[-1] == "40000 . stopped"
+    assert runner.events(1_000_000)[-1] == "40000 . stopped"
     assert not runner.task.running
 
 
 def test_another_one_takes_the_place_of_one_that_runs() -> None:
     runner = Runner()
     runner.start("loop forever\n+10 080#")
-    runner.notes(50_000)
+    runner.events(50_000)
     runner.start("+0 081#")
-    assert runner.notes(50_000) == ["0 > 081#", "0 . 0 met, 0 missed"]
+    assert runner.events(50_000) == ["0 > 081#", "0 . 0 met, 0 missed"]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from tests.host.canmon.tui.pilot import PATIENCE_US, drive_session, hear, wire_session
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.tui.tasks.model import Meant, Model
+from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.opening import open_session
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.cli.can_options import BusOptions
@@ -25,7 +25,7 @@ class Echo:
         self.record: list[tuple[str, str, bool]] = []
         self.stopped = False
 
-    def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         self.record += [(one.channel, str(one.frame), one.sent) for one, _ in records]
         return tuple(CanFrame.parse("700#") for one, _ in records if not one.sent)
 
@@ -82,7 +82,7 @@ def test_a_task_that_is_due_is_called_without_a_frame(session: Session) -> None:
     class Alarm(Echo):
         calls = 0
 
-        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
             assert now_us >= self.due_us
             self.calls, self.due_us = self.calls + 1, NEVER
             return ()
@@ -151,7 +151,7 @@ def test_the_thread_reads_until_it_is_closed(wire: Wire, session: Session) -> No
 
 def test_what_a_task_raises_is_raised_by_check(session: Session) -> None:
     class Broken(Echo):
-        def tick(self, now_us: int, records: Sequence[Meant], /) -> Frames:
+        def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
             raise ZeroDivisionError
 
     task = Broken()
