@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
@@ -19,6 +19,7 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types.cdr import Endian
 
 E = TypeVar("E", bound=StrEnum)
+V = TypeVar("V")
 
 
 class InterfaceType(StrEnum):
@@ -108,69 +109,60 @@ class ConnectorOptions:
             read.word("subscription_type", SubscriptionType.FLUSH),
             read.word("publisher.push_policy", PushPolicy.NEW),
             read.count("publisher.skip_count", 0),
-            read.rate("publisher.push_rate", 1_000.0),
-            read.endian("serializer.cdr.endian"),
-            read.buffer("inport."),
-            read.buffer("outport."),
+            read.value("publisher.push_rate", 1_000.0, _rate, f"{MIN_RATE_HZ}..{MAX_RATE_HZ} Hz"),
+            read.value("serializer.cdr.endian", Endian.LITTLE, _endian, ", ".join(Endian)),
+            _Reader(properties, "inport.").buffer(),
+            _Reader(properties, "outport.").buffer(),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class _Reader:
-    """Reads one property at a time."""
+    """Reads one property at a time; what holds for one end alone goes first."""
 
     properties: Mapping[str, str]
+    end: str = ""
 
-    def word(self, key: str, default: E, end: str = "") -> E:
-        text = self._text(key, end)
-        kind = type(default)
+    def value(self, key: str, default: V, convert: Callable[[str], V], allowed: str) -> V:
+        own = self.properties.get(f"dataport.{self.end}{key}")
+        text = self.properties.get(f"dataport.{key}") if own is None else own
         try:
-            return default if text is None else kind(text)
+            return default if text is None else convert(text)
         except ValueError:
-            raise self._refusal(key, text, ", ".join(kind)) from None
+            raise RtcRefused(f"dataport.{key}: {text!r} is none of: {allowed}") from None
 
-    def count(self, key: str, default: int, end: str = "") -> int:
-        text = self._text(key, end)
-        if text is None:
-            return default
-        if not text.isdecimal():
-            raise self._refusal(key, text, "0 and more")
-        return int(text)
+    def word(self, key: str, default: E) -> E:
+        return self.value(key, default, type(default), ", ".join(type(default)))
 
-    def rate(self, key: str, default: float) -> float:
-        text = self._text(key)
+    def count(self, key: str, default: int) -> int:
+        return self.value(key, default, _count, "0 and more")
+
+    def buffer(self) -> BufferOptions:
+        length = self.count("buffer.length", DEFAULT_LENGTH)
+        full = self.word("buffer.write.full_policy", FullPolicy.OVERWRITE)
+        empty = self.word("buffer.read.empty_policy", EmptyPolicy.READBACK)
+        read = self.word("buffer.read.policy", ReadPolicy.FIFO)
+        skip_count = self.count("buffer.read.skip_count", 0)
         try:
-            rate_hz = default if text is None else float(text)
-        except ValueError:
-            rate_hz = 0.0
-        if not MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ:
-            raise self._refusal(key, text, f"{MIN_RATE_HZ}..{MAX_RATE_HZ} Hz")
-        return rate_hz
-
-    def endian(self, key: str) -> Endian:
-        text = self._text(key)
-        words = [word.strip() for word in (text or "little").split(",")]
-        if not set(words) <= set(Endian):
-            raise self._refusal(key, text, ", ".join(Endian))
-        return Endian(words[0])
-
-    def buffer(self, end: str) -> BufferOptions:
-        try:
-            return BufferOptions(
-                self.count("buffer.length", DEFAULT_LENGTH, end),
-                self.word("buffer.write.full_policy", FullPolicy.OVERWRITE, end),
-                self.word("buffer.read.empty_policy", EmptyPolicy.READBACK, end),
-                self.word("buffer.read.policy", ReadPolicy.FIFO, end),
-                self.count("buffer.read.skip_count", 0, end),
-            )
-        except RtcRefused:
-            raise
+            return BufferOptions(length, full, empty, read, skip_count)
         except ValueError as error:
-            raise RtcRefused(f"dataport.{end}buffer: {error}") from error
+            raise RtcRefused(f"dataport.{self.end}buffer: {error}") from error
 
-    def _text(self, key: str, end: str = "") -> str | None:
-        own = self.properties.get(f"dataport.{end}{key}")
-        return self.properties.get(f"dataport.{key}") if own is None else own
 
-    def _refusal(self, key: str, text: str | None, allowed: str) -> RtcRefused:
-        return RtcRefused(f"dataport.{key}: {text!r} is none of: {allowed}")
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise ValueError(text)
+    return int(text)
+
+
+def _rate(text: str) -> float:
+    rate_hz = float(text)
+    if not MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ:
+        raise ValueError(text)
+    return rate_hz
+
+
+def _endian(text: str) -> Endian:
+    """Return the byte order that is preferred: the first of those named, little if none is."""
+    first, *_ = [Endian(word.strip()) for word in (text or Endian.LITTLE).split(",")]
+    return first

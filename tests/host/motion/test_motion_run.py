@@ -1,10 +1,15 @@
+"""Measures of a run, and the least time it can take."""
+
 from __future__ import annotations
+
+from math import pi
 
 import pytest
 
+from tickrig.host.motion.components.omni_to_2wd import plan
 from tickrig.host.motion.control_laws import VelocityLimits
 from tickrig.host.motion.geometry import Pose, Twist
-from tickrig.host.motion.motion_run import MotionRun, Sample
+from tickrig.host.motion.motion_run import MotionLimits, MotionRun, Sample, least_time_s, way_time_s
 
 LINE = Pose(2.0, 0.0, 0.0)
 LIMITS = VelocityLimits(0.3, 0.3, 0.006, 0.1)
@@ -62,3 +67,30 @@ def test_a_speed_that_stays_beyond_a_limit_is_counted(twist: Twist) -> None:
 def test_a_speed_at_the_limit_is_within_it() -> None:
     same = Sample(0.0, Pose(), Twist(0.3, -0.3), None)
     assert run(same, same).violations(LIMITS) == 0
+
+
+SQUARE = [Pose(4, 0), Pose(4, 4), Pose(0, 4), Pose(0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("points", "bound_s"),
+    [
+        ([Pose(1.0, 0.5, pi / 2)], 10.08),
+        ([Pose(3.4, 7.7, -1.57)], 42.11),
+        ([Pose(-1.0)], 25.40),
+        (SQUARE, 78.5),
+    ],
+)
+def test_the_bounds_are_those_of_the_prototype(points: list[Pose], bound_s: float) -> None:
+    """rh3-control, manoeuvres and UMBmark."""
+    assert least_time_s(plan(Pose(), points)) == pytest.approx(bound_s, abs=0.03)
+
+
+def test_a_short_way_never_reaches_the_highest_speed() -> None:
+    assert way_time_s(0.03, 0.3, 0.3) == pytest.approx(2 * (0.03 / 0.3) ** 0.5)
+    assert way_time_s(0.0, 0.3, 0.3) == 0.0
+
+
+def test_an_abler_cart_is_faster() -> None:
+    relays = plan(Pose(), SQUARE)
+    assert least_time_s(relays, MotionLimits(v=1.0, w=1.0)) < least_time_s(relays) / 2

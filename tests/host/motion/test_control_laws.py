@@ -1,13 +1,56 @@
+"""The limiter, the regulator and the spins."""
+
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, pi, radians, sin, sqrt
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.motion.control_laws import ControlLaw, Regulator
+from tickrig.host.motion.control_laws import (
+    ControlLaw,
+    ReferenceSpin,
+    Regulator,
+    TimeOptimalSpin,
+    VelocityLimits,
+    steps,
+)
 from tickrig.host.motion.geometry import Pose, Twist, wrap
+
+LIMITS = VelocityLimits(v=1.0, w=0.3, dv=0.006, dw=0.1)
+speeds = st.floats(-1e3, 1e3)
+
+
+@given(st.lists(st.builds(Twist, speeds, speeds), max_size=50))
+def test_no_command_violates_a_limit(wanted: list[Twist]) -> None:
+    before = Twist()
+    for twist in wanted:
+        now = LIMITS.smooth(twist, before)
+        assert abs(now.v) <= LIMITS.v
+        assert abs(now.w) <= LIMITS.w
+        assert abs(now.v - before.v) <= LIMITS.dv + 1e-12
+        assert abs(now.w - before.w) <= LIMITS.dw + 1e-12
+        before = now
+
+
+def test_what_is_within_the_limits_passes() -> None:
+    assert LIMITS.smooth(Twist(0.105, 0.05), Twist(0.1, 0.0)) == Twist(0.105, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("tick_s", "acc_cycle_s", "dv", "dw"),
+    [
+        (0.02, 0.001, 0.006, 0.1),  # 0.3 m/s2, and the cap of 5 rad/s2
+        (0.001, 0.001, 0.0003, 0.005),
+        (0.02, 0.02, 0.0003, 0.1),  # the literal reading
+    ],
+)
+def test_steps_are_given_for_each_acc_cycle(
+    tick_s: float, acc_cycle_s: float, dv: float, dw: float
+) -> None:
+    assert steps(0.0003, 0.1, tick_s, acc_cycle_s) == pytest.approx((dv, dw))
+
 
 H = 0.02
 SPEC = Regulator(800.0, 300.0, 400.0, 0.05, 0.01, H)
@@ -107,3 +150,51 @@ def driven(pose: Pose, twist: Twist) -> Pose:
         pose.y + twist.v * H * sin(heading),
         (heading + pi) % (2 * pi) - pi,
     )
+
+
+LATENCY = 0.03
+REFERENCE, OPTIMAL = ReferenceSpin(5.0), TimeOptimalSpin(2.5, H, LATENCY)
+
+
+@pytest.mark.parametrize(
+    ("q", "w"),
+    [
+        (1.0, 1.0),  # sqrt(2 * 0.1 * 5 * q) = sqrt(q)
+        (0.25, 0.5),
+        (-0.25, -0.5),
+        (1e-4, radians(2)),
+        (pi, 1.0),
+    ],
+)
+def test_the_reference_spin_slows_down_with_the_root_of_the_angle(q: float, w: float) -> None:
+    assert REFERENCE.turn(q, 0.0, 1.0, Twist()) == pytest.approx((0.0, w))
+
+
+def test_a_spin_takes_the_shorter_way() -> None:
+    assert REFERENCE.turn(3.0, -3.0, 1.0, Twist()).w < 0
+    assert OPTIMAL.turn(3.0, -3.0, 1.0, Twist()).w < 0
+
+
+def test_the_time_optimal_spin_brakes_for_the_angle_that_it_will_have() -> None:
+    command = OPTIMAL.turn(0.2, 0.0, 10.0, Twist(0.0, 1.0))
+    assert command.w == pytest.approx(sqrt(2 * 2.5 * (0.2 - 1.0 * LATENCY)))
+
+
+def test_the_time_optimal_spin_ends_within_the_next_effect() -> None:
+    command = OPTIMAL.turn(0.001, 0.0, 1.0, Twist())
+    assert command.w == pytest.approx(0.001 / (H + LATENCY))
+
+
+@given(st.floats(-pi, pi), st.floats(-pi, pi))
+def test_the_time_optimal_spin_arrives_with_no_more_than_a_milliradian_over(
+    heading: float, start: float
+) -> None:
+    present, twist, way = start, Twist(), wrap(heading - start)
+    turned = 0.0
+    for _ in range(1_200):
+        twist = LIMITS.smooth(OPTIMAL.turn(heading, present, 0.3, twist), twist)
+        present += twist.w * H
+        turned = max(turned, abs(present - start))
+    assert abs(wrap(heading - present)) < 1e-6
+    if abs(way) < pi - 0.01:
+        assert turned < abs(way) + 0.001
