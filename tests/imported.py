@@ -11,7 +11,7 @@ import io
 import json
 import os
 import sys
-from importlib.metadata import EntryPoint
+from importlib import import_module
 
 
 def imported(point: str, command: str, *words: str) -> list[str]:
@@ -29,7 +29,8 @@ def imported(point: str, command: str, *words: str) -> list[str]:
     sys.argv = [command, *words]
     sys.stdout = sys.stderr = io.TextIOWrapper(io.BytesIO())
     with contextlib.suppress(SystemExit):
-        EntryPoint(command, point, "console_scripts").load()()
+        module, _, name = point.partition(":")
+        getattr(import_module(module), name)()
     return sorted(sys.modules.keys() - before)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import click
 
 from tickrig.host.cli.control import ask
-from tickrig.host.cli.options import time_us
+from tickrig.host.cli.refused import time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
 from tickrig.host.text.values import format_time, parse_setting

@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from math import isnan
-from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig import __version__
 
-PATH: Final = click.Path(path_type=Path)
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class PathType(click.Path):
+    """A path, as `click.Path(path_type=Path)`: pathlib is imported when there is one."""
+
+    def convert(
+        self,
+        value: str | os.PathLike[str],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Path:
+        """Read a path."""
+        from pathlib import Path  # noqa: PLC0415 - slow
+
+        return Path(str(super().convert(value, param, ctx)))
+
+
+PATH: Final = PathType()
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -58,12 +77,3 @@ def time_option(option: str, name: str, **attributes: Any) -> Decorator:
             raise Refused(f"{option} {error}") from None
 
     return click.option(option, name, metavar="TIME", callback=parsed, **attributes)
-
-
-def time_us(option: str, word: str) -> int:
-    """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
-    from tickrig.host.cli.refused import refused_at  # noqa: PLC0415 - a TAB needs none
-    from tickrig.host.text.values import parse_time_us  # noqa: PLC0415
-
-    with refused_at(option):
-        return parse_time_us(word)

@@ -33,3 +33,11 @@ def refused_at(option: str) -> Iterator[None]:
 def refuse_path(what: str, error: OSError) -> NoReturn:
     """Say that a path cannot be used, and why."""
     raise Refused(f"{what} {error.filename2 or error.filename}: {error.strerror}") from error
+
+
+def time_us(option: str, word: str) -> int:
+    """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
+    from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none
+
+    with refused_at(option):
+        return parse_time_us(word)

@@ -6,7 +6,8 @@ from typing import Any
 
 import click
 
-from tickrig.host.cli.options import PATH, NumberRange, time_us
+from tickrig.host.cli.options import PATH, NumberRange
+from tickrig.host.cli.refused import time_us
 from tickrig.host.cli.start import loading
 from tickrig.host.rtc.commands.ask import VARIABLE, default_path
 from tickrig.host.rtc.commands.conf import conf

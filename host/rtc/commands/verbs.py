@@ -11,8 +11,8 @@ from typing import Any, Final
 import click
 
 from tickrig.host.cli.control import refused_by
-from tickrig.host.cli.options import NumberRange, time_us
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.options import NumberRange
+from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc.commands.ask import (
     SYSTEM,
