@@ -19,14 +19,14 @@ class _FrameSplitter:
     """A frame is whole when its CRC matches; what silence leaves behind is shown as it is."""
 
     def __init__(self) -> None:
-        self._begun, self._heard_us = b"", 0
+        self._begun, self._received_us = b"", 0
 
     def split(self, at_us: int, data: bytes) -> list[bytes]:
         out = []
-        if self._begun and at_us - self._heard_us >= SHORTEST_SILENCE_US:
+        if self._begun and at_us - self._received_us >= SHORTEST_SILENCE_US:
             out.append(b"(no frame) " + _hex(self._begun))
             self._begun = b""
-        self._heard_us = at_us
+        self._received_us = at_us
         self._begun = (self._begun + data)[:MAX_FRAME_BYTES]
         try:
             parse_frame(self._begun)

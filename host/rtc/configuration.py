@@ -43,7 +43,21 @@ class Configuration:
     def bind(
         self, name: str, default: V, constraint: str = "", *, unit: str = "", widget: str = ""
     ) -> Parameter[V]:
-        """Add a parameter, with its default in the set `default`; see `Parameter`."""
+        """Add a parameter, with its default in the set `default`.
+
+        Args:
+            name: in the configuration sets.
+            default: bool, int, float, str or a tuple of one of these; the type of the values.
+            constraint: what values it may have, as `0<=x<=10` (`Constraint`).
+            unit: of the value, for people.
+            widget: how an editor shows it, such as `text` or `slider.10`.
+
+        Returns:
+            The parameter; its `value` is what holds.
+
+        Raises:
+            ValueError: a default that the constraint does not allow, or no constraint.
+        """
         parameter = Parameter(name, default, constraint, unit=unit, widget=widget)
         self._parameters[name] = parameter
         self._sets[DEFAULT][name] = parameter.text

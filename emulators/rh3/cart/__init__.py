@@ -1,1 +1,1 @@
-"""Carts of Reference Hardware 3 that drive: closed loops, runs, maps, the command `rh3`."""
+"""Carts of Reference Hardware 3 that drive: closed loops, convoys, and the command `rh3`."""

@@ -42,7 +42,7 @@ class OmniCart(RtComponent):
         self.velocity = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
         self.position = self.add_port(OutPort("OdometryPosition", iis.TimedPose2D))
         self.body = OmniBody(parameters or OmniParameters())
-        self._wanted, self._heard_us = Velocity(), 0
+        self._wanted, self._received_us = Velocity(), 0
 
     @property
     def true_pose(self) -> Pose:
@@ -64,8 +64,8 @@ class OmniCart(RtComponent):
         if (latest := read_newest(self.velocity)) is not None:
             numbers = (latest.data.vx, latest.data.vy, latest.data.va)
             self._wanted = Velocity(*numbers) if plausible(*numbers) else Velocity()
-            self._heard_us = ec.now_us
-        elif ec.now_us - self._heard_us > WATCHDOG_US:
+            self._received_us = ec.now_us
+        elif ec.now_us - self._received_us > WATCHDOG_US:
             self._wanted = Velocity()
         for _ in range(ec.period_us // STEP_US):
             self.body.step(self._wanted)

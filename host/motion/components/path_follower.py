@@ -83,7 +83,7 @@ class PathFollower(RtComponent):
     def _forget(self) -> None:
         self.path, self.twist = Path(RunMode.STOP), Twist()
         self._pose: Pose | None = None
-        self._seen_us = 0
+        self._received_us = 0
 
     def _configure(self) -> None:
         h, alpha = self.control_cycle.value, self.max_acc_w.value / self.control_cycle.value
@@ -124,8 +124,8 @@ class PathFollower(RtComponent):
     def _update_pose(self, ec: ExecutionContext) -> Pose | None:
         """Read new poses. Returns: the latest, None if there was none for `pose_timeout`."""
         if (pose := read_newest_pose(self.position)) is not None:
-            self._pose, self._seen_us = pose, ec.now_us
-        elif ec.now_us - self._seen_us > self.pose_timeout.value * 1e6:
+            self._pose, self._received_us = pose, ec.now_us
+        elif ec.now_us - self._received_us > self.pose_timeout.value * 1e6:
             self._pose = None
         return self._pose
 

@@ -39,7 +39,7 @@ class RunningInformation(RtComponent):
 
     def _forget(self) -> None:
         self._pose: Pose | None = None
-        self._taken_us = self._seen_us = 0
+        self._taken_us = self._received_us = 0
         self._velocity = iis.TimedVelocity2D()
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -57,8 +57,8 @@ class RunningInformation(RtComponent):
         for sample in read_all(self.position):
             if (pose := to_pose(sample.data)) is not None:
                 self._take(sample.tm, pose)
-                self._seen_us = ec.now_us
-        if ec.now_us - self._seen_us > self.timeout.value * 1e6:
+                self._received_us = ec.now_us
+        if ec.now_us - self._received_us > self.timeout.value * 1e6:
             self._velocity = iis.TimedVelocity2D(Time.from_us(ec.now_us))
         self.velocity.write(self._velocity)
         return ReturnCode.RTC_OK

@@ -102,20 +102,20 @@ class WatchedDistance:
     """
 
     def __init__(self, port: InPort[TimedDouble]) -> None:
-        self._port, self.free, self._heard_us = port, False, 0
+        self._port, self.free, self._received_us = port, False, 0
 
     def forget(self) -> None:
         """Begin anew."""
         self._port.clear()
-        self.free, self._heard_us = False, 0
+        self.free, self._received_us = False, 0
 
     def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
         """Take the newest distance; return whether the way is free."""
         latest = read_newest(self._port)
         if latest is not None and plausible(latest.data):
-            self._heard_us = ec.now_us
+            self._received_us = ec.now_us
             self.free = latest.data > (stop_m if self.free else go_m)
-        elif ec.now_us - self._heard_us > timeout_s * 1e6:
+        elif ec.now_us - self._received_us > timeout_s * 1e6:
             self.free = False
         return self.free
 

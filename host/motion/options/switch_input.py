@@ -36,7 +36,7 @@ class SwitchInput(RtComponent):
     def _forget(self) -> None:
         self.is_manual = False
         self._pushed = Velocity2D()
-        self._heard_us = self._let_go_us = 0
+        self._received_us = self._let_go_us = 0
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin with the planner."""
@@ -57,8 +57,8 @@ class SwitchInput(RtComponent):
 
     def _listen(self, ec: ExecutionContext) -> None:
         if (latest := read_newest(self.joystick)) is not None:
-            self._pushed, self._heard_us = _made_plausible(latest.data), ec.now_us
-        elif ec.now_us - self._heard_us > self.stale.value * 1e6:
+            self._pushed, self._received_us = _made_plausible(latest.data), ec.now_us
+        elif ec.now_us - self._received_us > self.stale.value * 1e6:
             self._pushed = Velocity2D()
 
     def _switch(self, ec: ExecutionContext) -> None:
