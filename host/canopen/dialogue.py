@@ -1,24 +1,19 @@
-"""Runs the scripts of one node, one after the other."""
+"""Scripts, what is said to a node in the order in which it is said, and what runs them.
+
+A script is a generator. It yields steps, is given what came of each, and returns
+its result; what goes wrong is raised in it. It waits for nothing: a `Dialogue`
+goes on with it when there is an answer, or when a time has passed.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, TypeVar
 
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
-from tickrig.host.canopen.script import (
-    SDO_TIMEOUT_US,
-    Ask,
-    Await,
-    Command,
-    Pause,
-    Script,
-    Step,
-    Tell,
-)
-from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtState
+from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
@@ -30,6 +25,56 @@ from tickrig.wire.canopen.sdo.sdo import (
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
+
+SDO_TIMEOUT_US: Final = 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Send an SDO request; gives the response, raises SdoTimeout without one."""
+
+    request: bytes
+    index: int
+    sub: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Send an SDO frame that has no answer."""
+
+    request: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Send an NMT command."""
+
+    command: NmtCommand
+
+
+@dataclass(frozen=True, slots=True)
+class Await:
+    """Wait until a heartbeat or boot-up says a state; raises StateTimeout."""
+
+    state: NmtState
+    timeout_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Let time pass."""
+
+    duration_us: int
+
+
+Step = Ask | Tell | Command | Await | Pause
+
+T = TypeVar("T")
+
+Script = Generator[Step, Any, T]
+"""A script that returns a T; it is sent the `Response` of an `Ask`, else None."""
+
+Answer = Response | None
 
 Failure = SdoFailed | StateTimeout | WrongIdentity
 Send = Callable[[int, bytes], None]

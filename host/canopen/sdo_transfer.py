@@ -7,8 +7,8 @@ Not emulated: block transfer, which a server of a device must not insist on.
 
 from __future__ import annotations
 
+from tickrig.host.canopen.dialogue import Answer, Ask, Script, Tell
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.canopen.script import Answer, Ask, Script, Tell
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,

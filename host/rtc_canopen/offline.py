@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from tickrig.host.canopen.dialogue import Ask, Step
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.canopen.script import Ask, Step
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.host.rtc.states import RtcRefused

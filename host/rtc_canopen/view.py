@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from tickrig.host.canopen.dialogue import Failure, QueuedScript
-from tickrig.host.canopen.script import Script
+from tickrig.host.canopen.dialogue import Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import DataPort, OutPort

@@ -17,7 +17,7 @@ import pexpect
 
 from benchmarks.canmon_decode import seconds
 from benchmarks.table import rates, row
-from tickrig.host.canmon.sources.source import open_source
+from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.check.column_check import check_columns

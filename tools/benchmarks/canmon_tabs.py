@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.table import RUNS, percentiles, row
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.opening import open_session
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Session, open_session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds_objects
@@ -20,7 +20,7 @@ from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary, rend
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import MOST, LiveGraph, ViewMode
 from tickrig.host.monitor.graph.signal_spec import parse_signal
-from tickrig.host.monitor.transmit.row_text import parse_row_text
+from tickrig.host.monitor.transmit.transmit_list import parse_row_text
 from tickrig.wire.can import CanFrame
 
 EPOS = Path(__file__).parents[2] / "examples/eds/epos.eds"
@@ -36,10 +36,10 @@ SETTINGS = {
 PANELS = tuple(map(TABS.load, TABS.built_in))
 
 
-class Frames:
+class Frames(AnySource[Record]):
     """PDOs of a drive, in batches."""
 
-    live, ended, lost, failed = True, False, 0, ""
+    live = True
 
     def __init__(self) -> None:
         self._batches = [_batch(at * BATCH) for at in range(FRAMES // BATCH)][::-1]
@@ -47,13 +47,6 @@ class Frames:
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Return the next batch."""
         return self._batches.pop()
-
-    def messages(self) -> list[str]:
-        """Say nothing."""
-        return []
-
-    def close(self) -> None:
-        """There is nothing to close."""
 
 
 def run(seconds: float) -> None:

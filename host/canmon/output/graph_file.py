@@ -1,15 +1,101 @@
-"""Files that curves are written to."""
+"""Files that curves are written to: SVG and HTML, PNG through matplotlib (extra `plot`), CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+import heapq
+from collections.abc import Iterator, Sequence
 from io import BytesIO
+from itertools import cycle, groupby
+from operator import itemgetter
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final, TextIO
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.graph.chart import Chart, Curve, chart
 from tickrig.host.monitor.graph.series import Series, View
+from tickrig.host.monitor.graph.svg import COLOURS, html_page, svg
+
+
+def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
+    """Write the samples in a view: a row for each time, a column for each series.
+
+    A cell is empty where a series has no sample at that time; where it has several, the last
+    counts. Times are seconds with six digits, as in the log.
+    """
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(["t_s", *(_heading(one) for one in series)])
+    samples = heapq.merge(*(_samples(number, one, view) for number, one in enumerate(series)))
+    for at_us, group in groupby(samples, key=itemgetter(0)):
+        cells: list[str | float] = [""] * len(series)
+        for _, number, _, value in group:
+            cells[number] = int(value) if value.is_integer() else value
+        writer.writerow([f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}", *cells])
+
+
+def _heading(series: Series) -> str:
+    return f"{series.label} [{series.unit}]" if series.unit else series.label
+
+
+def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int, int, float]]:
+    """Yield time, which series, which sample, value; in this order they are sorted."""
+    seen = series.between(view.from_us, view.to_us)
+    for index in range(seen.start, seen.stop):
+        yield series.at_us[index], number, index, series.values[index]
+
+
+DPI: Final = 100
+AXIS_SHARE: Final = 0.09
+"""Of the width, for each axis beyond the second."""
+MARGIN: Final = 0.03
+"""Of an axis, above and below its curves."""
+
+
+def write_png(
+    file: BinaryIO, series: Sequence[Series], view: View, width: int = 960, height: int = 400
+) -> None:
+    """Write a picture of so many pixels.
+
+    Raises:
+        ImportError: matplotlib is not there.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow
+
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, layout="constrained")
+    drawn = chart(series, view, width)
+    first = figure.add_subplot()
+    first.grid(visible=True, alpha=0.4)
+    axes = {axis: first.twinx() if number else first for number, axis in enumerate(drawn.ranges)}
+    for number, (axis, (low, high)) in enumerate(drawn.ranges.items()):
+        margin = (high - low) * MARGIN
+        axes[axis].set_ylim(low - margin, high + margin)
+        if number > 1:
+            axes[axis].spines["right"].set_position(("axes", 1 + AXIS_SHARE * (number - 1)))
+    lines = []
+    for curve, colour in zip(drawn.curves, cycle(COLOURS), strict=False):
+        label = f"{curve.label} [{curve.unit}]" if curve.unit else curve.label
+        times, values = _points(curve, drawn)
+        lines += axes[curve.axis].plot(times, values, label=label, color=colour, linewidth=1.2)
+    first.set_xlim(view.seconds(view.from_us), view.seconds(view.to_us))
+    first.set_xlabel("s")
+    if view.cursor_us is not None:
+        first.axvline(view.seconds(view.cursor_us), color="#888888", linewidth=1)
+    if lines:
+        figure.legend(handles=lines, loc="outside upper left", ncols=3)
+    figure.savefig(file, format="png")
+
+
+def _points(curve: Curve, drawn: Chart) -> tuple[list[float], list[float]]:
+    view = drawn.view
+    times: list[float] = []
+    values: list[float] = []
+    for x, bar in curve.stops:
+        second = view.seconds(view.from_us) + x * view.span_us / drawn.columns / 1e6
+        times += [second] * len(bar)
+        values += bar
+    return times, values
+
 
 KINDS: Final = (".svg", ".html", ".png", ".csv")
 
@@ -44,21 +130,13 @@ def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[in
 def _write(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
     match path.suffix.lower():
         case ".svg":
-            from tickrig.host.monitor.graph.svg import svg  # noqa: PLC0415 - one kind is wanted
-
             path.write_text(svg(series, view, *size), "utf-8")
         case ".html":
-            from tickrig.host.monitor.graph.svg import html_page  # noqa: PLC0415
-
             path.write_text(html_page(series, view, *size, title=path.stem), "utf-8")
         case ".csv":
-            from tickrig.host.monitor.graph.csv_text import write_csv  # noqa: PLC0415
-
             with path.open("w", encoding="utf-8", newline="") as file:
                 write_csv(file, series, view)
         case _:
-            from tickrig.host.monitor.graph.png import write_png  # noqa: PLC0415
-
             picture = BytesIO()
             write_png(picture, series, view, *size)
             path.write_bytes(picture.getvalue())

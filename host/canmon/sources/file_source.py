@@ -10,6 +10,7 @@ from itertools import islice
 from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.monitor.frames.candump_filter import flagged_id
 from tickrig.host.monitor.frames.record import Record
@@ -22,45 +23,7 @@ BATCH: Final = 1_024
 """Frames of one poll."""
 
 
-class TalliedSource:
-    """A source whose tallies say what was lost or is no frame.
-
-    Attributes:
-        ended: no more will come.
-        failed: why it ended before its time; empty if it did not.
-    """
-
-    ended = False
-    failed = ""
-
-    def tallies(self) -> Iterable[tuple[str, Tally]]:
-        """Return the tally of each file, with its name."""
-        raise NotImplementedError
-
-    @property
-    def lost(self) -> int:
-        """Frames that the recorder or writer says it lost."""
-        return sum(tally.lost for _, tally in self.tallies())
-
-    @property
-    def unread(self) -> int:
-        """Lines and frames that could not be taken."""
-        return sum(tally.unread for _, tally in self.tallies())
-
-    def messages(self) -> list[str]:
-        """Say what was no frame or got lost."""
-        return [text for name, tally in self.tallies() for text in tally.messages(name)]
-
-    def losses(self) -> list[str]:
-        """Say what got lost or could not be taken."""
-        return [text for name, tally in self.tallies() for text in tally.losses(name)]
-
-    def close(self) -> None:
-        """Read no more."""
-        self.ended = True
-
-
-class FileSource(TalliedSource):
+class FileSource(AnySource[Record]):
     """One or more log files.
 
     Raises:
@@ -90,7 +53,7 @@ class FileSource(TalliedSource):
             batch.extend(islice(self._frames, BATCH))
         except (OSError, LogError) as error:
             self.failed = str(error)
-        self.ended = len(batch) < BATCH
+        self._ended = len(batch) < BATCH
         return batch
 
     def close(self) -> None:
@@ -121,7 +84,7 @@ STDIN: Final = 0
 READ_BYTES: Final = 1 << 16
 
 
-class StdinSource(TalliedSource):
+class StdinSource(AnySource[Record]):
     """A pipe, a terminal or a file that somebody feeds."""
 
     live = True
@@ -135,7 +98,7 @@ class StdinSource(TalliedSource):
 
     def poll(self, timeout_us: int, /) -> list[Record]:
         """Wait for bytes; return the frames of the lines that are whole."""
-        if self.ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
+        if self._ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
             return []
         try:
             data = os.read(self._descriptor, READ_BYTES)
@@ -143,5 +106,5 @@ class StdinSource(TalliedSource):
             data, self.failed = b"", f"standard input: {error.strerror}"
         if data:
             return self._lines.push(data)
-        self.ended = True
+        self._ended = True
         return self._lines.finish()

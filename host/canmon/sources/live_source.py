@@ -6,8 +6,9 @@ import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import repeat
-from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
@@ -50,7 +51,7 @@ class Reader(Protocol[Read_co]):
         ...
 
 
-class LiveSource(Generic[Item]):
+class LiveSource(AnySource[Item]):
     """One or more buses or serial ports, read by a thread each.
 
     What the caller does not fetch is kept up to a limit; frames beyond it are
@@ -92,15 +93,14 @@ class LiveSource(Generic[Item]):
         """Say that a bus is gone, and all that came was fetched."""
         return (bool(self.failed) or self._stop) and not self._queue
 
+    def tallies(self) -> Iterable[tuple[str, Tally]]:
+        """Return what was no frame, by the name of each bus or port."""
+        return [(reader.name, reader.tally) for reader in self._readers]
+
     @property
     def lost(self) -> int:
         """Frames that the drivers dropped or that found the queue full."""
         return self._overruns + sum(reader.lost for reader in self._readers)
-
-    @property
-    def unread(self) -> int:
-        """Frames that came and could not be taken, as those of CAN FD."""
-        return sum(reader.tally.unread for reader in self._readers)
 
     def poll(self, timeout_us: int, /) -> list[Item]:
         """Wait for a first frame, then return all that are there."""
@@ -113,12 +113,12 @@ class LiveSource(Generic[Item]):
 
     def messages(self) -> list[str]:
         """Say what was no frame or got lost."""
-        remarks = (word for one in self._readers for word in one.tally.remarks(one.name))
+        remarks = (text for name, tally in self.tallies() for text in tally.remarks(name))
         return [*self.losses(), *remarks]
 
     def losses(self) -> list[str]:
         """Say what got lost or could not be taken."""
-        said = [word for reader in self._readers for word in reader.tally.losses(reader.name)]
+        said = super().losses()
         said += [
             f"{one.name}: its driver lost {one.lost} frames" for one in self._readers if one.lost
         ]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.file_source import TalliedSource
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
@@ -22,15 +22,14 @@ SMALL_BYTES: Final = 1 << 20
 """Below it a log is read frame by frame sooner than numpy is imported."""
 
 
-class WholeLog(TalliedSource):
+class WholeLog(AnySource[Record]):
     """All of a log file, as a source whose end is reached.
 
     Attributes:
         columns: its frames.
     """
 
-    live = False
-    ended = True
+    _ended = True
 
     def __init__(self, path: Path, columns: Columns) -> None:
         self._name, self.columns = str(path), columns
@@ -38,10 +37,6 @@ class WholeLog(TalliedSource):
     def tallies(self) -> Iterable[tuple[str, Tally]]:
         """Return the tally of the file."""
         return [(self._name, self.columns.tally)]
-
-    def poll(self, timeout_us: int, /) -> list[Record]:
-        """Return nothing: all is in the columns."""
-        return []
 
     def snapshot(self) -> Snapshot:
         """Return the statistics of all frames."""

@@ -16,7 +16,8 @@ from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
-from tickrig.host.canmon.sources.source import Source, open_source
+from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions

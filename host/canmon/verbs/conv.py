@@ -11,7 +11,7 @@ import click
 from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.log_file import LogFile
-from tickrig.host.canmon.sources.source import open_source
+from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,

@@ -16,7 +16,8 @@ from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
-from tickrig.host.canmon.sources.source import AnySource, open_any
+from tickrig.host.canmon.sources.opening import open_any
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,

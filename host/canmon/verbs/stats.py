@@ -10,7 +10,7 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.ending import report
 from tickrig.host.canmon.output.listening import bit_rate_of, follow, span_option
-from tickrig.host.canmon.sources.source import open_source
+from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions

@@ -85,7 +85,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
     from tickrig.host.canmon.tui.tasks.model import Model  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.tui.tasks.opening import open_session  # noqa: PLC0415
+    from tickrig.host.canmon.tui.tasks.session import open_session  # noqa: PLC0415
 
     try:
         workspace = Workspace() if path is None else Workspace.read(path)

@@ -1,9 +1,18 @@
-"""The objects of one node with the latest values that were heard."""
+"""The objects of one node with the latest values that were heard.
+
+>>> encode_value(ObjectText("target_velocity", DataType.INTEGER32), "-2").hex()
+'feffffff'
+>>> encode_value(ObjectText("angle", DataType.INTEGER16, "deg", 0.1), "1.5").hex()
+'0f00'
+>>> encode_value(ObjectText(), "37 02").hex()
+'3702'
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
+from math import isfinite
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
@@ -11,8 +20,11 @@ from tickrig.host.monitor.decode.node_memory import Entry, NodeMemory
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer, write_entry
 from tickrig.host.monitor.frames.quantity import s_text
+from tickrig.host.text.values import parse_setting
+from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
 from tickrig.wire.canopen.sdo.abort import describe_abort
+from tickrig.wire.errors import FieldError
 
 
 class Origin(StrEnum):
@@ -176,3 +188,48 @@ def _line(row: ObjectRow, name: int, now_us: int) -> str:
         f" {row.trouble or row.kind}",
     ]
     return " ".join(cells).rstrip()
+
+
+TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
+TRUTH: Final = {"true": 1, "false": 0}
+
+
+def encode_value(text: ObjectText, words: str) -> bytes:
+    """Return the bytes of a value, written as the table shows it: in the unit of the object.
+
+    Args:
+        text: what is known of the object; where no type is, bytes are written.
+        words: the value; bytes in hex.
+
+    Raises:
+        ValueError: not a value of this object.
+    """
+    kind = text.kind
+    if kind in TEXTS:
+        return kind.encode(words)
+    if kind is None or not (kind.is_integer or kind in (DataType.REAL32, DataType.REAL64)):
+        return _bytes(words)
+    value = TRUTH.get(words.lower(), parse_setting(words))
+    if isinstance(value, str):
+        raise ValueError(f"{words!r} is no number; {text.name} is {kind.name}")
+    try:
+        return kind.encode(_on_the_wire(text, kind, value))
+    except (FieldError, OverflowError):
+        raise ValueError(f"{words} is not in the range of {kind.name}") from None
+
+
+def _on_the_wire(text: ObjectText, kind: DataType, value: float) -> float:
+    """Return the number that is sent: the nearest step, where the object has a factor."""
+    if text.factor == 1 or text.in_hex:
+        return value
+    scaled = value / text.factor
+    return round(scaled) if kind.is_integer and isfinite(scaled) else scaled
+
+
+def _bytes(words: str) -> bytes:
+    try:
+        return bytes.fromhex(words)
+    except ValueError:
+        raise ValueError(
+            f"{words!r} is not bytes in hex, as 37 02; the type is not known"
+        ) from None

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Final
 
+from tickrig.host.canopen.dialogue import Pause, Script
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
-from tickrig.host.canopen.script import Pause, Script
 from tickrig.host.canopen.sdo_transfer import download, download_number, upload_number
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, PdoEntry, PdoName, SdoEntry
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.host.canopen.dialogue import Await, Command, Pause, Script
 from tickrig.host.canopen.errors import SdoFailed, StateTimeout
-from tickrig.host.canopen.script import Await, Command, Pause, Script
 from tickrig.host.canopen.sdo_transfer import download_number, upload_number
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState

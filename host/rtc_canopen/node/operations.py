@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
+from tickrig.host.canopen.dialogue import Command, Dialogue, Failure, QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout, WrongIdentity
-from tickrig.host.canopen.script import Command, Script
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
 from tickrig.host.rtc_canopen.events import Notify, ServerEventType

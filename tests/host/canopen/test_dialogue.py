@@ -8,8 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
-from tickrig.host.canopen.script import SDO_TIMEOUT_US, Await, Command, Pause, Script
+from tickrig.host.canopen.dialogue import (
+    SDO_TIMEOUT_US,
+    Await,
+    Command,
+    Dialogue,
+    Failure,
+    Pause,
+    QueuedScript,
+    Script,
+)
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.instant import NEVER

@@ -16,8 +16,11 @@ from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.monitor.dictionary.encode_value import encode_value
-from tickrig.host.monitor.dictionary.node_dictionary import ObjectRow, render_dictionary
+from tickrig.host.monitor.dictionary.node_dictionary import (
+    ObjectRow,
+    encode_value,
+    render_dictionary,
+)
 from tickrig.host.tui.line_view import Line, plain
 
 

@@ -19,8 +19,13 @@ from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
 from tickrig.host.canmon.tui.tasks.session import Session, Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
-from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
-from tickrig.host.monitor.transmit.transmit_list import ON, TransmitList, render_transmit
+from tickrig.host.monitor.transmit.transmit_list import (
+    ON,
+    RowText,
+    TransmitList,
+    parse_row_text,
+    render_transmit,
+)
 from tickrig.host.tui.line_view import plain
 from tickrig.wire.can import CanFrame, Frames
 

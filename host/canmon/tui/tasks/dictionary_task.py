@@ -7,8 +7,7 @@ from typing import Final
 
 from tickrig.host.canmon.tui.tasks.model import DecodedFrame
 from tickrig.host.canmon.tui.tasks.session import Task
-from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
-from tickrig.host.canopen.script import Script
+from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import Entry

@@ -14,7 +14,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
-from tickrig.host.canmon.sources.source import Source, open_source
+from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.source_spec import BusSpec
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused

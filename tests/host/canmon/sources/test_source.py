@@ -8,7 +8,8 @@ import pytest
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import StdinSource
-from tickrig.host.canmon.sources.source import Source, open_source
+from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.source import Source
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
@@ -22,10 +23,10 @@ LOG = """\
 
 
 def drained(source: Source) -> list[Record]:
-    record = []
+    records: list[Record] = []
     while not source.ended:
-        record += source.poll(0)
-    return record
+        records += source.poll(0)
+    return records
 
 
 def log(folder: Path, text: str, name: str = "run.log") -> str:

@@ -9,6 +9,7 @@ from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
@@ -20,10 +21,10 @@ NODE = 5
 BUS = "can0"
 
 
-class RigSource:
+class RigSource(AnySource[Record]):
     """The rig's wire as a source; its time passes while it is polled."""
 
-    live, ended, lost, unread, failed = True, False, 0, 0, ""
+    live = True
 
     def __init__(self, host: CanHost) -> None:
         self._host = host
@@ -31,15 +32,6 @@ class RigSource:
     def poll(self, timeout_us: int, /) -> list[Record]:
         frames: Sequence[CanFrame] = self._host.receive(max(1, timeout_us))
         return [Record(self._host.now_us, BUS, frame) for frame in frames]
-
-    def messages(self) -> list[str]:
-        return []
-
-    def losses(self) -> list[str]:
-        return []
-
-    def close(self) -> None:
-        """There is nothing to close."""
 
 
 class RigSession(Session):

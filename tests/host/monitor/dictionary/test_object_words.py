@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.dictionary.encode_value import encode_value
+from tickrig.host.monitor.dictionary.node_dictionary import encode_value
 from tickrig.wire.canopen.datatypes import DataType
 
 

@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.graph.csv_text import write_csv
-from tickrig.host.monitor.graph.png import write_png
+from tickrig.host.canmon.output.graph_file import write_csv, write_png
 from tickrig.host.monitor.graph.series import Series, View
 from tickrig.host.monitor.graph.svg import html_page, svg
 

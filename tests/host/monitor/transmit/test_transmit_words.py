@@ -8,8 +8,12 @@ from hypothesis import strategies as st
 
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
-from tickrig.host.monitor.transmit.row_text import RowText, parse_row_text
-from tickrig.host.monitor.transmit.transmit_list import TransmitRow, render_transmit
+from tickrig.host.monitor.transmit.transmit_list import (
+    RowText,
+    TransmitRow,
+    parse_row_text,
+    render_transmit,
+)
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 ROWS = (
