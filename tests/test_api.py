@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 import subprocess
 import sys
 from collections import Counter
@@ -11,11 +12,13 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
+import griffe
 import pytest
 
 ROOT = Path(__file__).parents[1]
 PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.testing")
 NAMES = {name: place for place in PLACES for name in import_module(place).__all__}
+TOOL = runpy.run_path(str(ROOT / "tools" / "api"))
 DEFINED = Counter(
     node.name
     for floor in ("wire", "device", "host", "emulators")
@@ -65,12 +68,59 @@ def test_a_place_imports_nothing_before_a_name_is_asked_for(place: str) -> None:
     assert {*said.split()} - {"__future__"} == {"tickrig", "tickrig._lazy", place}
 
 
-def test_what_is_public_is_what_the_file_says() -> None:
-    words = [sys.executable, str(ROOT / "tools" / "api")]
-    found = subprocess.check_output(words, text=True).splitlines()
+@pytest.fixture(scope="module")
+def package() -> griffe.Module:
+    """Read the package, without importing it."""
+    found = griffe.load("tickrig", search_paths=[ROOT / "src"])
+    assert isinstance(found, griffe.Module)
+    return found
+
+
+def test_what_is_public_is_what_the_file_says(package: griffe.Module) -> None:
+    found = list(TOOL["lines"](package))
     listed = (ROOT / "tests" / "api.txt").read_text("utf-8").splitlines()
     assert [line for line in listed if line not in found] == [], "gone: this breaks programs"
     assert found == listed, "new: tools/api --renew"
+
+
+def untold(path: str, call: griffe.Function, docstring: griffe.Docstring | None) -> Iterator[str]:
+    """Give what a docstring does not tell: all, or arguments."""
+    if docstring is None:
+        yield path
+        return
+    names = {each.name.lstrip("*") for each in call.parameters} - {"self", "cls"}
+    told = re.findall(r"\w+", docstring.value)
+    yield from (f"{path}({name})" for name in sorted(names.difference(told)))
+
+
+def untold_of_class(path: str, found: griffe.Class) -> Iterator[str]:
+    """Give what its docstring and those of its methods do not tell; a base may tell it."""
+    for name, member in found.all_members.items():
+        method = member.final_target if isinstance(member, griffe.Alias) else member
+        if not isinstance(method, griffe.Function) or not method.is_public:
+            continue
+        owners = [owner for owner in (found, *found.mro()) if name in owner.members]
+        if name == "__init__":
+            yield from untold(path, method, found.docstring or owners[0].docstring)
+        elif not name.startswith("__"):
+            ways = [
+                {*untold(f"{path}.{name}", method, each.members[name].docstring)} for each in owners
+            ]
+            yield from set.intersection(*ways)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_docstrings_of_what_is_public_tell_all_arguments(
+    package: griffe.Module, place: str
+) -> None:
+    missing: list[str] = []
+    for name, member in TOOL["public"](package, place).members.items():
+        found = member.final_target if name in NAMES else None
+        if isinstance(found, griffe.Class):
+            missing += untold_of_class(f"{place}.{name}", found)
+        elif isinstance(found, griffe.Function):
+            missing += untold(f"{place}.{name}", found, found.docstring)
+    assert missing == []
 
 
 @pytest.mark.parametrize("name", NAMES)

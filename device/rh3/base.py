@@ -42,7 +42,7 @@ class Rh3Base(Copyable):
     """
 
     def __init__(self, parameters: BaseParameters | None = None) -> None:
-        self.parameters = parameters or BaseParameters()
+        self.parameters: BaseParameters = parameters or BaseParameters()
         self.inputs = QuantityBank(INPUTS)
         self.ground = Ground(self.parameters)
         self._driver = driver = Driver(self.parameters, self.inputs)

@@ -125,7 +125,11 @@ class CanWire(Copyable):
         return 1_000 * busy // (now - first) if now > first else 0
 
     def disconnect(self, end: CanEnd) -> None:
-        """Pull a node's plug: it is alone, and nobody acknowledges what it sends."""
+        """Pull a node's plug: it is alone, and nobody acknowledges what it sends.
+
+        Args:
+            end: the node's end.
+        """
         if end.number not in self._apart:
             now_us = self.bus.now_us
             self.bus.leave(end, now_us)
@@ -134,14 +138,22 @@ class CanWire(Copyable):
             apart.join(end, now_us)
 
     def reconnect(self, end: CanEnd) -> None:
-        """Put the plug back in."""
+        """Put the plug back in.
+
+        Args:
+            end: the node's end.
+        """
         apart = self._apart.pop(end.number, None)
         if apart is not None:
             apart.leave(end, self.bus.now_us)
             self.bus.join(end, self.bus.now_us)
 
     def cut_power(self, end: CanEnd) -> None:
-        """Take a node off the bus: what it had to send or had received is lost, all begins anew."""
+        """Take a node off the bus: what it had to send or had received is lost, all begins anew.
+
+        Args:
+            end: the node's end.
+        """
         self.disconnect(end)
         apart, now_us = self._apart[end.number], self.bus.now_us
         apart.leave(end, now_us)

@@ -78,7 +78,17 @@ class DeviceType:
             raise Refused(str(error)) from None
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
-        """Make the device that a trace was recorded on; ValueError if it cannot be."""
+        """Make the device that a trace was recorded on.
+
+        Args:
+            config: what the trace says of it.
+
+        Returns:
+            The device, as it was when the recording began.
+
+        Raises:
+            ValueError: it cannot be made of that.
+        """
         settings = {name: value for name, value in config.items() if name != SEED}
         if self.configure is None:
             known: dict[str, Any] = {str(option.name): option.default for option in self.options}

@@ -63,7 +63,7 @@ class Station(Generic[W]):
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
         self.device, self.port, self.tick_us = device, port, device.tick_us
-        self.at_us = NEVER
+        self.at_us: int = NEVER
 
     def wake_us(self, now_us: int) -> int:
         """Return the first tick after `now_us` at which this station has work."""
@@ -115,7 +115,7 @@ class Rig(Copyable):
         event_queue: EventQueue | None = None,
     ) -> None:
         self.now_us = self.worst_late_us = self.late_ticks = 0
-        self.event_queue = event_queue or EventQueue()
+        self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
@@ -190,7 +190,11 @@ class Rig(Copyable):
         return twin((self, *parts)) if parts else twin(self)
 
     def move_on(self, wire: Wire) -> None:
-        """Let a wire go on with the rig; one with stations does so anyway."""
+        """Let a wire go on with the rig; one with stations does so anyway.
+
+        Args:
+            wire: the wire.
+        """
         if wire not in self._wires:
             self._wires += (wire,)
 
@@ -206,7 +210,12 @@ class Rig(Copyable):
             self._happen(next_us)
 
     def run_to(self, t_us: int, host: Host | None = None) -> None:
-        """Step through all that happens up to and at `t_us`, or until something is at a host."""
+        """Step through all that happens up to and at a time, or until something is at a host.
+
+        Args:
+            t_us: the time, since the start of the rig.
+            host: where to look for something, if given.
+        """
         self._look()
         while (next_us := self._go_on(t_us, host)) <= t_us:
             self._happen(next_us)
@@ -215,11 +224,23 @@ class Rig(Copyable):
         self._pass_to(t_us)
 
     def run_for(self, duration_us: int) -> None:
-        """Step through `duration_us`."""
+        """Step through a time.
+
+        Args:
+            duration_us: how long it is.
+        """
         self.run_to(self.now_us + duration_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int) -> bool:
-        """Step until `done()`, which only looks; False if `timeout_us` passed first."""
+        """Step until something is so.
+
+        Args:
+            done: returns whether it is; it only looks.
+            timeout_us: for how long at most.
+
+        Returns:
+            False if the time passed first.
+        """
         deadline_us = self.now_us + timeout_us
         self._look()
         while not done():

@@ -73,7 +73,7 @@ class Rs485Line(Copyable):
             raise ValueError("baud rate, frame bits and buffer size must be at least 1, ends 2")
         self._baud, self._byte_cost, self._echo = baud, frame_bits * 1_000_000, echo
         self._bursts = bursts
-        self.ends = tuple(Rs485End(self, buffer_bytes) for _ in range(ends))
+        self.ends: tuple[Rs485End, ...] = tuple(Rs485End(self, buffer_bytes) for _ in range(ends))
         self.collisions = 0
         self._air: list[_Burst] = []
 

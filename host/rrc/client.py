@@ -70,7 +70,7 @@ class RrcClient:
     ) -> None:
         self._link, self._timeout_us = link, timeout_us
         self._inbox = Inbox(on_unknown)
-        self.unknown = self._inbox.unknown
+        self.unknown: deque[Arrival[str]] = self._inbox.unknown
         self._channel = Channel(link, self._inbox, max_refusals, on_refusals)
         self._settings = self._channel.matcher.settings
 

@@ -103,7 +103,7 @@ class CanopenSlave(Copyable):
         self.on_accepts: list[Callable[[], None]] = []
         self._dues = [NEVER] * len(services)
         self._due_us = 0
-        self.services = [make(self, slot) for slot, make in enumerate(services)]
+        self.services: list[Service] = [make(self, slot) for slot, make in enumerate(services)]
 
     @property
     def tick_us(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 from tickrig.device.canopen.core.application import Application
@@ -14,6 +15,7 @@ from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
 from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.device.canopen.stack import make_slave
+from tickrig.device.physical import OutputSignal
 from tickrig.device.timer import Timer
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.rtc_canopen.objects import object_table
@@ -44,7 +46,7 @@ class DeviceRtc(Application):
         self._kind, self._placed = kind, kind.profile().placed()
         self.has_inputs(inputs_of(kind))
         self.life = CanopenLifeCycle(node, self._make)
-        self.outputs = outputs_of(self.life.component)
+        self.outputs: Mapping[str, OutputSignal] = outputs_of(self.life.component)
         self._timer = Timer(kind.rate_hz)
         node.boots, node.admits = self.life.boots, self.life.admits
         node.entered = self._moved

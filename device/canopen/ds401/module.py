@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tickrig.device.canopen.core.application import Application, number_of
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -29,6 +29,7 @@ from tickrig.device.canopen.ds401.families import (
 )
 from tickrig.device.canopen.ds401.interrupt_source import InterruptSource
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.physical import OutputSignal
 from tickrig.wire.canopen.nmt import NmtState
 
 
@@ -76,7 +77,9 @@ class Ds401(Application):
         self._faults = self._make_faults()
         self._lines = terminals.digital_input_names(self._digital_inputs.lines)
         self._terminals = terminals.outputs(self._digital_outputs, self._analogue_outputs)
-        self.outputs = {name: terminal.output for name, terminal in self._terminals.items()}
+        self.outputs: Mapping[str, OutputSignal] = {
+            name: terminal.output for name, terminal in self._terminals.items()
+        }
         self._has_physical_inputs()
         self._watch_objects()
 

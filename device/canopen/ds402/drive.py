@@ -34,6 +34,7 @@ from tickrig.device.canopen.ds402.state.automaton import (
     command_of,
 )
 from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
+from tickrig.device.physical import OutputSignal
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
 
@@ -105,7 +106,7 @@ class Ds402(Application):
     encoder_error: ClassVar[ErrorCode] = ErrorCode.INCREMENTAL_SENSOR
     limits_are_faults: ClassVar[bool] = False
     more_targets: ClassVar[tuple[int, ...]] = ()
-    outputs = terminals.OUTPUTS
+    outputs: Mapping[str, OutputSignal] = terminals.OUTPUTS
 
     axis: Axis
     switches: Switches
@@ -118,7 +119,7 @@ class Ds402(Application):
         motor: Motor = servo or IdealMotor()
         self.parameters = parameters = Parameters(node.dictionary)
         listed = parameters.number(indices.SUPPORTED_MODES)
-        self.offered = offered(self.modes, listed)
+        self.offered: Mapping[int, type[Mode]] = offered(self.modes, listed)
         self._supported = listed or supported(self.offered)
         self.axis = Axis(motor, read_settings(parameters, motor.counts_per_turn))
         self.switches, self.stopping = Switches(), Stopping(self.axis, parameters)
