@@ -356,3 +356,65 @@ def test_looking_ahead_draws_no_chance(seed: int) -> None:
         return log.lines
 
     assert run(look=True) == run(look=False)
+
+
+def test_a_frame_may_be_broken_at_each_bit_from_the_data_to_the_crc() -> None:
+    frame = frames("185#0102")
+    bits, times = frame_bits(frame[0]), set[int]()
+    for seed in range(400):
+        wire = CanWire(seed=seed)
+        log, node, _ = Log(wire), wire.end(), wire.end()
+        wire.faults.arm("corrupt", 1)
+        node.send(0, frame)
+        wire.advance(wire.due_us)
+        wire.faults.clear("corrupt")
+        wire.advance(10_000)
+        broken_us, sent_us = log.times_us
+        times.add(broken_us)
+        assert sent_us - broken_us == bits
+    # 19 bits of header, then the turned one; 6 + 6 bits of error flags and 8 of delimiter
+    assert times == {19 + place + 20 for place in range(bits - 19 - 11)}
+
+
+def test_a_duplicated_frame_is_followed_by_an_error_frame_and_itself() -> None:
+    wire = CanWire(seed=6)  # the first is duplicated, the second is not
+    log, node, host = Log(wire), wire.end(), wire.end()
+    wire.faults.arm("duplicate", 0.5)
+    node.send(0, frames("705#7F"))
+    wire.advance(2_000)
+    bits = frame_bits(frames("705#7F")[0])
+    assert log.times_us == [bits - 3 + 6 + 6 + 8, 2 * bits - 3 + 6 + 6 + 8]
+    assert host.poll_stamped(2_000) == tuple((at_us, frames("705#7F")[0]) for at_us in log.times_us)
+    assert counters(node, host) == [(7, 0, ACTIVE), (0, 0, ACTIVE)]
+
+
+def test_on_shorted_lines_each_start_of_frame_is_an_error() -> None:
+    wire = CanWire()
+    log, node, _ = Log(wire), wire.end(), wire.end()
+    wire.faults.arm("short")
+    node.send(0, frames("100#"))
+    wire.advance(10_000)
+    active = [15 + 18 * n for n in range(16)]  # 1 + 6 + 8 bits, then 3 between frames
+    assert log.times_us == [*active, *(285 + 26 * n for n in range(1, 17))]  # 8 more if passive
+
+
+def test_a_passive_node_alone_waits_8_bits_longer() -> None:
+    wire = CanWire()
+    log, node = Log(wire), wire.end()
+    node.send(0, frames("705#00"))
+    wire.advance(10_000)
+    bits = frame_bits(frames("705#00")[0]) + 6
+    assert log.times_us == [*(n * bits - 3 for n in range(1, 17)), 17 * bits - 3 + 8]
+
+
+def test_a_collision_ends_when_the_one_that_sends_recessive_is_passive() -> None:
+    wire = CanWire()
+    log, first, second, third = Log(wire), wire.end(), wire.end(), wire.end()
+    first.send(0, frames("185#0002"))
+    second.send(0, frames("185#0102"))
+    wire.advance(100_000)
+    bits = frame_bits(frames("185#0002")[0])
+    collisions = [46 + 49 * n for n in range(16)]
+    # passive nodes wait 8 bits after an attempt: both before the first frame, then the second
+    assert log.times_us == [*collisions, 781 + 8 + bits, 781 + 2 * (8 + bits)]
+    assert counters(first, second, third) == [(127, 0, ACTIVE), (135, 0, PASSIVE), (0, 14, ACTIVE)]
