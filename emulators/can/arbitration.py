@@ -55,8 +55,8 @@ class CanArbiter:
 
     __slots__ = ("free", "heads", "slow")
 
-    def __init__(self, free: int) -> None:
-        self.free, self.slow = free, False
+    def __init__(self) -> None:
+        self.free, self.slow = 0, False
         self.heads: list[tuple[int, int, CanEnd]] = []
 
     def enter(self, end: CanEnd, now: int) -> None:

@@ -42,10 +42,11 @@ class CanSegment(TransmissionOutcomes):
     def __init__(
         self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
     ) -> None:
-        super().__init__(bit_rate, start_us, faults, observers)
-        self.now_us, self.shorted, self.heard = start_us, False, False
+        super().__init__(bit_rate, faults, observers)
+        self.now_us, self.shorted = start_us, False
+        self.heard: bool
         self._lengths: Cache[CanFrame, int] = Cache()
-        self._finish: Callable[[], None] = self._come_back
+        self._finish: Callable[[], None]  # of the plan
 
     @property
     def due_us(self) -> int:
@@ -86,17 +87,16 @@ class CanSegment(TransmissionOutcomes):
         if self.now_us < now_us:
             self.advance(now_us)
         now, queue = now_us * self.unit, end.queue
-        if (excess := len(queue) + len(frames) - end.room) > 0:
-            end.lost += excess
-            frames = frames[: len(frames) - excess]
-        if not frames:
+        taken = frames[: max(0, end.room - len(queue))]
+        end.lost += len(frames) - len(taken)
+        if not taken:
             return
         if self._start >= now:
             self._withdraw()
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
         waiting = bool(queue)
-        queue.extend(frames)
+        queue.extend(taken)
         if not waiting:
             self._enter(end, now)
 
@@ -130,8 +130,8 @@ class CanSegment(TransmissionOutcomes):
         """Let a node that is bus-off wait for its return."""
         self.disturb(now_us)
         if end.controller.state is ErrorState.BUS_OFF:
-            busy = self._start < now_us * self.unit
-            quiet = self._free - RECESSIVE_BITS * self.bit if busy else now_us * self.unit
+            now = now_us * self.unit
+            quiet = self._free - RECESSIVE_BITS * self.bit if self._winners else now
             self._recovery.begin(end, quiet)
 
     def disturb(self, now_us: int) -> None:
@@ -143,8 +143,8 @@ class CanSegment(TransmissionOutcomes):
 
     def _enter(self, end: CanEnd, now: int) -> None:
         arbiter = self._arbiter
-        if not arbiter.heads and not self._winners and arbiter.free < now:
-            arbiter.free = now
+        if not arbiter.heads and not self._winners:
+            arbiter.free = max(arbiter.free, now)
         arbiter.enter(end, now)
 
     def _withdraw(self) -> None:

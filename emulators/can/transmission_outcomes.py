@@ -15,7 +15,6 @@ from tickrig.emulators.can.routes import CanRoutes
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import INTERFRAME_BITS
 from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, ErrorState
-from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
@@ -42,9 +41,7 @@ class TransmissionOutcomes:
         busy: from when to when the latest frames kept the bus busy, in units.
     """
 
-    def __init__(
-        self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
-    ) -> None:
+    def __init__(self, bit_rate: int, faults: CanFaults, observers: Listeners[Observer]) -> None:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
         self.routes = CanRoutes()
@@ -52,13 +49,15 @@ class TransmissionOutcomes:
         self._faults, self._observers = faults, observers
         self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
         self._recovery = Recovery(self.bit)
-        self._arbiter = CanArbiter(start_us * self.unit)
-        self._on_bus = 0  # ends that acknowledge
+        self._arbiter = CanArbiter()
+        self._on_bus: int  # ends that acknowledge
         self._repeating = False  # a node is alone, and nothing changes any more
         self._news: list[tuple[int, CanEnd]] = []  # whose error state changed when
         self._stale = True  # the plan that follows is to be made
         self._winners: list[CanEnd] = []
-        self._start = self._free = self._due_us = NEVER
+        self._start: int  # of the plan, as the next two
+        self._free: int
+        self._due_us: int
 
     def _deliver(self) -> None:
         """Hand a frame to all that accept it."""

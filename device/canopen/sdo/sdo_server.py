@@ -74,13 +74,14 @@ class SdoServer:
 
     def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
         self.node, self._wake, self._limits = node, wake, limits
-        self.request_id = self.response_id = 0
+        self.request_id: int
+        self.response_id: int
         self.block_size = MAX_BLOCK_SIZE
         self._entries = node.dictionary.by_multiplexer
-        self._multiplexer = NO_MULTIPLEXER
+        self._multiplexer: bytes
         self._idle: Final[State] = self._without_transfer
-        self._state: State = self._idle
-        self.due_us = NEVER
+        self._state: State
+        self.due_us: int
 
     def receive(self, frame: CanFrame) -> None:
         """Take a request, or the next segment."""
@@ -128,7 +129,6 @@ class SdoServer:
         specifier = command & SPECIFIER
         if specifier not in _INITIATE or command & _INITIATE[specifier]:
             raise SdoAbort(AbortCode.COMMAND_SPECIFIER)
-        self.end()
         self._multiplexer = request[1:4]
         entry = self.node.dictionary.look_up(self._multiplexer)
         match specifier:

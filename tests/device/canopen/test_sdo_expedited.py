@@ -40,6 +40,12 @@ def test_what_is_no_request_to_this_node_is_ignored(request_: str) -> None:
     assert bus.step(request_) + bus.run(50) == []
 
 
+def test_an_object_that_is_made_on_demand_is_asked_for_its_value() -> None:
+    bus = booted()
+    bus.slave.dictionary[0x1000, 0].source = lambda entry: bytes.fromhex("01020304")
+    assert bus.step("605#4000100000000000") == ["585#4300100001020304"]
+
+
 DOWNLOADS = [
     ("2F002000A5000000", "6000200000000000", "4F002000A5000000"),  # DE-01
     ("2B01200034120000", "6001200000000000", "4B01200034120000"),  # DE-02
