@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.emulators.can.can_bench import Log, frames
-from tests.emulators.can.test_errors import ACTIVE, BUS_OFF, PASSIVE, bus_off, counters
+from tests.emulators.can.test_errors import ACTIVE, BUS_OFF, bus_off, counters
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.wire.can_bits import frame_bits
