@@ -9,17 +9,17 @@ from typing import Any
 
 import click
 
+from tickrig.emulators.commands.picture import check_plot
 from tickrig.emulators.rh3.base_options import NAMES, read_parameters
 from tickrig.emulators.rh3.cart.options import (
     MotionOptions,
     require_arrival,
-    stopping_at_the_end,
     watched,
 )
 from tickrig.emulators.rh3.cart.squares import SquarePlan, run_squares
 from tickrig.emulators.rh3.cart.track_plot import write_track
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.motion.drive import drive
+from tickrig.host.motion.drive import drive, stop
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.path_file import FARTHEST_M, read_path, within_reach
 from tickrig.host.motion.ports import plausible
@@ -63,16 +63,20 @@ def _checked(options: dict[str, Any]) -> MotionOptions:
     if options["show_map"] is None:
         options["show_map"] = sys.stdout.isatty()
     checked = MotionOptions(**options, base=read_parameters(given))
-    checked.check()
+    if checked.plot is not None:
+        check_plot(checked.plot)  # before the run, not after it
     return checked
 
 
 def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
     connection = options.begin()
     began = connection.chain.odometry.pose
-    with watched(options, [began, *points]) as watcher, stopping_at_the_end(connection):
-        run = drive(connection, points, watcher.watch)
-        require_arrival(connection, run)
+    with watched(options, [began, *points]) as watcher:
+        try:
+            run = drive(connection, points, watcher.watch)
+            require_arrival(connection, run)
+        finally:
+            stop(connection)
     for line in table(run, began, points, limits_of(connection.chain)):
         click.echo(line)
     if options.plot is not None:

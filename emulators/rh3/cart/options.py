@@ -9,28 +9,24 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import Final
 
 import click
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.commands.picture import check_plot
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.serving import stopped_by_signals
+from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.drive import BaseConnection, start, stop
+from tickrig.host.motion.drive import BaseConnection, start
 from tickrig.host.motion.geometry import Pose, Wheels
 from tickrig.host.motion.motion_run import MotionRun, Sample
 from tickrig.host.motion.track_map import WIDTH, LiveMap, TrackMap
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.real_time import RealTime
-
-INTERRUPTED: Final = 130
-"""Exit status after Ctrl-C."""
 
 
 class RunStopped(Exception):  # noqa: N818 - no error
@@ -60,11 +56,6 @@ class MotionOptions:
     show_map: bool
     base: BaseParameters
     plot: Path | None = None
-
-    def check(self) -> None:
-        """Refuse what could not be done later."""
-        if self.plot is not None:
-            check_plot(self.plot)
 
     def begin(self, wheels: Wheels | None = None) -> BaseConnection:
         """Return a cart at the origin with its components active."""
@@ -167,15 +158,6 @@ def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatch
         except RunStopped:
             click.echo("stopped", err=True)
             raise SystemExit(INTERRUPTED) from None
-
-
-@contextmanager
-def stopping_at_the_end(connection: BaseConnection) -> Iterator[BaseConnection]:
-    """Stop the base whatever happens."""
-    try:
-        yield connection
-    finally:
-        stop(connection)
 
 
 def require_arrival(connection: BaseConnection, run: MotionRun) -> None:
