@@ -87,16 +87,17 @@ class CanSegment(TransmissionOutcomes):
         if self.now_us < now_us:
             self.advance(now_us)
         now, queue = now_us * self.unit, end.queue
-        taken = frames[: max(0, end.room - len(queue))]
-        end.lost += len(frames) - len(taken)
-        if not taken:
+        if (excess := len(queue) + len(frames) - end.room) > 0:
+            end.lost += excess
+            frames = frames[: len(frames) - excess]
+        if not frames:
             return
         if self._start >= now:
             self._withdraw()
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
         waiting = bool(queue)
-        queue.extend(taken)
+        queue.extend(frames)
         if not waiting:
             self._enter(end, now)
 
@@ -143,8 +144,8 @@ class CanSegment(TransmissionOutcomes):
 
     def _enter(self, end: CanEnd, now: int) -> None:
         arbiter = self._arbiter
-        if not arbiter.heads and not self._winners:
-            arbiter.free = max(arbiter.free, now)
+        if not arbiter.heads and not self._winners and arbiter.free < now:
+            arbiter.free = now
         arbiter.enter(end, now)
 
     def _withdraw(self) -> None:

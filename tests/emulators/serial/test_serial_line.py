@@ -125,6 +125,10 @@ def test_a_thousand_bytes_take_as_long_in_both_directions() -> None:
     line.a.send(0, bytes(1_000))
     line.b.send(0, bytes(1_000))
     assert (line.a.idle_us, line.b.idle_us) == (86_806, 86_806)  # 10 000 bits at 115 200 bit/s
+    line = SerialLine(baud=100_000)
+    line.a.send(0, bytes(4_000))
+    line.b.send(0, bytes(4_000))
+    assert (line.a.idle_us, line.b.idle_us) == (400_000, 400_000)
 
 
 def test_what_is_sent_when_the_line_is_free_again_begins_at_that_time() -> None:
