@@ -13,17 +13,16 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.errors.can_error_state import CanErrorState
 from tickrig.device.canopen.errors.emcy_consumer import EmcyConsumer
 from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
 from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
+from tickrig.device.canopen.errors.error_state_emcy import ErrorStateEmcy
+from tickrig.device.canopen.nmt.error_control import HeartbeatProducer, NodeGuarding
 from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer
-from tickrig.device.canopen.nmt.heartbeat_producer import HeartbeatProducer
 from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.nmt.node_guarding import NodeGuarding
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
@@ -39,7 +38,7 @@ SERVICES: Final[tuple[ServiceMaker, ...]] = (
     EmcyConsumer,
     HeartbeatConsumer,
     NodeGuarding,
-    CanErrorState,
+    ErrorStateEmcy,
     EmcyProducer,
     ErrorBehaviour,
     HeartbeatProducer,

@@ -15,7 +15,7 @@ from tickrig.device.canopen.device_rtc.device import application_of as applicati
 from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
@@ -35,7 +35,7 @@ from tickrig.host.cli.messages import show_findings
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.log import log_of
 from tickrig.host.text.user_file import explain_error, find_class
-from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.rtc_canopen.objects import device_info
 
 DEVICE_TYPE: Final = 0x1000

@@ -12,11 +12,9 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_device import COUNTS, read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_finding import EdsError, Finding
-from tickrig.wire.canopen.eds.object_table import EntryDescription
+from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
+from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
 
 
 @dataclass(frozen=True, slots=True)

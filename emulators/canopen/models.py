@@ -13,7 +13,7 @@ from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import application_of, make_dictionary
 from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
 from tickrig.emulators.canopen.eds import DeviceDescription
-from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
+from tickrig.wire.canopen.eds.object_table import BIT_RATES, DeviceInfo
 
 VENDOR: Final = "tickrig"
 PRODUCT: Final = 0x1008

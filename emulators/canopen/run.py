@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.transcript import FrameTranscript
 from tickrig.emulators.can.emulator import CanEmulator

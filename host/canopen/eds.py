@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text
-from tickrig.wire.canopen.eds.eds_finding import EdsError, Finding
+from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding, decode_text
 
 
 def open_eds(path: Path) -> EdsFile:

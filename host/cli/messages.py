@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from tickrig.wire.canopen.eds.eds_finding import Finding
+    from tickrig.wire.canopen.eds.eds_file import Finding
 
 
 def say(text: str) -> None:

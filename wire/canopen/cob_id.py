@@ -29,7 +29,7 @@ RESTRICTED: Final = (
 
 
 def is_restricted(can_id: int) -> bool:
-    """Say whether a configurable communication object must not use a CAN-ID.
+    """Return whether a configurable communication object must not use a CAN-ID.
 
     >>> is_restricted(0x601), is_restricted(0x6A0), is_restricted(0x185)
     (True, False, False)

@@ -88,7 +88,7 @@ class LssError(IntEnum):
 
 
 class LssAddress(NamedTuple):
-    """What tells a device from all others: the identity object 1018h."""
+    """What distinguishes a device from all others: the identity object 1018h."""
 
     vendor: int
     product: int

@@ -14,8 +14,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.device_info import BIT_RATES, DeviceInfo
-from tickrig.wire.canopen.eds.object_table import ROT, RWW, ObjectTable
+from tickrig.wire.canopen.eds.object_table import BIT_RATES, ROT, RWW, DeviceInfo, ObjectTable
 from tickrig.wire.rtc_canopen.profile import PlacedPort, PortDirection, RtcProfile
 
 NO_PROFILE: Final = 0

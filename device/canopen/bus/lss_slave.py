@@ -97,7 +97,7 @@ class LssSlave(Service):
 
     A node-ID counts from the next reset; an unconfigured slave boots with it when
     LSS returns to waiting. It is lost with the power unless it was stored. Any
-    reset returns to waiting. Selective switching and fastscan are heard in waiting
+    reset returns to waiting. Selective switching and fastscan act in waiting
     only, fastscan and identify non-configured by a slave that neither has nor was
     given a node-ID. A bit rate counts when it is activated: the slave is silent for
     two switch delays and changes in between (`node.on_bit_rate`). Without all of
@@ -128,7 +128,7 @@ class LssSlave(Service):
         self.schedule(self._switch_us)
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Hear the LSS master, while initialising too."""
+        """Listen to the LSS master, while initialising too."""
         if len(self._identity) == len(LssAddress._fields):
             yield LSS_MASTER_COB_ID, self._receive
 

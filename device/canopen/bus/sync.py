@@ -26,7 +26,7 @@ _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 
 
 class Sync(Service):
-    """Hears SYNC and sends it if bit 30 of 1005h and 1006h say so.
+    """Consumes SYNC, and produces it if bit 30 of 1005h and 1006h say so.
 
     `node.on_sync` is called for each SYNC, for the own one too, at its place
     between the frames of a tick. A SYNC of another length than 1019h says is
@@ -83,7 +83,7 @@ class Sync(Service):
             self._begin()
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Hear SYNC in Pre-operational and Operational."""
+        """Listen to SYNC in Pre-operational and Operational."""
         self._length = 1 if self.overflow else 0
         if state in ALIVE and not is_restricted(self.can_id):
             yield self.can_id, self._receive

@@ -22,7 +22,7 @@ PRODUCES: Final = FLAG_30
 class TimeStamp(Service):
     """Keeps the time of day.
 
-    Bit 31 of 1012h makes it hear TIME; `node.time_of_day` is the latest time
+    Bit 31 of 1012h makes it consume TIME; `node.time_of_day` is the latest time
     stamp as it came, `now` the clock that goes on from there. Bit 30 lets the
     application send TIME by `produce`. What is no time of day is ignored.
 
@@ -44,7 +44,7 @@ class TimeStamp(Service):
         return None if latest is None else latest.after(self.node.now_us - self._set_us)
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Hear TIME in Pre-operational and Operational."""
+        """Listen to TIME in Pre-operational and Operational."""
         cob_id = self._number
         if state in ALIVE and cob_id & CONSUMES:
             yield cob_id & CAN_ID_MASK, self._receive

@@ -18,9 +18,9 @@ class Application(Service):
     By itself it does nothing. A device profile overrides `on_execute`, which is
     called in the ticks that it asks for: by `request`, by `schedule`, when one
     of its watched objects has changed, and when a physical input was set. It
-    hears of NMT states (`state_changed`), of resets (`start`), of lost masters
+    reacts to NMT states (`state_changed`), to resets (`start`), to lost masters
     (`communication_error`) and, if it enters itself in `node.sync_handlers`, of each
-    SYNC; it tells errors by `node.emergency`.
+    SYNC; it reports errors by `node.emergency`.
 
     Attributes:
         inputs: what the world does to the device: `has_inputs` makes them.

@@ -103,7 +103,7 @@ class Entry:
         self.watchers = tuple(watcher for watcher in self.watchers if watcher != changed)
 
     def assign(self, data: bytes) -> None:
-        """Change the value from the inside; watchers hear of it."""
+        """Change the value from the inside; watchers are called."""
         if data != self.data:
             self.data = data
             for changed in self.watchers:
@@ -156,7 +156,7 @@ class Entry:
         self.force(data)
 
     def receive(self, data: bytes) -> None:
-        """Write from a PDO: what is refused is not taken, and nobody hears of it."""
+        """Write from a PDO: what is refused is not taken, and nobody is notified."""
         try:
             self.download(data)
         except SdoAbort:

@@ -82,7 +82,7 @@ class Service(Copyable):
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Give those of the CAN-IDs whose frames may, when handled, change what the node hears.
+        """Give those of the CAN-IDs whose frames may change what the node listens to.
 
         An acceptance filter lets everything pass behind such a frame.
 

@@ -1,4 +1,4 @@
-"""One analogue input (CiA 401, 6400h to 6403h)."""
+"""One analogue input, what of it is an event, and which were one (CiA 401, 6400h to 642Dh)."""
 
 from __future__ import annotations
 
@@ -7,18 +7,107 @@ from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel
+from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel, quantity, show
 from tickrig.device.canopen.ds401.converter import Converter
-from tickrig.device.canopen.ds401.event_rule import EventRule
 from tickrig.device.canopen.ds401.families import (
     ANALOGUE_INPUT,
     INTEGER_LIMITS,
+    INTERRUPT_SOURCE,
     INTERRUPT_TRIGGER,
     REAL_LIMITS,
+    elements,
     find_number,
 )
-from tickrig.device.canopen.ds401.quantity import quantity, show
 from tickrig.device.physical import InputSignal
+
+
+class EventRule:
+    """The limits and deltas of one channel, as integers or as REAL32.
+
+    Each bit of the interrupt trigger selection (6421h) is an event of its own:
+
+    | bit | event                                               |
+    |-----|-----------------------------------------------------|
+    | 0   | the value was below the upper limit and is no more  |
+    | 1   | the value was at the lower limit or above and is below |
+    | 2   | it differs from what was sent last by more than the delta |
+    | 3   | it is below what was sent last by more than the negative delta |
+    | 4   | it is above what was sent last by more than the positive delta |
+
+    A limit is an event when it is crossed, not as long as it is exceeded. A limit
+    that the device has no object for is none, a delta is 0.
+
+    Args:
+        dictionary: the objects of the device.
+        number: of the channel.
+        index: of the upper limit; the other four follow.
+        entry: the value that is judged.
+
+    Attributes:
+        there: whether the device has one of the five objects for the channel.
+    """
+
+    def __init__(self, dictionary: Dictionary, number: int, index: int, entry: Entry) -> None:
+        objects = [find_number(dictionary, index + offset, number) for offset in range(5)]
+        self._upper, self._lower, *self._deltas = objects
+        self.settings = [found for found in objects if found is not None]
+        self._entry = entry
+        self._sent = self._seen = quantity(entry)
+
+    def begin(self) -> None:
+        """Take the value as sent."""
+        self._sent = self._seen = quantity(self._entry)
+
+    def sent(self) -> None:
+        """Note that the value is on the bus."""
+        self._sent = quantity(self._entry)
+
+    def judge(self, trigger: int) -> bool:
+        """Return whether the value is an event."""
+        now, before = quantity(self._entry), self._seen
+        self._seen = now
+        change = now - self._sent
+        delta, negative, positive = (quantity(entry) for entry in self._deltas)
+        events = (
+            self._upper is not None and before < quantity(self._upper) <= now,
+            self._lower is not None and before >= quantity(self._lower) > now,
+            abs(change) > delta,
+            -change > negative,
+            change > positive,
+        )
+        return any(event and trigger >> bit & 1 for bit, event in enumerate(events))
+
+
+BANK_CHANNELS: Final = 32
+
+
+class InterruptSource:
+    """Banks of 32 channels; reading a bank over the bus clears it.
+
+    Attributes:
+        entries: the banks.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._banks = dict(elements(dictionary, INTERRUPT_SOURCE))
+        self.entries = list(self._banks.values())
+        for entry in self.entries:
+            entry.source = _read
+
+    def note(self, number: int) -> None:
+        """Set the bit of a channel, 1..254."""
+        bank, bit = divmod(number - 1, BANK_CHANNELS)
+        entry = self._banks.get(bank + 1)
+        if entry is not None and bit < 8 * entry.size:
+            bits = int.from_bytes(entry.data, "little") | 1 << bit
+            entry.assign(bits.to_bytes(entry.size, "little"))
+
+
+def _read(entry: Entry) -> bytes:
+    data = entry.data
+    entry.assign(bytes(entry.size))
+    return data
+
 
 DEFAULT_TRIGGER: Final = 7
 """Limits and delta (6421h)."""
@@ -85,12 +174,12 @@ class AnalogueInput:
             rule.begin()
 
     def sent(self) -> None:
-        """Hear that the present value is on the bus."""
+        """Note that the present value is on the bus."""
         for rule in self._rules:
             rule.sent()
 
     def update(self, physical: float, *, enabled: bool) -> bool:
-        """Read the channel; say whether that is an event, as far as events are enabled."""
+        """Read the channel. Returns: whether that is an event, as far as events are enabled."""
         if self._judged == (physical, enabled):
             return False
         self._judged = physical, enabled

@@ -6,7 +6,7 @@ from math import isfinite, isnan
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel
+from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel, limits, quantity
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import (
     ANALOGUE_ERROR_MODE,
@@ -15,7 +15,6 @@ from tickrig.device.canopen.ds401.families import (
     REAL_ERROR_VALUE,
     find_number,
 )
-from tickrig.device.canopen.ds401.quantity import limits, quantity
 from tickrig.device.physical import OutputSignal
 
 

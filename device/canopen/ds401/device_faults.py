@@ -1,4 +1,4 @@
-"""What a module finds wrong with itself, and what it tells about it."""
+"""What a module finds wrong with itself, and what it reports."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class FaultDetector:
     """Sees faults come and go: EMCY, and what 1029h says.
 
     Args:
-        node: who tells about it.
+        node: where it is reported.
         faults: those that the module can have.
 
     Attributes:
@@ -92,7 +92,11 @@ class FaultDetector:
         self._present.clear()
 
     def look(self, inputs: QuantityBank) -> bool:
-        """Tell what has come and gone; say whether outputs have to stop for what has come."""
+        """Report what has come and gone.
+
+        Returns:
+            Whether outputs have to stop for what has come.
+        """
         before = self._present
         self._present = [fault for fault in self.faults if inputs[fault.name]]
         come = [fault for fault in self._present if fault not in before]

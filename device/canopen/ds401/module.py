@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.application import Application, number_of
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.ds401 import terminals
-from tickrig.device.canopen.ds401.analogue_input import AnalogueInput
+from tickrig.device.canopen.ds401.analogue_input import AnalogueInput, InterruptSource
 from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.device_faults import (
@@ -18,8 +18,7 @@ from tickrig.device.canopen.ds401.device_faults import (
     OUTPUT_OVERLOAD,
     FaultDetector,
 )
-from tickrig.device.canopen.ds401.digital_inputs import DigitalInputs
-from tickrig.device.canopen.ds401.digital_outputs import DigitalOutputs
+from tickrig.device.canopen.ds401.digital import DigitalInputs, DigitalOutputs
 from tickrig.device.canopen.ds401.families import (
     ANALOGUE_INPUT,
     ANALOGUE_INTERRUPT_ENABLE,
@@ -27,10 +26,63 @@ from tickrig.device.canopen.ds401.families import (
     DIGITAL_INTERRUPT_ENABLE,
     channels,
 )
-from tickrig.device.canopen.ds401.interrupt_source import InterruptSource
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.physical import OutputSignal
+from tickrig.device.physical import InputSignal, OutputSignal
 from tickrig.wire.canopen.nmt import NmtState
+
+GROUP_LINES: Final = 8
+
+
+class DigitalTerminal(NamedTuple):
+    """One digital output, or all of them."""
+
+    output: OutputSignal
+    outputs: DigitalOutputs
+    shift: int
+    mask: int
+
+    @property
+    def level(self) -> int:
+        """The lines as a number."""
+        return self.outputs.level >> self.shift & self.mask
+
+
+Terminal = DigitalTerminal | AnalogueOutput
+
+
+def digital_input_names(lines: int) -> tuple[str, ...]:
+    """Return `di1` to the last one."""
+    return tuple(f"di{line}" for line in range(1, lines + 1))
+
+
+def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
+    """Give the digital inputs; 1 is high."""
+    for line, name in enumerate(names, 1):
+        yield InputSignal(name, f"digital input {line}")
+
+
+def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the names of eight digital inputs at once: `di`, then `di9_16` and so on."""
+    found = {}
+    for first in range(0, len(names), GROUP_LINES):
+        members = tuple(names[first : first + GROUP_LINES])
+        found[f"di{first + 1}_{first + len(members)}" if first else "di"] = members
+    return found
+
+
+def outputs_by_name(
+    digital: DigitalOutputs, analogue: Iterable[AnalogueOutput]
+) -> dict[str, Terminal]:
+    """Return the outputs by name: `do1`.., `do` and `ao1`.."""
+    found: list[Terminal] = [
+        DigitalTerminal(OutputSignal(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
+        for line in range(1, digital.lines + 1)
+    ]
+    if found:
+        everything = OutputSignal("do", "all digital outputs as a number, output 1 is bit 0")
+        found.append(DigitalTerminal(everything, digital, 0, (1 << digital.lines) - 1))
+    found += analogue
+    return {terminal.output.name: terminal for terminal in found}
 
 
 class Ds401(Application):
@@ -75,8 +127,8 @@ class Ds401(Application):
         self._digital_enable = dictionary.find(DIGITAL_INTERRUPT_ENABLE)
         self._analogue_enable = dictionary.find(ANALOGUE_INTERRUPT_ENABLE)
         self._faults = self._make_faults()
-        self._lines = terminals.digital_input_names(self._digital_inputs.lines)
-        self._terminals = terminals.outputs(self._digital_outputs, self._analogue_outputs)
+        self._lines = digital_input_names(self._digital_inputs.lines)
+        self._terminals = outputs_by_name(self._digital_outputs, self._analogue_outputs)
         self.outputs: Mapping[str, OutputSignal] = {
             name: terminal.output for name, terminal in self._terminals.items()
         }
@@ -127,12 +179,12 @@ class Ds401(Application):
         return self._terminals[name].level
 
     def on_execute(self, now_us: int) -> None:
-        """Look for faults, read inputs, tell events, put outputs out."""
+        """Look for faults, read inputs, cause events, put outputs out."""
         if self._faults.look(self.inputs):
             self._fail(failed=True)
         digital = self._digital_inputs.update(self._level, now_us)
         if number_of(self._digital_enable, 1):
-            self._tell(digital)
+            self._cause_events(digital)
         self._read_analogue()
         self._digital_outputs.update()
         for output in self._analogue_outputs:
@@ -149,9 +201,9 @@ class Ds401(Application):
         for channel in self._analogue_inputs:
             if channel.update(self.inputs[channel.name], enabled=enabled):
                 self._source.note(channel.number)
-                self._tell(channel.entries)
+                self._cause_events(channel.entries)
 
-    def _tell(self, entries: list[Entry]) -> None:
+    def _cause_events(self, entries: list[Entry]) -> None:
         producer = PdoProducer.of(self.node)
         for entry in entries:
             producer.request_for(entry)
@@ -176,10 +228,10 @@ class Ds401(Application):
         return FaultDetector(self.node, faults)
 
     def _has_physical_inputs(self) -> None:
-        lines = terminals.digital_inputs(self._lines)
+        lines = digital_inputs(self._lines)
         analogue = (channel.input for channel in self._analogue_inputs)
         faults = (fault.input for fault in self._faults.faults)
-        self.has_inputs((*lines, *analogue, *faults), terminals.groups(self._lines))
+        self.has_inputs((*lines, *analogue, *faults), groups(self._lines))
 
     def _watch_objects(self) -> None:
         self.watch(self._digital_inputs.settings())

@@ -21,7 +21,7 @@ MAX_NODES: Final = 127
 
 
 class EmcyConsumer(Service):
-    """Hears the EMCY of other nodes: the sub-index is their node-ID.
+    """Consumes the EMCY of other nodes: the sub-index is their node-ID.
 
     What to do about it is left to the application. An EMCY that has not eight
     bytes is ignored.
@@ -55,7 +55,7 @@ class EmcyConsumer(Service):
                 if is_valid(entry.number):
                     yield entry.number & CAN_ID_MASK, _Producer(self, entry.sub).receive
 
-    def hear(self, node_id: int, emcy: Emcy) -> None:
+    def take(self, node_id: int, emcy: Emcy) -> None:
         """Take the EMCY of a node."""
         self.latest[node_id] = emcy
         for notify in self.on_emcy:
@@ -70,4 +70,4 @@ class _Producer(NamedTuple):
 
     def receive(self, frame: CanFrame) -> None:
         with suppress(FramingError):
-            self.consumer.hear(self.node_id, Emcy.parse(frame.data))
+            self.consumer.take(self.node_id, Emcy.parse(frame.data))

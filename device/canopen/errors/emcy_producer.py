@@ -27,11 +27,11 @@ QUEUE_LENGTH: Final = 16
 
 
 class EmcyProducer(Service):
-    """Tells errors, once when they occur and once when they are gone (0000h).
+    """Reports errors, once when they occur and once when they are gone (0000h).
 
     An error is known by its code and its text. 1001h is the sum of the errors
     that are there, with the generic bit as long as there is one. Each error that
-    goes is told, with the register that is left. In Stopped and in bus-off the
+    goes is reported, with the register that is left. In Stopped and in bus-off the
     messages wait; they are sent afterwards. A reset forgets errors and messages:
     who still sees the cause has to raise it again.
 
@@ -69,15 +69,15 @@ class EmcyProducer(Service):
         self._free_us = 0
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """Note and tell an error that was not there."""
+        """Note and report an error that was not there."""
         key = code & 0xFFFF, _padded(text)
         if key not in self._active:
             self._active[key] = register
             self._history.note(*key)
-            self._tell(*key)
+            self._queue_message(*key)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """Tell that an error is gone, if it was there."""
+        """Report that an error is gone, if it was there."""
         gone = [
             key
             for key in self._active
@@ -85,7 +85,7 @@ class EmcyProducer(Service):
         ]
         for key in gone:
             del self._active[key]
-            self._tell(EmcyCode.NO_ERROR, key[1])
+            self._queue_message(EmcyCode.NO_ERROR, key[1])
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Send what had to wait in Stopped."""
@@ -113,7 +113,7 @@ class EmcyProducer(Service):
         if self._queue:
             self.schedule(self._free_us)
 
-    def _tell(self, code: int, text: bytes) -> None:
+    def _queue_message(self, code: int, text: bytes) -> None:
         register = self.register
         if self._register is not None:
             self._register.assign(bytes([register]))

@@ -23,7 +23,7 @@ from tickrig.wire.canopen.eds.communication_profile import (
 from tickrig.wire.canopen.eds.object_table import ROT, RW, RWW, Element, ObjectTable
 
 NODE_ID: Final = 32
-"""Unless told otherwise."""
+"""Unless another is given."""
 
 I16: Final = DataType.INTEGER16
 I32: Final = DataType.INTEGER32

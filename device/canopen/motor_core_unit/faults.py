@@ -1,4 +1,4 @@
-"""What may go wrong in a motor core unit, how it is seen, and what is told of it."""
+"""What may go wrong in a motor core unit, how it is seen, and the EMCYs of it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.wire.canopen.emcy import ErrorRegister
 
 
 @dataclass(frozen=True, slots=True)
-class Signs:
+class Measurements:
     """What the unit measures of itself.
 
     Attributes:
@@ -23,7 +24,7 @@ class Signs:
         velocity_deg_s: velocity of the shaft by the motor encoder.
         current_ma: current in the motor.
         limited: limits or the supply keep the current below what the loops want.
-        astray: the motor is far from what is wanted of it.
+        deviates: the motor is far from what is wanted of it.
         overloaded: the I2t of the power stage is used up.
         slip_deg: by how much motor encoder and gear encoder disagree.
     """
@@ -37,7 +38,7 @@ class Signs:
     velocity_deg_s: float
     current_ma: int
     limited: bool
-    astray: bool
+    deviates: bool
     overloaded: bool
     slip_deg: float
 
@@ -58,8 +59,8 @@ class Fault:
     name: str
     code: int
     register: ErrorRegister
-    seen: Callable[[Signs], bool]
-    gone: Callable[[Signs], bool]
+    seen: Callable[[Measurements], bool]
+    gone: Callable[[Measurements], bool]
     after_us: int = 0
 
     def __reduce__(self) -> tuple[Callable[[str], Fault], tuple[str]]:
@@ -91,9 +92,9 @@ DIP_US: Final = 5_000
 _DRIVE: Final = ErrorRegister.DEVICE_PROFILE
 
 
-def _unless_tripped(signs: Signs) -> bool:
+def _unless_tripped(measured: Measurements) -> bool:
     """Take a cause for gone that is not seen without power or motion: it would come back."""
-    return not signs.tripped
+    return not measured.tripped
 
 
 FAULTS: Final = (
@@ -126,7 +127,7 @@ FAULTS: Final = (
     ),
     Fault(
         *("motor commutation", 0x7122, _DRIVE),
-        seen=lambda s: s.astray and abs(s.current_ma) < NO_CURRENT_MA,
+        seen=lambda s: s.deviates and abs(s.current_ma) < NO_CURRENT_MA,
         gone=_unless_tripped,
         after_us=NO_CURRENT_US,
     ),
@@ -143,4 +144,55 @@ FAULTS: Final = (
         after_us=OVERLOADED_US,
     ),
 )
-"""In this order; what is seen first is told first."""
+"""In this order; what is seen first is reported first."""
+
+
+class Supervision:
+    """The faults that there are: each is reported by EMCY, and again when it is cleared.
+
+    Args:
+        node: the slave.
+
+    Attributes:
+        faults: those that there are, in the order in which they came.
+    """
+
+    def __init__(self, node: CanopenSlave) -> None:
+        self._node = node
+        self.faults: list[Fault] = []
+        self._since_us: dict[Fault, int] = {}
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a cause is seen, but not for long enough yet."""
+        return bool(self._since_us)
+
+    def start(self) -> None:
+        """Know of no fault; a cause that is still there is found anew."""
+        self.faults.clear()
+        self._since_us.clear()
+
+    def look(self, now_us: int, measured: Measurements) -> bool:
+        """Look for causes. Returns: whether there is a new fault."""
+        known = len(self.faults)
+        for fault in FAULTS:
+            if fault in self.faults:
+                continue
+            if not fault.seen(measured):
+                self._since_us.pop(fault, None)
+            elif now_us - self._since_us.setdefault(fault, now_us) >= fault.after_us:
+                self._raise(fault)
+        return len(self.faults) > known
+
+    def clear(self, measured: Measurements) -> bool:
+        """Let go of the faults whose cause is gone. Returns: whether there were any."""
+        gone = [fault for fault in self.faults if fault.gone(measured)]
+        for fault in gone:
+            self.faults.remove(fault)
+            self._node.emergency_clear(fault.code)
+        return bool(gone)
+
+    def _raise(self, fault: Fault) -> None:
+        del self._since_us[fault]
+        self.faults.append(fault)
+        self._node.emergency(fault.code, fault.register)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from enum import Enum, IntEnum, auto
+from enum import Enum, IntEnum, IntFlag, auto
 from typing import Final, assert_never
 
-from tickrig.device.canopen.motor_core_unit.references import References
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.motor_core_unit.objects import References
 from tickrig.device.canopen.motor_core_unit.shaft import Shaft
 from tickrig.device.canopen.motor_core_unit.trajectory import CONTROL_US, DEGREE, Trajectory
 
@@ -19,7 +20,7 @@ class Mode(IntEnum):
     ANGLE = 3
 
 
-class Act(Enum):
+class Action(Enum):
     """What the motor does."""
 
     COAST = auto()  # without power
@@ -29,19 +30,19 @@ class Act(Enum):
     BRAKE = auto()  # velocity goes to zero
 
 
-ACTS: Final = {
-    Mode.FREE: Act.COAST,
-    Mode.CURRENT: Act.PUSH,
-    Mode.VELOCITY: Act.TURN,
-    Mode.ANGLE: Act.POINT,
+ACTIONS: Final = {
+    Mode.FREE: Action.COAST,
+    Mode.CURRENT: Action.PUSH,
+    Mode.VELOCITY: Action.TURN,
+    Mode.ANGLE: Action.POINT,
 }
 """What a mode does where references act."""
 
-ASTRAY_DEG: Final = 1.0
-ASTRAY_DEG_S: Final = 10.0
-ASTRAY_MA: Final = 200
+DEVIATION_DEG: Final = 1.0
+DEVIATION_DEG_S: Final = 10.0
+DEVIATION_MA: Final = 200
 
-LOOPS: Final = (Act.TURN, Act.POINT, Act.BRAKE)
+LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
 """The velocity is planned."""
 
 
@@ -56,25 +57,25 @@ class Motion:
         references: where it shall go.
 
     Attributes:
-        act: what the motor does.
+        action: what the motor does.
         reached: the reference is reached.
     """
 
     def __init__(self, shaft: Shaft, references: References) -> None:
         self._shaft, self._references = shaft, references
         self._trajectory = Trajectory()
-        self.act, self.reached = Act.COAST, False
+        self.action, self.reached = Action.COAST, False
         self._begin_ma = self._end_ma = 0
 
     @property
     def on(self) -> bool:
         """Whether the power stage is on."""
-        return self.act is not Act.COAST
+        return self.action is not Action.COAST
 
     @property
     def loops(self) -> bool:
         """Whether a velocity is to be kept."""
-        return self.act in LOOPS
+        return self.action in LOOPS
 
     @property
     def steady(self) -> bool:
@@ -83,69 +84,69 @@ class Motion:
         stands = trajectory.begin_udeg_s == trajectory.velocity_udeg_s == 0
         return stands and self._begin_ma == self._end_ma
 
-    def astray(self, since_us: int) -> bool:
-        """Say whether the motor is far from what is wanted of it now."""
+    def deviates(self, since_us: int) -> bool:
+        """Return whether the motor is far from what is wanted of it now."""
         position_deg, velocity_deg_s, _ = self._trajectory.at(since_us)
-        match self.act:
-            case Act.COAST:
+        match self.action:
+            case Action.COAST:
                 return False
-            case Act.PUSH:
-                return abs(self._shaft.current_ma - self._end_ma) > ASTRAY_MA
-            case Act.POINT:
-                return abs(self._shaft.angle_ndeg / DEGREE - position_deg) > ASTRAY_DEG
-            case Act.TURN | Act.BRAKE:
-                return abs(self._shaft.velocity_udeg_s / 1e6 - velocity_deg_s) > ASTRAY_DEG_S
+            case Action.PUSH:
+                return abs(self._shaft.current_ma - self._end_ma) > DEVIATION_MA
+            case Action.POINT:
+                return abs(self._shaft.angle_ndeg / DEGREE - position_deg) > DEVIATION_DEG
+            case Action.TURN | Action.BRAKE:
+                return abs(self._shaft.velocity_udeg_s / 1e6 - velocity_deg_s) > DEVIATION_DEG_S
             case _:
-                assert_never(self.act)
+                assert_never(self.action)
 
-    def plan(self, act: Act) -> None:
+    def plan(self, action: Action) -> None:
         """Plan the control tick that begins."""
-        if act is not self.act:
-            self._begin(act)
-        match act:
-            case Act.COAST:
+        if action is not self.action:
+            self._begin(action)
+        match action:
+            case Action.COAST:
                 self.reached = False
-            case Act.PUSH:
+            case Action.PUSH:
                 self._begin_ma, self._end_ma = self._end_ma, self._references.current_ma
                 self.reached = self._begin_ma == self._end_ma
-            case Act.TURN:
+            case Action.TURN:
                 self._run(self._references.velocity_udeg_s)
-            case Act.POINT:
+            case Action.POINT:
                 self._approach()
-            case Act.BRAKE:
+            case Action.BRAKE:
                 self._run(0)
                 self.reached = False
             case _:
-                assert_never(act)
+                assert_never(action)
 
     def drive(self, since_us: int) -> None:
-        """Tell the motor what to do until the next ms.
+        """Command the motor until the next ms.
 
         Args:
             since_us: since the begin of the control tick.
         """
         position_deg, velocity_deg_s, acceleration_deg_s2 = self._trajectory.at(since_us)
-        match self.act:
-            case Act.COAST:
+        match self.action:
+            case Action.COAST:
                 self._shaft.release()
-            case Act.PUSH:
+            case Action.PUSH:
                 change_ma = (self._end_ma - self._begin_ma) * since_us / CONTROL_US
                 self._shaft.push((self._begin_ma + change_ma) / 1_000)
-            case Act.POINT:
+            case Action.POINT:
                 self._shaft.point(position_deg, velocity_deg_s, acceleration_deg_s2)
-            case Act.TURN | Act.BRAKE:
+            case Action.TURN | Action.BRAKE:
                 self._shaft.turn(velocity_deg_s, acceleration_deg_s2)
             case _:
-                assert_never(self.act)
+                assert_never(self.action)
 
-    def _begin(self, act: Act) -> None:
+    def _begin(self, action: Action) -> None:
         """Go on from the motion that is."""
         shaft, trajectory = self._shaft, self._trajectory
         velocity = trajectory.velocity_udeg_s if self.loops else shaft.velocity_udeg_s
         current_ma = shaft.current_ma
-        self.act = act
+        self.action = action
         trajectory.place(shaft.angle_ndeg, velocity if self.loops else 0)
-        self._end_ma = current_ma if act is Act.PUSH else 0
+        self._end_ma = current_ma if action is Action.PUSH else 0
         self._begin_ma = self._end_ma
 
     def _run(self, velocity_udeg_s: int) -> None:
@@ -166,3 +167,50 @@ def mode_of(number: int) -> Mode:
     ('ANGLE', 'FREE')
     """
     return Mode(number) if number in tuple(Mode) else Mode.FREE
+
+
+STATUS: Final = 0x2001
+MEASURED: Final = 0x6401
+
+
+class Status(IntFlag):
+    """Bits of 2001h (our decision K19)."""
+
+    ON = 1
+    REACHED = 2
+    LIMITED = 4
+    FAULT = 8
+
+
+class Display:
+    """Writes 2001h and 6401h, once a control tick.
+
+    Args:
+        dictionary: of the unit.
+        shaft: what is measured.
+        references: they know the full scales.
+    """
+
+    def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:
+        self._status = dictionary[STATUS, 0]
+        self._angle, self._velocity, self._current, self._supply = dictionary.elements(MEASURED)
+        self._shaft, self._references = shaft, references
+
+    def show(self, motion: Motion, *, faulty: bool) -> None:
+        """Show what is."""
+        shaft, references = self._shaft, self._references
+        self._angle.value = references.angle(shaft.angle_ndeg / 1e6)
+        self._velocity.value = references.velocity(shaft.velocity_udeg_s / 1e3)
+        self._current.value = references.current(shaft.current_ma)
+        self._supply.value = shaft.servo.supply_mv // 10
+        self._status.value = self._bits(motion, faulty=faulty)
+
+    def _bits(self, motion: Motion, *, faulty: bool) -> int:
+        status = Status.FAULT if faulty else Status(0)
+        if motion.on:
+            status |= Status.ON
+            if motion.reached:
+                status |= Status.REACHED
+            if self._shaft.servo.current_limited:
+                status |= Status.LIMITED
+        return int(status)

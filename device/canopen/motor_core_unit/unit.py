@@ -1,25 +1,71 @@
-"""The application of the motor core unit."""
+"""The application of the motor core unit, with its physical side."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
-from tickrig.device.canopen.motor_core_unit.display import Display
-from tickrig.device.canopen.motor_core_unit.faults import Signs
-from tickrig.device.canopen.motor_core_unit.motion import ACTS, Act, Motion, mode_of
-from tickrig.device.canopen.motor_core_unit.references import References
+from tickrig.device.canopen.motor_core_unit.faults import Measurements, Supervision
+from tickrig.device.canopen.motor_core_unit.motion import ACTIONS, Action, Display, Motion, mode_of
+from tickrig.device.canopen.motor_core_unit.objects import References
 from tickrig.device.canopen.motor_core_unit.shaft import Shaft
-from tickrig.device.canopen.motor_core_unit.supervision import Supervision
-from tickrig.device.canopen.motor_core_unit.terminals import INPUTS, OUTPUTS, READINGS, feel
 from tickrig.device.canopen.motor_core_unit.trajectory import CONTROL_US, DEGREE
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.servo.presets import MOTOR_CORE_UNIT
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
+
+LOAD: Final = "torque from outside at the shaft, positive drives it forward"
+
+INPUTS: Final = (
+    InputSignal("supply_v", "supply of the motor", high=80, unit="V", initial=60, real=True),
+    InputSignal("shaft_load_nm", LOAD, low=-100, high=100, unit="Nm", real=True),
+    InputSignal("load_kg_m2", "inertia of what is on the shaft", high=10, unit="kg m2", real=True),
+    InputSignal(
+        "ambient_c", "air around it", low=-40, high=125, unit="degC", initial=25, real=True
+    ),
+    InputSignal("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    InputSignal("encoder_unplugged", "the plug of the motor encoder is off", SignalType.FAULT),
+    InputSignal("motor_phase_open", "a wire of the motor is off", SignalType.FAULT),
+    InputSignal("short_circuit", "two wires of the motor touch", SignalType.FAULT),
+)
+
+OUTPUTS: Final = (
+    OutputSignal("angle_deg", "angle of the shaft, without the offset 2011h", "deg"),
+    OutputSignal("velocity_deg_s", "velocity of the shaft", "deg/s"),
+    OutputSignal("current_a", "current in the motor", "A"),
+    OutputSignal("winding_c", "temperature of the winding", "degC"),
+    OutputSignal("target_deg", "where the reference wants the shaft in angle mode", "deg"),
+    OutputSignal("mode", "free, current, velocity or angle"),
+    OutputSignal("status", "off, on, or the faults that are there"),
+)
+
+READINGS: Final[Mapping[str, Callable[[Servo], float]]] = MappingProxyType(
+    {
+        "angle_deg": lambda servo: servo.shaft_deg,
+        "velocity_deg_s": lambda servo: servo.shaft_deg_s,
+        "current_a": lambda servo: servo.current_a,
+        "winding_c": lambda servo: servo.winding_c,
+    }
+)
+"""The outputs that are the motor's own."""
+
+
+def apply_inputs(servo: Servo, inputs: QuantityBank) -> None:
+    """Let the world act on the motor, if it has changed."""
+    if inputs.changed:
+        inputs.changed = False
+        servo.supply_v, servo.ambient_c = inputs["supply_v"], inputs["ambient_c"]
+        servo.load_nm, servo.load_kg_m2 = inputs["shaft_load_nm"], inputs["load_kg_m2"]
+        servo.blocked = bool(inputs["shaft_blocked"])
+        servo.encoder_unplugged = bool(inputs["encoder_unplugged"])
+        servo.phase_open = bool(inputs["motor_phase_open"])
+
 
 MODE: Final = 0x2000
 
@@ -80,11 +126,11 @@ class MotorCoreUnit(Application):
         """Let the shaft coast."""
         self.servo.release()
         self.servo.step_to(now_us)
-        feel(self.servo, self.inputs)
+        apply_inputs(self.servo, self.inputs)
         return NEVER if self.servo.resting else now_us + TICK_US
 
     def start(self) -> None:
-        """Know of no fault; where the shaft is says the gear encoder."""
+        """Know of no fault; the gear encoder says where the shaft is."""
         self._supervision.start()
         self._references.start()
         self._mode_was_written = False
@@ -105,7 +151,7 @@ class MotorCoreUnit(Application):
     def on_execute(self, now_us: int) -> None:
         """Let time pass for the motor, look after it, drive it."""
         self.servo.step_to(now_us)
-        feel(self.servo, self.inputs)
+        apply_inputs(self.servo, self.inputs)
         failed = self._supervise(now_us)
         controls = failed or now_us - self._begin_us >= CONTROL_US
         if controls:
@@ -114,12 +160,12 @@ class MotorCoreUnit(Application):
         self.schedule(self._rested_us(now_us) if controls and self._rests else now_us + TICK_US)
 
     def _supervise(self, now_us: int) -> bool:
-        """Find new faults, let go of old ones; say whether there is a new one."""
+        """Find new faults, let go of old ones. Returns: whether there is a new one."""
         if self._mode_was_written:
             self._mode_was_written = False
-            if self._supervision.clear(self._signs(now_us)):
+            if self._supervision.clear(self._measurements(now_us)):
                 self._shaft.find_zero()
-        failed = self._supervision.look(now_us, self._signs(now_us))
+        failed = self._supervision.look(now_us, self._measurements(now_us))
         self._references.failed |= failed
         return failed
 
@@ -127,22 +173,22 @@ class MotorCoreUnit(Application):
         """Begin a control tick."""
         self._begin_us = now_us
         self.servo.current_limit_a = self._references.current_limit_ma / 1_000
-        self._motion.plan(self._act)
+        self._motion.plan(self._action)
         self._display.show(self._motion, faulty=bool(self._supervision.faults))
 
     @property
-    def _act(self) -> Act:
+    def _action(self) -> Action:
         """What faults, NMT state and mode let the motor do."""
         if self._supervision.faults:
-            return Act.COAST
-        act = ACTS[mode_of(self._mode.number)]
-        if act is Act.COAST or self.node.state is NmtState.OPERATIONAL:
-            return act
-        return Act.BRAKE
+            return Action.COAST
+        action = ACTIONS[mode_of(self._mode.number)]
+        if action is Action.COAST or self.node.state is NmtState.OPERATIONAL:
+            return action
+        return Action.BRAKE
 
-    def _signs(self, now_us: int) -> Signs:
+    def _measurements(self, now_us: int) -> Measurements:
         servo, on = self.servo, self._motion.on
-        return Signs(
+        return Measurements(
             on=on,
             loops=self._motion.loops,
             tripped=on and bool(self.inputs["short_circuit"]),
@@ -152,7 +198,7 @@ class MotorCoreUnit(Application):
             velocity_deg_s=self._shaft.velocity_udeg_s / 1e6,
             current_ma=servo.current_ma,
             limited=servo.current_limited,
-            astray=self._motion.astray(now_us - self._begin_us),
+            deviates=self._motion.deviates(now_us - self._begin_us),
             overloaded=servo.overloaded,
             slip_deg=self._shaft.slip_deg,
         )

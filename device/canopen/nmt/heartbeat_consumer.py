@@ -41,7 +41,7 @@ class Monitor:
         node_id: whom it watches.
         period_us: the consumer heartbeat time.
         watch: what is known.
-        nmt_state: the NMT state that the node told last, None before.
+        nmt_state: the NMT state that the node sent last, None before.
         deadline_us: when its heartbeat is late.
     """
 
@@ -54,7 +54,7 @@ class Monitor:
         self.nmt_state: int | None = None
 
     def receive(self, frame: CanFrame) -> None:
-        """Hear a heartbeat."""
+        """Take a heartbeat."""
         if len(frame.data) != 1:
             return
         self.nmt_state = frame.data[0]

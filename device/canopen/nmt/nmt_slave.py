@@ -48,7 +48,7 @@ class NmtSlave(Service):
             yield NMT_COB_ID, self._receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Name the NMT master: what is heard follows the state."""
+        """Name the NMT master: what it listens to follows the state."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def _receive(self, frame: CanFrame) -> None:

@@ -125,7 +125,7 @@ class PdoMapping:
 
 
 def _fits(entry: Entry, bits: int) -> bool:
-    """Say whether an object has so many bits; a string has whole bytes."""
+    """Return whether an object has so many bits; a string has whole bytes."""
     if entry.size:
         return 0 < bits <= 8 * entry.size
     return 0 < bits <= 8 * min(entry.description.max_bytes, 8) and bits % 8 == 0

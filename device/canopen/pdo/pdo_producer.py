@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.pdo.mpdo_producer import DamProducer
+from tickrig.device.canopen.pdo.mpdo import DamProducer
 from tickrig.device.canopen.pdo.tpdo import TPDO_PARAMETERS, Tpdo
 from tickrig.device.canopen.pdo.tpdo_modes import TpdoMode
 from tickrig.wire.canopen.nmt import NmtState

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Handler
 from tickrig.device.canopen.core.slave import COMMUNICATION_AREA
-from tickrig.device.canopen.pdo.mpdo_consumer import DamConsumer, SamConsumer
+from tickrig.device.canopen.pdo.mpdo import DamConsumer, SamConsumer
 from tickrig.device.canopen.pdo.pdo_mapping import PdoMapping
 from tickrig.device.canopen.pdo.pdo_packing import Unpack, make_unpack, total_bits
 from tickrig.device.canopen.pdo.pdo_parameters import (
@@ -141,7 +141,7 @@ class Rpdo:
             notify(self.number)
 
     def _passes(self, data: bytes) -> bool:
-        """Judge length and time; say whether the frame can be used."""
+        """Judge length and time. Returns: whether the frame can be used."""
         if len(data) < self._length:
             self._break(EmcyCode.PDO_TOO_SHORT)
             return False

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.pdo.mpdo import scanned_entries
-from tickrig.device.canopen.pdo.mpdo_producer import DamProducer, SamProducer
+from tickrig.device.canopen.pdo.mpdo import DamProducer, SamProducer, scanned_entries
 from tickrig.device.canopen.pdo.pdo_mapping import PdoMapping
 from tickrig.device.canopen.pdo.pdo_packing import Pack, make_pack
 from tickrig.device.canopen.pdo.pdo_parameters import (
@@ -105,7 +104,7 @@ class Tpdo:
         self.mode.answer()
 
     def _watch(self, entries: Iterable[Entry]) -> None:
-        """Hear of each change that counts as an event."""
+        """Follow each change that counts as an event."""
         self._watched = [entry for entry in entries if entry.key not in self._producer.quiet]
         for entry in self._watched:
             entry.watch(self.mode.request)

@@ -36,7 +36,7 @@ class TpdoMode:
 
     Attributes:
         due_us: when it wants to be run.
-        synchronous: whether it wants to hear of SYNC.
+        synchronous: whether it acts on SYNC.
         timed: whether it ever wants to be run.
         on_change: whether a change of a mapped object is an event.
         on_sync: called with the counter of each SYNC, 0 if it has none.

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.sdo.sdo_block_download import BlockDownload
-from tickrig.device.canopen.sdo.sdo_block_upload import BlockUpload
-from tickrig.device.canopen.sdo.sdo_limits import SdoLimits
+from tickrig.device.canopen.sdo.sdo_block import BlockDownload, BlockUpload
 from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload, SegmentedUpload
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -29,6 +28,34 @@ from tickrig.wire.instant import NEVER
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.entry import Entry
     from tickrig.device.canopen.core.slave import CanopenSlave
+
+
+TIMEOUT_US: Final = 5_000_000
+MEMORY_BYTES: Final = 64 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class SdoLimits:
+    """What CiA 301 leaves to the device.
+
+    Attributes:
+        timeout_us: silence of the client after which a transfer is aborted, at least 1.
+        memory_bytes: what all strings and domains of the slave hold together; what an
+            object itself may hold stands in its description.
+    """
+
+    timeout_us: int = TIMEOUT_US
+    memory_bytes: int = MEMORY_BYTES
+
+    def __post_init__(self) -> None:
+        if self.timeout_us < 1:
+            raise ValueError(f"an SDO time-out of {self.timeout_us} us is less than 1 us")
+        if self.memory_bytes < 0:
+            raise ValueError(f"a memory of {self.memory_bytes} bytes is less than 0")
+
+
+USUAL: Final = SdoLimits()
+
 
 State = Callable[[bytes], None]
 """What the next request means; a transfer is in one of these at a time."""
@@ -116,7 +143,7 @@ class SdoServer:
         self._state, self._multiplexer, self.due_us = self._idle, NO_MULTIPLEXER, NEVER
 
     def abort(self, code: AbortCode) -> None:
-        """End the transfer and tell the client why."""
+        """End the transfer; the client gets the reason."""
         self.confirm(ServerCommand.ABORT, code.to_bytes(4, "little"))
         self.end()
 

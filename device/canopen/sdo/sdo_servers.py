@@ -9,8 +9,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.cob_id_rules import check_sdo_cob_id, is_valid
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
-from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
-from tickrig.device.canopen.sdo.sdo_server import SdoServer
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits, SdoServer
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.nmt import NmtState

@@ -110,7 +110,7 @@ def _split(word: str) -> tuple[int, Path]:
 
 def _read(node: int, path: Path) -> EdsObjects:
     from tickrig.host.monitor.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
-    from tickrig.wire.canopen.eds.eds_finding import EdsError  # noqa: PLC0415
+    from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415
 
     try:
         return read_eds_objects(path, node)

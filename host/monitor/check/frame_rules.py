@@ -14,8 +14,7 @@ from tickrig.wire.can_error import ErrorFrame, describe_error_frame
 from tickrig.wire.canopen.emcy import Emcy, describe
 from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
 from tickrig.wire.canopen.sdo.abort import describe_abort
-from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand
-from tickrig.wire.canopen.sdo.sdo_layout import index_sub
+from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand, index_sub
 from tickrig.wire.errors import WireError
 
 EMCY_IDS: Final = range(0x081, 0x100)

@@ -16,7 +16,7 @@ from tickrig.host.monitor.decode.object_text import (
     slug,
 )
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.eds_finding import Finding
+from tickrig.wire.canopen.eds.eds_file import Finding
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS

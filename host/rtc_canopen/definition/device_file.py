@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.eds_finding import EdsError, Finding
+from tickrig.wire.canopen.eds.eds_file import EdsError, Finding
 
 IDENTITY: Final = ((0x1000, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3))
 """Device type, vendor-ID, product code, revision number; the serial number is of one device."""

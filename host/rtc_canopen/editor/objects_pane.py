@@ -13,7 +13,7 @@ from tickrig.host.rtc_canopen.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.view import PendingTransfer, ServerView
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.canopen.eds.eds_value import parse_value
 from tickrig.wire.errors import FieldError
 

@@ -6,7 +6,6 @@ from tests.device.canopen.reference import NODE_ID, make_dictionary
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
@@ -28,6 +27,7 @@ from tickrig.wire.canopen.sdo.sdo_block import (
     BlockStart,
     BlockUploadInitiateRequest,
     BlockUploadInitiateResponse,
+    crc16,
 )
 
 OPEN_SECOND = ("605#23011201A0060000", "605#23011202A1060000")

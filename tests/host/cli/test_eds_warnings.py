@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tickrig.host.cli.messages import show_findings
-from tickrig.wire.canopen.eds.eds_finding import Finding
+from tickrig.wire.canopen.eds.eds_file import Finding
 
 
 def test_what_is_so_in_many_sections_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
 from tickrig.wire.canopen.eds.eds_entry import read_entry, required
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import (
+    BIT_RATES_KBIT,
     RO,
     RW,
     Access,
+    DeviceInfo,
     EntryDescription,
     ObjectCode,
     ObjectDescription,

@@ -6,8 +6,7 @@ import math
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_finding import shorten
+from tickrig.wire.canopen.eds.eds_file import EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_limit, parse_value
 from tickrig.wire.canopen.eds.object_table import (
     MAX_VARIABLE_BYTES,
@@ -62,7 +61,7 @@ def required(file: EdsFile, section: str, key: str) -> str | None:
 
 
 def is_visible_char(file: EdsFile, number: int) -> bool:
-    """Say whether 00A0h is the data type of RTC-CANopen here, not one that the file derives."""
+    """Return whether 00A0h is the data type of RTC-CANopen here, not one that the file derives."""
     return number == DataType.VISIBLE_CHAR and f"{number:X}sub1" not in file.sections
 
 

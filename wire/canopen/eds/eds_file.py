@@ -3,11 +3,49 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterable, Iterator
+from typing import Final, NamedTuple
 
-from tickrig.wire.canopen.eds.eds_finding import Finding, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+
+LONGEST: Final = 40
+
+
+class Finding(NamedTuple):
+    """A fault of a file.
+
+    Attributes:
+        file: what the file is called.
+        section: without brackets, empty for the file as a whole.
+        reason: which key or line, what it says, and what was allowed or is taken instead.
+    """
+
+    file: str
+    section: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        where = f"[{self.section}] " if self.section else ""
+        return f"{self.file}: {where}{self.reason}"
+
+
+class EdsError(ValueError):
+    """An EDS that cannot be used: all that is wrong with it, a line each."""
+
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("\n".join(map(str, self.findings)))
+
+
+def shorten(text: str) -> str:
+    """Return a text of a file so that it fits into a line.
+
+    >>> shorten("a" * 99) == "a" * 37 + "..."
+    True
+    """
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
 
 Section = dict[str, str]
 
@@ -72,7 +110,7 @@ class EdsFile:
         return self.sections.get(section, {}).get(key.lower(), "")
 
     def has(self, section: str, key: str) -> bool:
-        """Say whether a keyword is there, with a text or without."""
+        """Return whether a keyword is there, with a text or without."""
         return key.lower() in self.sections.get(section, {})
 
     def numeric(self, section: str, key: str) -> str:
@@ -179,5 +217,5 @@ def canonical_section(title: str) -> str:
 
 
 def _matters(title: str) -> bool:
-    """Say whether a section, or what stands before the first one, describes the device."""
+    """Return whether a section, or what stands before the first one, describes the device."""
     return not title or title in SECTIONS or _OBJECT.fullmatch(title.upper()) is not None

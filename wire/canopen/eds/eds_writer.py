@@ -9,11 +9,12 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final, Protocol
 
-from tickrig.wire.canopen.eds.device_info import BIT_RATES_KBIT, DeviceInfo
 from tickrig.wire.canopen.eds.eds_value import format_limit, format_value, parse_value
 from tickrig.wire.canopen.eds.object_table import (
+    BIT_RATES_KBIT,
     MAX_VARIABLE_BYTES,
     Access,
+    DeviceInfo,
     EntryDescription,
     ObjectCode,
     ObjectDescription,
@@ -227,7 +228,7 @@ def _default(entry: EntryDescription) -> str | None:
 
 
 def _reads_as(entry: EntryDescription, text: str) -> bool:
-    """Say whether a default comes back exactly."""
+    """Return whether a default comes back exactly."""
     if not text:
         return not any(entry.default) and len(entry.default) == entry.data_type.size
     if _fits_a_line(text):
@@ -244,5 +245,5 @@ def _name(text: str) -> str:
 
 
 def _fits_a_line(text: str) -> bool:
-    """Say whether a value survives blanks, comments and line ends of an EDS."""
+    """Return whether a value survives blanks, comments and line ends of an EDS."""
     return text.isprintable() and text == text.strip() and " ;" not in text

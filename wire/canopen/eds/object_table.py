@@ -1,8 +1,9 @@
-"""Objects of a device, written down as its manual lists them."""
+"""Objects of a device, written down as its manual lists them, and the head of its EDS."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from enum import Flag, IntEnum
 from operator import attrgetter
 from typing import Final, NamedTuple
@@ -262,3 +263,25 @@ class ObjectTable:
         u8 = DataType.UNSIGNED8
         row = EntryDescription(index, 0, "Number of entries", u8, access, default=count)
         self._rows.append(row)
+
+
+BIT_RATES_KBIT: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
+BIT_RATES: Final = frozenset(1_000 * kbit for kbit in BIT_RATES_KBIT)
+"""All of them, in bit/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """Who made it, and what it can do.
+
+    Attributes:
+        vendor_name: empty if unknown.
+        product_name: empty if unknown.
+        order_code: empty if unknown.
+        bit_rates: bit/s that it supports.
+    """
+
+    vendor_name: str = ""
+    product_name: str = ""
+    order_code: str = ""
+    bit_rates: frozenset[int] = frozenset()

@@ -41,8 +41,11 @@ from tickrig.wire.canopen.sdo.sdo_command import (
     TOGGLE,
     ClientCommand,
     ServerCommand,
+    check_frame,
+    frame_at,
+    index_sub,
+    number_field,
 )
-from tickrig.wire.canopen.sdo.sdo_layout import check_frame, frame_at, index_sub, number_field
 from tickrig.wire.errors import FieldError, FramingError
 
 

@@ -9,7 +9,9 @@ BlockSegment(seqno=5, data=b'..\x00\x00\x00\x00\x00', last=True)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Final, Self
+
+import crcmod
 
 from tickrig.wire.canopen.sdo.sdo_command import (
     BLOCK_ACKNOWLEDGE,
@@ -24,8 +26,10 @@ from tickrig.wire.canopen.sdo.sdo_command import (
     SEGMENT_BYTES,
     ClientCommand,
     ServerCommand,
+    frame_at,
+    index_sub,
+    number_field,
 )
-from tickrig.wire.canopen.sdo.sdo_layout import frame_at, index_sub, number_field
 from tickrig.wire.errors import FieldError
 
 
@@ -221,3 +225,11 @@ class BlockEnded:
     def parse(cls, frame: bytes) -> Self:
         """Read the 8 bytes."""
         return cls()
+
+
+_crc: Final = crcmod.mkCrcFun(0x1_1021, initCrc=0, rev=False, xorOut=0)
+
+
+def crc16(data: bytes) -> int:
+    """Return the CRC over the data of a block transfer, without the fill of the last segment."""
+    return _crc(data)

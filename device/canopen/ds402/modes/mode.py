@@ -125,7 +125,7 @@ class Mode:
 
 
 class Window:
-    """Tells whether something has been inside for long enough: windows and thresholds.
+    """Finds out whether something has been inside for long enough: windows and thresholds.
 
     Attributes:
         waiting: it is inside, and the time runs.

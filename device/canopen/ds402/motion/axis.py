@@ -9,7 +9,7 @@ from tickrig.device.canopen.ds402.motion.reference import Control, Reference
 from tickrig.device.canopen.ds402.objects.settings import Settings
 
 STANDSTILL_TURNS_S: Final = 0.5
-"""A motor that turns more slowly stands: its encoder tells no better within a tick."""
+"""A motor that turns more slowly stands: its encoder resolves no better within a tick."""
 
 
 class Axis:
@@ -36,7 +36,7 @@ class Axis:
 
     @property
     def stands(self) -> bool:
-        """Whether the motor stands, as far as its encoder tells."""
+        """Whether the motor stands, as far as its encoder shows."""
         return not self.is_fast(self.motor.velocity_counts_s)
 
     @property

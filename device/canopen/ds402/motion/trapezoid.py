@@ -134,7 +134,7 @@ class Path:
         return Motion(self.end.position + self.end.velocity * since_s, self.end.velocity)
 
     def ended(self, now_us: int) -> bool:
-        """Say whether the target is reached."""
+        """Return whether the target is reached."""
         return (now_us - self.began_us) / US_PER_S >= self.end_s
 
 

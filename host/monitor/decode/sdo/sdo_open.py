@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from tickrig.host.monitor.decode.sdo.transfer import Direction, Mode, Outcome, Transfer
-from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import Segment
-from tickrig.wire.canopen.sdo.sdo_block import BlockEnd, BlockSegment
+from tickrig.wire.canopen.sdo.sdo_block import BlockEnd, BlockSegment, crc16
 
 
 class Phase(Enum):

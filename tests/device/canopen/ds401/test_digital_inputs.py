@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds401.board import BOOL, REAL, U8, U16, U32, Board, Row
-from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
+from tickrig.device.canopen.ds401.digital import FILTER_US
 from tickrig.device.canopen.ds401.families import (
     FILTER_INPUT,
     INTERRUPT_ANY_CHANGE,

@@ -7,7 +7,7 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.ds401.digital_inputs import FILTER_US
+from tickrig.device.canopen.ds401.digital import FILTER_US
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.instant import NEVER
 

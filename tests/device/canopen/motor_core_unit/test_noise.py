@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.motor_core_unit.bench import UnitBench
-from tickrig.device.canopen.motor_core_unit.terminals import INPUTS
+from tickrig.device.canopen.motor_core_unit.unit import INPUTS
 from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
 

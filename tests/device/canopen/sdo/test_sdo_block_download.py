@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.sdo_client import Client, booted, offer_blocks_of, pattern
 from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import Abort
 from tickrig.wire.canopen.sdo.sdo_block import (
     BlockAcknowledge,
@@ -15,6 +14,7 @@ from tickrig.wire.canopen.sdo.sdo_block import (
     BlockEnd,
     BlockEnded,
     BlockSegment,
+    crc16,
 )
 
 TEXT = b"A really really long string..."

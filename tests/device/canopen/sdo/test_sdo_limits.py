@@ -6,18 +6,18 @@ from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.sdo_client import Client
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.sdo.sdo_limits import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import Abort, DownloadInitiateRequest, Response
 from tickrig.wire.canopen.sdo.sdo_block import (
     BlockDownloadInitiateRequest,
     BlockEnd,
     BlockEnded,
     BlockSegment,
+    crc16,
 )
 
 FIRMWARE, TEXT = 0x1F50, 0x2000

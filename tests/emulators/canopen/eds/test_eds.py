@@ -8,10 +8,8 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.eds import DeviceDescription, describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.eds.device_info import DeviceInfo
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_finding import EdsError
-from tickrig.wire.canopen.eds.object_table import Access, ObjectCode, ObjectDescription
+from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
+from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, ObjectCode, ObjectDescription
 
 SAMPLE = Path(__file__).parent / "sample.dcf"
 NODE_ID = 5

@@ -14,10 +14,9 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.build import describe_rtc
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
-from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescription
 
 ROOT = Path(__file__).parents[4]
 SHIPPED = (*(ROOT / "examples").rglob("*.eds"), *(ROOT / "tests" / "golden").rglob("*.eds"))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.canopen.eds import EdsCache
-from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsError
 
 TYPE = "[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\n"
 

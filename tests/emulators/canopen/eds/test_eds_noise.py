@@ -12,8 +12,7 @@ import pytest
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.canopen.build import application_of
 from tickrig.emulators.canopen.eds import describe
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
 
 ROOT: Final = Path(__file__).parents[4]
 FILES: Final = (Path(__file__).parent / "sample.dcf", ROOT / "examples" / "eds" / "epos.eds")

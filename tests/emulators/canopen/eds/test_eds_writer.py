@@ -11,11 +11,11 @@ from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.device_info import DeviceInfo
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
 from tickrig.wire.canopen.eds.object_table import (
     Access,
+    DeviceInfo,
     EntryDescription,
     ObjectCode,
     ObjectDescription,

@@ -7,7 +7,7 @@ import pytest
 from tests.host.monitor.decode.traces import last
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_finding import EdsError
+from tickrig.wire.canopen.eds.eds_file import EdsError
 
 EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
 

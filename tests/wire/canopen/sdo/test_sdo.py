@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.crc import crc16
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateRequest,
@@ -32,6 +31,7 @@ from tickrig.wire.canopen.sdo.sdo_block import (
     BlockStart,
     BlockUploadInitiateRequest,
     BlockUploadInitiateResponse,
+    crc16,
 )
 from tickrig.wire.errors import FieldError, FramingError, WireError
 

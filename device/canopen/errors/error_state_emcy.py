@@ -8,11 +8,11 @@ from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 
 
-class CanErrorState(Service):
-    """Tells error-passive (8120h) and that bus-off is over (8140h).
+class ErrorStateEmcy(Service):
+    """Reports error-passive (8120h) and that bus-off is over (8140h).
 
     8120h is cleared when the controller is error-active again. Bus-off is a
-    communication error (1029h). 8140h is told when it is over, and cleared at once:
+    communication error (1029h). 8140h is sent when it is over, and cleared at once:
     nothing is wrong then.
 
     Not emulated: when and whether a controller recovers is its own business.
@@ -30,16 +30,16 @@ class CanErrorState(Service):
         self.state = ErrorState.ACTIVE
 
     def booted(self) -> None:
-        """Tell anew, after the boot-up message, what is still so."""
+        """Report anew, after the boot-up message, what is still so."""
         if self.state is ErrorState.PASSIVE:
             self.schedule(self.node.now_us + 1)
 
     def tick(self, now_us: int) -> None:
-        """Tell error-passive."""
-        self._tell_passive()
+        """Report error-passive."""
+        self._report_passive()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Tell a change."""
+        """Report a change."""
         node, old, self.state = self.node, self.state, state
         if old is state:
             return
@@ -50,9 +50,9 @@ class CanErrorState(Service):
             node.emergency(EmcyCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
             node.emergency_clear(EmcyCode.BUS_OFF_RECOVERED)
         if state is ErrorState.PASSIVE:
-            self._tell_passive()
+            self._report_passive()
         else:
             node.emergency_clear(EmcyCode.CAN_PASSIVE)
 
-    def _tell_passive(self) -> None:
+    def _report_passive(self) -> None:
         self.node.emergency(EmcyCode.CAN_PASSIVE, ErrorRegister.COMMUNICATION)

@@ -1,4 +1,4 @@
-"""What the objects of the motor core unit ask for, in the units of its motion."""
+"""What the objects of the motor core unit ask for, in the units of its motion, and show."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class References:
 
     Args:
         node: the slave.
-        back: called when a reference comes after a failure.
+        on_reference: called when a reference comes after a failure.
 
     Attributes:
         entries: the objects.
         failed: no reference has come since the failure.
     """
 
-    def __init__(self, node: CanopenSlave, back: Callable[[], None]) -> None:
+    def __init__(self, node: CanopenSlave, on_reference: Callable[[], None]) -> None:
         dictionary = node.dictionary
         self._angle, self._velocity, self._current = dictionary.elements(FULL_SCALE)
         self._reference, self._velocity_limit, self._current_limit, _ = dictionary.elements(
@@ -50,14 +50,15 @@ class References:
             *(self._offset, self._error_mode, self._error_value),
         ]
         self.failed = False
-        self._node, self._back, self._reference.written = node, back, self._came
+        self._node, self._on_reference = node, on_reference
+        self._reference.written = self._reference_written
 
     def start(self) -> None:
         """Know of no failure."""
         self.failed = False
         listeners = PdoConsumer.of(self._node).on_rpdo
-        if self._came not in listeners:
-            listeners.append(self._came)
+        if self._reference_written not in listeners:
+            listeners.append(self._reference_written)
 
     @property
     def number(self) -> int:
@@ -100,10 +101,10 @@ class References:
         limit = abs(_part(self._current_limit.number, self._current.number))
         return _limited(limit, MAX_CURRENT_MA) or MAX_CURRENT_MA
 
-    def _came(self, source: Entry | int) -> None:
+    def _reference_written(self, source: Entry | int) -> None:
         if self.failed:
             self.failed = False
-            self._back()
+            self._on_reference()
 
     def angle(self, angle_mdeg: float) -> int:
         """Return an angle of the shaft as 6401h:01 shows it."""

@@ -1,4 +1,4 @@
-"""Node guarding and life guarding of a slave (CiA 301, error control services)."""
+"""Error control of a slave: heartbeat producer, node and life guarding (CiA 301, 1017h, 100Ch)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,50 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
+
+
+class HeartbeatProducer(Service):
+    """Sends the NMT state each producer heartbeat time.
+
+    The boot-up message counts as the first heartbeat. A time that is written,
+    over the bus or from the inside, begins anew, so the first one comes after
+    one period.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._period = node.dictionary.find(0x1017)
+        self._due_us = NEVER
+        self._begins = False
+        if self._period is not None:
+            self._period.watch(self._changed)
+            self._period.written = self._changed  # the same value, too, begins anew
+
+    def booted(self) -> None:
+        """Count from the boot-up message."""
+        self._begin()
+
+    def tick(self, now_us: int) -> None:
+        """Begin to count, or send one heartbeat."""
+        node = self.node
+        period_us = 1_000 * self._period.number if self._period is not None else 0
+        if self._begins:
+            self._due_us = now_us
+        else:
+            node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
+        self._begins = False
+        self._due_us += period_us
+        self.schedule(self._due_us if period_us else NEVER)
+
+    def _changed(self, entry: Entry) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        """Count from the next tick on, or from this one; not before the boot-up message."""
+        if self.node.state is not NmtState.INITIALISING:
+            self._begins = True
+            self.schedule(0)
+
 
 GUARD_TIME: Final = 0x100C
 LIFE_TIME_FACTOR: Final = 0x100D
@@ -55,7 +99,7 @@ class NodeGuarding(Service):
         self._toggle = 0
 
     def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Hear requests in every state but Initialising."""
+        """Listen to requests in every state but Initialising."""
         if state in ALWAYS and self._guard_time is not None:
             yield ERROR_CONTROL_COB_ID + self.node.node_id, self._receive
 

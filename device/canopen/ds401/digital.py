@@ -1,0 +1,230 @@
+"""Digital inputs and outputs: bits of many lines, shown by objects of several widths (CiA 401)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.ds401.families import (
+    ERROR_MODE_OUTPUT,
+    ERROR_VALUE_OUTPUT,
+    FILTER_INPUT,
+    FILTER_MASK_OUTPUT,
+    INTERRUPT_ANY_CHANGE,
+    INTERRUPT_HIGH_TO_LOW,
+    INTERRUPT_LOW_TO_HIGH,
+    POLARITY_INPUT,
+    POLARITY_OUTPUT,
+    READ_INPUT,
+    SINGLE_BANK_LINES,
+    SINGLE_BANKS,
+    WRITE_OUTPUT,
+    DigitalObjects,
+    elements,
+)
+from tickrig.wire.instant import NEVER
+
+
+class View(NamedTuple):
+    """An element of an object and the lines that it shows.
+
+    Attributes:
+        entry: the element.
+        lines: its lines, as bits among all lines.
+        shift: number of lines before its first one.
+    """
+
+    entry: Entry
+    lines: int
+    shift: int
+
+    def into(self, bits: int) -> int:
+        """Return the bits with those of the element in their place."""
+        return bits & ~self.lines | self.entry.number << self.shift & self.lines
+
+    def out_of(self, bits: int) -> bytes:
+        """Return what the element holds if these are the bits."""
+        return ((bits & self.lines) >> self.shift).to_bytes(self.entry.size, "little")
+
+
+class Bits:
+    """What one family of objects says of all lines; line 1 is the lowest bit.
+
+    If objects of several widths name a line, a change of one changes the others.
+    Where their power-on values differ, the object of the highest index counts.
+
+    Args:
+        dictionary: the objects of the device.
+        family: which of them.
+        default: 0 or -1, for lines that no object names.
+
+    Attributes:
+        value: the bits.
+        changed: called with the element that the bus has changed.
+    """
+
+    def __init__(self, dictionary: Dictionary, family: DigitalObjects, default: int = 0) -> None:
+        self.views = sorted(_views(dictionary, family), key=lambda view: view.entry.key)
+        self.value = default
+        self.changed: Callable[[View], None] | None = None
+        for view in self.views:
+            self.value = view.into(self.value)
+        self.assign(self.value)
+        for view in self.views:
+            view.entry.watch(self._follow)
+
+    @property
+    def lines(self) -> int:
+        """How many lines there are, up to the last one that an object names."""
+        return max((view.lines.bit_length() for view in self.views), default=0)
+
+    def assign(self, value: int) -> None:
+        """Change the bits from the inside; all objects follow."""
+        self.value = value
+        for view in self.views:
+            view.entry.assign(view.out_of(value))
+
+    def entries(self, lines: int) -> list[Entry]:
+        """Return the elements that show one of these lines."""
+        return [view.entry for view in self.views if view.lines & lines]
+
+    def _follow(self, entry: Entry) -> None:
+        view = next(view for view in self.views if view.entry is entry)
+        value = view.into(self.value)
+        if value != self.value:
+            self.assign(value)
+            if self.changed is not None:
+                self.changed(view)
+
+
+def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[View]:
+    for width, index in ((8, family.by_8), (16, family.by_16), (32, family.by_32)):
+        for sub, entry in elements(dictionary, index):
+            yield _view(entry, width, (sub - 1) * width)
+    for bank in range(SINGLE_BANKS):
+        for sub, entry in elements(dictionary, family.single + bank):
+            yield _view(entry, 1, bank * SINGLE_BANK_LINES + sub - 1)
+
+
+def _view(entry: Entry, width: int, shift: int) -> View:
+    bits = min(width, 8 * entry.size)
+    return View(entry, (1 << bits) - 1 << shift, shift)
+
+
+FILTER_US: Final = 10_000
+"""How long a filtered line must be stable; the profile leaves it to the device."""
+
+
+class DigitalInputs:
+    """All digital inputs of a module; line 1 is the lowest bit.
+
+    Attributes:
+        value: what the bus reads.
+        lines: how many there are.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self.value = Bits(dictionary, READ_INPUT)
+        self._polarity = Bits(dictionary, POLARITY_INPUT)
+        self._filter = Bits(dictionary, FILTER_INPUT)
+        self._any = Bits(dictionary, INTERRUPT_ANY_CHANGE, -1)
+        self._rising = Bits(dictionary, INTERRUPT_LOW_TO_HIGH)
+        self._falling = Bits(dictionary, INTERRUPT_HIGH_TO_LOW)
+        self.lines = self.value.lines
+        self._all = (1 << self.lines) - 1
+        self._level = self._passed = 0
+        self._waits: dict[int, int] = {}
+
+    @property
+    def due_us(self) -> int:
+        """When the filter lets the next line through."""
+        return min(self._waits.values(), default=NEVER)
+
+    def settings(self) -> list[Entry]:
+        """Return the objects that change what is read."""
+        return [view.entry for bits in (self._polarity, self._filter) for view in bits.views]
+
+    def power_on(self, level: int) -> None:
+        """Take the lines as they are."""
+        self._level = self._passed = level
+        self._waits.clear()
+
+    def update(self, level: int, now_us: int) -> list[Entry]:
+        """Read the lines; return the objects whose change is an interrupt."""
+        self._pass(level, now_us)
+        before = self.value.value
+        value = (self._passed ^ self._polarity.value) & self._all
+        self.value.assign(value)
+        rising, falling = value & ~before, before & ~value
+        events = (rising | falling) & self._any.value
+        events |= rising & self._rising.value | falling & self._falling.value
+        return self.value.entries(events)
+
+    def _pass(self, level: int, now_us: int) -> None:
+        """Let unfiltered lines through at once, filtered ones when they have been stable."""
+        changed, self._level = level ^ self._level, level
+        differing = level ^ self._passed
+        for line in _ones(changed & differing):
+            self._waits[line] = now_us + FILTER_US
+        held = differing & self._filter.value
+        self._waits = {
+            line: due_us for line, due_us in self._waits.items() if line & held and due_us > now_us
+        }
+        self._passed = level ^ sum(self._waits)
+
+
+def _ones(bits: int) -> Iterator[int]:
+    """Give the bits that are set, each as a number of its own."""
+    while bits:
+        lowest = bits & -bits
+        yield lowest
+        bits ^= lowest
+
+
+class DigitalOutputs:
+    """All digital outputs of a module; line 1 is the lowest bit.
+
+    The filter mask holds lines as they are.
+
+    Attributes:
+        value: what the bus writes.
+        lines: how many there are.
+        level: the physical lines.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self.value = Bits(dictionary, WRITE_OUTPUT)
+        self._polarity = Bits(dictionary, POLARITY_OUTPUT)
+        self._error_mode = Bits(dictionary, ERROR_MODE_OUTPUT, -1)
+        self._error_value = Bits(dictionary, ERROR_VALUE_OUTPUT)
+        self._mask = Bits(dictionary, FILTER_MASK_OUTPUT, -1)
+        self.lines = self.value.lines
+        self._all = (1 << self.lines) - 1
+        self.level = self._failed = 0
+        self.value.changed = self._written
+
+    def objects(self) -> list[Entry]:
+        """Return the objects that change what is put out."""
+        families = (self.value, self._polarity, self._error_mode, self._error_value, self._mask)
+        return [view.entry for bits in families for view in bits.views]
+
+    def power_on(self) -> None:
+        """Begin with all lines low."""
+        self.level = 0
+
+    def fail(self, *, failed: bool) -> None:
+        """Put error values out, or what was written."""
+        self._failed = self._all if failed else 0
+
+    def update(self) -> None:
+        """Put out."""
+        wrong = self._failed & self._error_mode.value
+        value = self.value.value & ~wrong | self._error_value.value & wrong
+        value ^= self._polarity.value
+        mask = self._mask.value
+        self.level = (self.level & ~mask | value & mask) & self._all
+
+    def _written(self, view: View) -> None:
+        self._failed &= ~view.lines
