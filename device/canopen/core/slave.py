@@ -93,7 +93,7 @@ class CanopenSlave(Copyable):
         self.admits: Callable[[NmtCommand], bool] = _admits
         self.entered: Callable[[NmtState, NmtState], None] | None = None
         self.time_of_day: TimeOfDay | None = None
-        self.silent_until_us: int
+        self.silent_until_us = 0
         self._powered = False
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler]

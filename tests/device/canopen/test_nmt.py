@@ -131,3 +131,7 @@ def test_a_power_cycle_boots_again() -> None:
 def test_an_impossible_node_id_is_refused(node_id: int) -> None:
     with pytest.raises(ValueError, match=r"is not in 1\.\.127"):
         make_slave(Dictionary([]), node_id)
+
+
+def test_a_slave_that_was_never_ticked_is_not_silent() -> None:
+    assert make_slave(Dictionary([]), 5).silent_until_us == 0
