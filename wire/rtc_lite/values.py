@@ -13,11 +13,10 @@ number follows from the size.
 from __future__ import annotations
 
 import struct
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar, cast
 
 from tickrig.wire.errors import FieldError
 
@@ -39,38 +38,50 @@ def encode_name(name: str) -> bytes:
 
 T = TypeVar("T")
 
+TEXT: Final = "latin-1"
+"""In place of a format of `struct`: characters."""
+
 
 @dataclass(frozen=True, slots=True)
-class LitePortType(ABC, Generic[T]):
+class LitePortType(Generic[T]):
     """A data type of a port.
 
     Attributes:
         code: its letter; upper case for a sequence.
         name: the type of the port at the proxy, as `TimedLong`.
         size: bytes of a value, of an element in a sequence.
+        format: of an element, as `struct` has it; `TEXT` for characters.
+        initial: the value before any was written.
     """
 
     code: str
     name: str
     size: int
+    format: str
+    initial: T
 
     @property
     def sequence(self) -> bool:
         """Whether a value is any number of elements."""
         return self.code.isupper()
 
-    @property
-    @abstractmethod
-    def initial(self) -> T:
-        """The value before any was written."""
-
-    @abstractmethod
     def encode(self, value: T) -> bytes:
         """Write a value; FieldError if the type does not have it."""
+        if self.format == TEXT:
+            return self._encode_text(cast(str, value))
+        values: Any = value if self.sequence else (value,)
+        try:
+            return struct.pack(f"<{len(values)}{self.format}", *values)
+        except (struct.error, OverflowError) as error:
+            raise FieldError(f"{self.name} cannot be {values}: {error}") from None
 
-    @abstractmethod
     def decode(self, data: bytes) -> T:
         """Read a value; FieldError if the bytes are not of this type."""
+        self.check_size(data)
+        if self.format == TEXT:
+            return cast(T, data.decode("latin-1"))
+        values = struct.unpack(f"<{len(data) // self.size}{self.format}", data)
+        return cast(T, values if self.sequence else values[0])
 
     def check_size(self, data: bytes) -> None:
         """Raise FieldError unless so many bytes can be a value."""
@@ -79,50 +90,7 @@ class LitePortType(ABC, Generic[T]):
             unit = "bytes each" if self.sequence else "bytes"
             raise FieldError(f"{self.name} of {len(data)} bytes: it has {self.size} {unit}")
 
-
-@dataclass(frozen=True, slots=True)
-class _Scalar(LitePortType[T]):
-    format: str
-    zero: T
-
-    @property
-    def initial(self) -> T:
-        return self.zero
-
-    def encode(self, value: T) -> bytes:
-        return _pack(self, self.format, (value,))
-
-    def decode(self, data: bytes) -> T:
-        self.check_size(data)
-        value: T = struct.unpack(f"<{self.format}", data)[0]
-        return value
-
-
-@dataclass(frozen=True, slots=True)
-class _Sequence(LitePortType[tuple[T, ...]]):
-    format: str
-
-    @property
-    def initial(self) -> tuple[T, ...]:
-        return ()
-
-    def encode(self, value: tuple[T, ...]) -> bytes:
-        return _pack(self, f"{len(value)}{self.format}", value)
-
-    def decode(self, data: bytes) -> tuple[T, ...]:
-        self.check_size(data)
-        return struct.unpack(f"<{len(data) // self.size}{self.format}", data)
-
-
-@dataclass(frozen=True, slots=True)
-class _Text(LitePortType[str]):
-    """Characters of Latin-1: one, or any number."""
-
-    @property
-    def initial(self) -> str:
-        return "" if self.sequence else "\0"
-
-    def encode(self, value: str) -> bytes:
+    def _encode_text(self, value: str) -> bytes:
         try:
             data = value.encode("latin-1")
         except UnicodeEncodeError:
@@ -130,32 +98,23 @@ class _Text(LitePortType[str]):
         self.check_size(data)
         return data
 
-    def decode(self, data: bytes) -> str:
-        self.check_size(data)
-        return data.decode("latin-1")
 
-
-def _pack(port_type: LitePortType[Any], layout: str, values: tuple[object, ...]) -> bytes:
-    try:
-        return struct.pack(f"<{layout}", *values)
-    except (struct.error, OverflowError) as error:
-        raise FieldError(f"{port_type.name} cannot be {values}: {error}") from None
-
-
-BOOLEAN: Final = _Scalar("b", "TimedBoolean", 1, "?", zero=False)
-CHAR: Final = _Text("c", "TimedChar", 1)
-OCTET: Final = _Scalar("o", "TimedOctet", 1, "B", 0)
-SHORT: Final = _Scalar("s", "TimedShort", 2, "h", 0)
-LONG: Final = _Scalar("l", "TimedLong", 4, "i", 0)
-FLOAT: Final = _Scalar("f", "TimedFloat", 4, "f", 0.0)
-DOUBLE: Final = _Scalar("d", "TimedDouble", 4, "f", 0.0)
-BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = _Sequence("B", "TimedBooleanSeq", 1, "?")
-CHAR_SEQ: Final = _Text("C", "TimedCharSeq", 1)
-OCTET_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("O", "TimedOctetSeq", 1, "B")
-SHORT_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("S", "TimedShortSeq", 2, "h")
-LONG_SEQ: Final[LitePortType[tuple[int, ...]]] = _Sequence("L", "TimedLongSeq", 4, "i")
-FLOAT_SEQ: Final[LitePortType[tuple[float, ...]]] = _Sequence("F", "TimedFloatSeq", 4, "f")
-DOUBLE_SEQ: Final[LitePortType[tuple[float, ...]]] = _Sequence("D", "TimedDoubleSeq", 4, "f")
+BOOLEAN: Final = LitePortType("b", "TimedBoolean", 1, "?", initial=False)
+CHAR: Final = LitePortType("c", "TimedChar", 1, TEXT, "\0")
+OCTET: Final = LitePortType("o", "TimedOctet", 1, "B", 0)
+SHORT: Final = LitePortType("s", "TimedShort", 2, "h", 0)
+LONG: Final = LitePortType("l", "TimedLong", 4, "i", 0)
+FLOAT: Final = LitePortType("f", "TimedFloat", 4, "f", 0.0)
+DOUBLE: Final = LitePortType("d", "TimedDouble", 4, "f", 0.0)
+BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = LitePortType(
+    "B", "TimedBooleanSeq", 1, "?", ()
+)
+CHAR_SEQ: Final = LitePortType("C", "TimedCharSeq", 1, TEXT, "")
+OCTET_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("O", "TimedOctetSeq", 1, "B", ())
+SHORT_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("S", "TimedShortSeq", 2, "h", ())
+LONG_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("L", "TimedLongSeq", 4, "i", ())
+FLOAT_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType("F", "TimedFloatSeq", 4, "f", ())
+DOUBLE_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType("D", "TimedDoubleSeq", 4, "f", ())
 
 PORT_TYPES: Final[Mapping[str, LitePortType[Any]]] = MappingProxyType(
     {

@@ -11,7 +11,6 @@ from tickrig.wire.rtc_canopen.port_types import (
     INTEGER,
     PORT_TYPES,
     CanopenPortType,
-    Scalar,
     integer,
 )
 from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
@@ -120,7 +119,9 @@ def _port(number: int, table: Table, word_bits: int) -> CanopenPortProfile:
 
 
 def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:
-    element: Scalar[Any] | None = integer(word_bits) if name == INTEGER else PORT_TYPES.get(name)
+    element: CanopenPortType[Any] | None = (
+        integer(word_bits) if name == INTEGER else PORT_TYPES.get(name)
+    )
     if element is None:
         raise ProfileError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")
     return element if length == 1 else element.sequence(length)

@@ -34,7 +34,7 @@ class PdoFieldType:
         bits: of one object in a PDO.
     """
 
-    row: table_4.Scalar[Any]
+    row: table_4.CanopenPortType[Any]
     one: type[Struct]
     many: type[Struct] | None
     bits: int

@@ -15,7 +15,6 @@ EXAMPLES = ROOT / "examples"
 
 NODE = """
 from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.component import ERROR, Result
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
 from tickrig.wire.rtc_lite.values import CHAR_SEQ, LONG, SHORT_SEQ
 
