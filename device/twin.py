@@ -46,19 +46,19 @@ class Copyable:
     original untouched.
 
     Attributes:
-        new_in_twins: attributes, and what they are in a twin whatever the original has:
+        _new_in_twins: attributes, and what they are in a twin whatever the original has:
             callbacks of somebody outside.
     """
 
     __slots__ = ()
-    new_in_twins: ClassVar[Mapping[str, object]] = {}
+    _new_in_twins: ClassVar[Mapping[str, object]] = {}
 
     def __getstate__(self) -> object:
         """Return the state that a twin begins with."""
         state = super().__getstate__()
         attributes = state[1] if isinstance(state, tuple) else state
-        if self.new_in_twins and isinstance(attributes, dict):
-            attributes = {**attributes, **self.new_in_twins}
+        if self._new_in_twins and isinstance(attributes, dict):
+            attributes = {**attributes, **self._new_in_twins}
             return (state[0], attributes) if isinstance(state, tuple) else attributes
         return state
 

@@ -49,6 +49,7 @@ class Rh3Base(Copyable):
         self.sides = driver.sides
         self.slave = ModbusSlave(driver.registers, driver.written, self.parameters.address)
         self._on, self._moving, self._unseen, self._now_us = True, False, True, 0
+        self._restarted = False
         self._seen = self._look()
 
     @property
@@ -59,7 +60,7 @@ class Rh3Base(Copyable):
     @property
     def due_us(self) -> int:
         """When anything would happen without input."""
-        if self.inputs.changed:
+        if self.inputs.changed or self._restarted:
             return 0
         due_us = self.slave.due_us
         if self._unseen:
@@ -78,9 +79,7 @@ class Rh3Base(Copyable):
 
     def reset(self) -> None:
         """Begin as after power-up, where it stands."""
-        self._driver.power_up()
-        self.slave.reset()
-        self._on = self.inputs.changed = True
+        self._restarted = True
 
     def read(self, name: str, /) -> float:
         """Look at an output, as it was left by the latest tick.
@@ -118,6 +117,10 @@ class Rh3Base(Copyable):
             self._seen, self._unseen = self._look(), self._moving
         return sent
 
+    def _power_up(self) -> None:
+        self._driver.power_up()
+        self.slave.reset()
+
     def _look(self) -> Look:
         ground, (left, right) = self.ground, self.sides
         return Look(
@@ -136,6 +139,10 @@ class Rh3Base(Copyable):
         while self._moving and driver.now_us < before_us:
             driver.now_us += TICK_US
             step()
+        if self._restarted:
+            self._restarted, driver.now_us = False, max(0, before_us)
+            self._power_up()
+            self._on = self.inputs.changed = True
         self._now_us = driver.now_us = now_us
 
     def _step(self) -> None:
@@ -158,8 +165,7 @@ class Rh3Base(Copyable):
         on = not self.inputs["power_cut"]
         if on != self._on:
             self._on = on
-            self._driver.power_up()
-            self.slave.reset()
+            self._power_up()
         self._driver.find_faults()
 
 

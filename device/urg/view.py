@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import tau
+from math import isinf, tau
 from typing import Final
 
 from tickrig.device.body.pose import Pose
@@ -70,7 +70,10 @@ class View:
         ways_m = self.world.distances_m(pose.x_m, pose.y_m, angles)
         if self.parameters.noise:
             pairs = zip(steps, ways_m, strict=True)
-            ways_m = [way_m + self._error_mm(step, way_m) / 1_000 for step, way_m in pairs]
+            ways_m = [
+                way_m if isinf(way_m) else way_m + self._error_mm(step, way_m) / 1_000
+                for step, way_m in pairs
+            ]
         near_m, far_m = kind.nearest_mm / 1_000, kind.farthest_mm / 1_000
         return [
             NoDistance.NOT_MEASURABLE

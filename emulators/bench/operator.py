@@ -80,7 +80,7 @@ class Operator(Copyable):
         note: told of each change, as `power_button=1`.
     """
 
-    new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
 
     def __init__(
         self,

@@ -92,7 +92,7 @@ class CanEnd(Copyable):
         *("segment", "stamps", "unfiltered", "wake", "wire"),
     )
 
-    new_in_twins = _NEW_IN_TWINS
+    _new_in_twins = _NEW_IN_TWINS
 
     def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
         self.wire, self.number, self._accepts = wire, number, accepts

@@ -32,7 +32,7 @@ Config = Mapping[str, str | int | float | None]
 
 _HEADER: Final = re.compile(r"# tickrig-trace v([0-9]+) ([\w-]+) (\{.*\})")
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
-_INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2})?)", re.ASCII)
+_INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2,3})?)", re.ASCII)
 
 
 class TraceError(ValueError):

@@ -91,7 +91,7 @@ def test_nobody_listens_to_a_twin() -> None:
 
 
 class Heard(Copyable):
-    new_in_twins: ClassVar[Mapping[str, object]] = {"hear": None}
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"hear": None}
 
     def __init__(self) -> None:
         self.hear: object = [].append

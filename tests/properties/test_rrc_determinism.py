@@ -6,75 +6,24 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.device.rrc.terminals import INPUTS
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rrc import commands as cmd
 
 ROOT = Path(__file__).parents[2]
-LINES = [
-    *(command.encode() for command in (cmd.Limit(60, 70, 90, 40, 80), cmd.Output(30, -20))),
-    *(cmd.Joystick(reverse_mode=mode).encode() for mode in range(4)),
-    *(cmd.Watchdog(ticks).encode() for ticks in (0, 3, 30)),
-    *(cmd.Status(on).encode() for on in (0, 1)),
-    *(cmd.Beep((on, 3, 0, 2, 7, 0, 0, 0, 1, 1)).encode() for on in (0, 5)),
-    *(b"stablemode1\n", b"stablemode00\n", b"device\n", b"hello\n", b"\n", b"x" * 90, b"\r\n"),
-]
-
 Act = tuple[int, bytes | tuple[str, int]]
 """How long to wait in microseconds, then bytes to send or an input to set."""
-
-inputs = st.sampled_from([item for item in INPUTS if item.name != "rrc_power"]).flatmap(
-    lambda item: st.tuples(st.just(item.name), st.integers(int(item.low), int(min(item.high, 100))))
-)
-waits = st.sampled_from([0, 1, 3_000, 10_000, 25_000, 100_000, 310_000, 1_500_000])
-acts = st.lists(st.tuples(waits, st.sampled_from(LINES) | inputs), max_size=40)
 
 
 def powered_on() -> list[Act]:
     return [(20_000, ("power_button", 1)), (20_000, ("power_button", 0)), (350_000, b"statusA1\n")]
-
-
-def play(
-    session: list[Act], *, dense: bool = False, send: Callable[[bytes], list[bytes]] | None = None
-) -> list[tuple[object, ...]]:
-    """Play a session on a rig and note everything that can be seen from outside."""
-    line, rrc = SerialLine(), Rrc()
-    rig, log = Rig(Station(rrc, line.a), dense=dense), list[tuple[object, ...]]()
-    for wait_us, act in [*session, (2_000_000, b"")]:
-        rig.run_for(wait_us)
-        log.append((rig.now_us, line.b.poll(rig.now_us), *map(rrc.read, rrc.outputs)))
-        if isinstance(act, bytes):
-            for chunk in send(act) if send else [act]:
-                line.b.send(rig.now_us, chunk)
-        else:
-            rrc.inputs.set(*act)
-    return log
-
-
-@settings(deadline=None, max_examples=150)
-@example(False, [(0, ("speed_up_button", 1)), (10_000, ("power_button", 1))])
-@given(st.booleans(), acts)
-def test_dense_and_sparse_runs_are_the_same(begin: bool, session: list[Act]) -> None:
-    session = powered_on() + session if begin else session
-    assert play(session) == play(session, dense=True)
-
-
-@settings(deadline=None, max_examples=50)
-@given(acts, st.integers(1, 7))
-def test_chunking_makes_no_difference(session: list[Act], size: int) -> None:
-    def cut(data: bytes) -> list[bytes]:
-        return [data[at : at + size] for at in range(0, len(data), size)]
-
-    assert play(powered_on() + session, send=cut) == play(powered_on() + session)
 
 
 @settings(deadline=None)

@@ -19,7 +19,6 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.values import LONG
 
 ROOT = Path(__file__).parents[2]
@@ -33,49 +32,9 @@ FRAMES = [
     *(checked("AR"), checked("AB"), checked("AC"), checked("CZ"), checked("BW", b"\x2c\x01")),
     *(checked("QG", b"\x03out"), b"\nZz\xd4", b"\nAA\x83", WRITE[:5], WRITE[5:], b"\n", b"x" * 70),
 ]
-CONFIGS = [
-    LiteConfig(),
-    LiteConfig(context=LiteContextType.TIMER, rate_hz=300),
-    LiteConfig(context=LiteContextType.TIMER, rate_hz=7),
-    LiteConfig(Framing.RTNO),
-]
 
-Act = tuple[int, bytes | tuple[str, int]]
-"""How long to wait in microseconds, then bytes to send or an input to set."""
-
-input_changes = st.sampled_from(
-    [
-        *(("callback_ms", 0), ("callback_ms", 7), ("callback_ms", 150)),
-        *(("slow_answer", 0), ("slow_answer", 1), ("power_cut", 0), ("power_cut", 1)),
-    ]
-)
 waits = st.sampled_from([0, 1, 300, 1_000, 2_500, 10_000, 19_900, 20_100, 99_000, 101_000, 700_000])
-acts = st.lists(st.tuples(waits, st.sampled_from(FRAMES) | input_changes), max_size=40)
 START = DIALOGUE[1:3]
-AFTERWARDS_US = 450_000
-"""The longest dead time, three callbacks of 150 ms, has passed, and each time-out."""
-begun: list[Act] = [(5_000, frame) for frame in START]
-
-
-def play(session: list[Act], config: LiteConfig, *, dense: bool = False) -> list[object]:
-    """Play a session on a rig and note everything that can be seen from outside."""
-    line, node = SerialLine(57_600), RtcLiteNode(LiteEcho, config)
-    rig, log = Rig(Station(node, line.a), dense=dense), list[object]()
-    for wait_us, act in [*session, (AFTERWARDS_US, b"")]:
-        rig.run_for(wait_us)
-        log.append((rig.now_us, line.b.poll(rig.now_us), *map(node.read, node.outputs)))
-        if isinstance(act, bytes):
-            line.b.send(rig.now_us, act)
-        else:
-            node.inputs.set(*act)
-    return log
-
-
-@settings(max_examples=60)
-@given(acts, st.sampled_from(CONFIGS))
-def test_dense_and_sparse_runs_are_the_same(session: list[Act], config: LiteConfig) -> None:
-    session = begun + session
-    assert play(session, config) == play(session, config, dense=True)
 
 
 @settings(max_examples=100)

@@ -2,4 +2,15 @@
 
 from tickrig._lazy import lazy
 
-__all__, __getattr__, __dir__ = lazy(__name__, {})
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from tickrig.emulators.testing import strategies as strategies
+    from tickrig.emulators.testing.check_device import check_device as check_device
+else:
+    __all__, __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "tickrig.emulators.testing": ("strategies",),
+            "tickrig.emulators.testing.check_device": ("check_device",),
+        },
+    )

@@ -193,3 +193,9 @@ def test_nobody_can_tell_a_recorded_device(tmp_path: Path) -> None:
     assert traced.inputs is lamp.inputs
     assert traced.outputs is lamp.outputs
     assert traced.read("state") == "Lit"
+
+
+@pytest.mark.parametrize("value", [5e-324, 1e-07, -2.5e-115, 1e22])
+def test_any_fraction_that_is_recorded_is_read(value: float) -> None:
+    line = Record(1_000, Mark.PHYSICAL, text=f"x_m={value}").encode()
+    assert parse_record(line, 2).change == ("x_m", value)

@@ -1,0 +1,95 @@
+"""Hypothesis strategies of what a device may meet: bytes, frames, waits, changes of its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hypothesis import strategies as st
+
+from tickrig.device.core import Device
+from tickrig.device.physical import InputSignal, SignalType
+from tickrig.wire.can import CanFrame, Frames
+
+Act = tuple[int, str, Any]
+"""How long to wait before it in microseconds; `send`, `set` or `reset`; and what is sent or set."""
+
+Session = Sequence[Act]
+
+
+def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrategy[bytes]:
+    """Draw what a host writes at once to a line.
+
+    Args:
+        lines: what the device understands; half of what is drawn are these, the rest is noise.
+        max_bytes: the longest noise.
+    """
+    noise = st.binary(max_size=max_bytes)
+    return st.sampled_from(lines) | noise if lines else noise
+
+
+def frames(
+    known: Sequence[str] = (), can_ids: Sequence[int] = (), most: int = 4
+) -> st.SearchStrategy[Frames]:
+    """Draw what a host sends at once on a CAN bus: data frames, and remote ones, also with 29 bits.
+
+    Args:
+        known: frames that the device understands, in candump's notation, as `601#40...`.
+        can_ids: identifiers that it listens to; others are drawn too.
+        most: how many frames at once.
+    """
+    noise_ids = st.integers(0, 0x7FF)
+    ids = st.sampled_from(can_ids) | noise_ids if can_ids else noise_ids
+    noise = st.builds(_data, ids, st.binary(max_size=8)) | st.builds(
+        _remote, ids, st.booleans(), st.integers(0, 8)
+    )
+    understood = [CanFrame.parse(text) for text in known]
+    one = st.sampled_from(understood) | noise if understood else noise
+    return st.lists(one, max_size=most).map(tuple)
+
+
+def _data(can_id: int, data: bytes) -> CanFrame:
+    return CanFrame(can_id, data)
+
+
+def _remote(can_id: int, extended: bool, length: int) -> CanFrame:
+    return CanFrame(can_id, remote=True, extended=extended, remote_length=length)
+
+
+def waits(tick_us: int) -> st.SearchStrategy[int]:
+    """Draw how long nothing is done, in microseconds, around ticks and up to seconds."""
+    near = [0, 1, tick_us // 2, tick_us - 1, tick_us, tick_us + 1, 3 * tick_us, 10 * tick_us]
+    return st.sampled_from([*near, 20_000, 100_000, 310_000, 1_500_000])
+
+
+def values(item: InputSignal) -> st.SearchStrategy[float]:
+    """Draw values of a physical input: any in its range, its ends and 0 or 1 more often."""
+    low, high = item.low, item.high
+    ends = [value for value in (low, high, 0, 1) if low <= value <= high]
+    if item.real:
+        return st.sampled_from(ends) | st.floats(low, high, allow_nan=False)
+    return st.sampled_from([int(end) for end in ends]) | st.integers(int(low), int(high))
+
+
+def input_changes(device: Device[Any]) -> st.SearchStrategy[tuple[str, float]]:
+    """Draw what the world does to a device with `inputs`; nothing can be drawn without them."""
+    table = device.inputs.table.values() if hasattr(device, "inputs") else ()
+    items = [item for item in table if item.type is not SignalType.TEXT]
+    return st.one_of([st.tuples(st.just(item.name), values(item)) for item in items])
+
+
+def sessions(
+    device: Device[Any], traffic: st.SearchStrategy[Any], most: int = 15
+) -> st.SearchStrategy[Session]:
+    """Draw what a host and the world do to a device, one after the other.
+
+    Args:
+        device: one of its kind; it is looked at only.
+        traffic: what a host sends at once, see `chunks` and `frames`.
+        most: how many acts.
+    """
+    wait = waits(device.tick_us)
+    sent = st.tuples(wait, st.just("send"), traffic)
+    changed = st.tuples(wait, st.just("set"), input_changes(device))
+    was_reset = st.tuples(wait, st.just("reset"), st.none())
+    return st.lists(st.one_of(sent, sent, changed, was_reset), max_size=most)
