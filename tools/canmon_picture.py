@@ -13,8 +13,7 @@ from typing import Final
 
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.tabs import make_panels
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import open_session
+from tickrig.host.canmon.tui.tasks.session import Model, open_session
 from tickrig.host.cli.can_options import BusOptions
 
 SIZE: Final = (110, 26)

@@ -21,13 +21,12 @@ from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.check.column_check import check_columns
-from tickrig.host.monitor.check.parse_rules import parse_rules
+from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.columns.column_traffic import snapshot_of
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import Traffic
-from tickrig.host.monitor.views.top_model import TopModel
-from tickrig.host.monitor.views.top_table import View, render
+from tickrig.host.monitor.views.top_model import TopModel, View, render
 from tickrig.wire.can import CanFrame
 
 FRAMES = 1_000_000

@@ -11,8 +11,7 @@ from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session, open_session
+from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds_objects

@@ -1,21 +1,69 @@
-"""Taking what comes from a source, with or without a screen."""
+"""Taking what comes from a source, with or without a screen, and how that ends."""
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Final, NoReturn, TypeVar
 
+import click
+
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.ending import until_interrupted
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
+from tickrig.host.cli.start import TERMINATING
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
+
+
+class FramesLost(click.ClickException):
+    """One line on standard error, and exit status 4."""
+
+    exit_code = 4
+
+
+def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) -> None:
+    """Say what was lost or no frame, and what else there is to say, then close the source.
+
+    Raises:
+        SourceFailed: it ended before its time.
+        FramesLost: frames were lost or could not be taken, and the caller is strict.
+    """
+    source.close()
+    for word in (*source.messages(), *more):
+        click.echo(word, err=True)
+    if source.failed:
+        raise SourceFailed(source.failed)
+    missing = [f"{source.lost} frames were lost"] if source.lost else []
+    missing += [f"{source.unread} lines or frames passed over"] if source.unread else []
+    if strict and missing:
+        raise FramesLost(", ".join(missing))
+
+
+@contextmanager
+def until_interrupted() -> Iterator[None]:
+    """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
+
+    def received(number: int, frame: FrameType | None) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = {number: signal.signal(number, received) for number in TERMINATING}
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
 
 Item = TypeVar("Item", bound="AnyRecord")
 

@@ -12,11 +12,10 @@ from typing import Final
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec
-from tickrig.host.monitor.frames.candump_filter import flagged_id
+from tickrig.host.monitor.frames.ident import flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_lines import LogLines
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, read_log
 from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
+from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import Tally
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.host.monitor.frames.ident import CandumpFilter
 from tickrig.host.monitor.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
 
 INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}

@@ -14,8 +14,14 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.ending import report, until_interrupted
-from tickrig.host.canmon.output.listening import bit_rate_of, listen, patience_us, span_option
+from tickrig.host.canmon.output.listening import (
+    bit_rate_of,
+    listen,
+    patience_us,
+    report,
+    span_option,
+    until_interrupted,
+)
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
@@ -25,9 +31,15 @@ from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.junit import junit
-from tickrig.host.monitor.check.parse_rules import SWITCHES, VALUES, RuleValues, joined, parse_rules
 from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.rules import (
+    SWITCHES,
+    VALUES,
+    Rules,
+    RuleValues,
+    joined,
+    parse_rules,
+)
 from tickrig.host.monitor.frames.record import Record
 
 _TEXTS: Final = {

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
+from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import (

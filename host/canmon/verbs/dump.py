@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
+from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
 from tickrig.host.canmon.sources.opening import open_any

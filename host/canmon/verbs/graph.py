@@ -14,9 +14,8 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.output.ending import report, until_interrupted
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.output.listening import follow, span_option
+from tickrig.host.canmon.output.listening import follow, report, span_option, until_interrupted
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log

@@ -23,8 +23,7 @@ from tickrig.host.monitor.logs.log_file import (
     LogFormatError,
     log_format,
 )
-from tickrig.host.monitor.logs.log_lines import LogLines
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, read_log
 from tickrig.host.monitor.logs.tally import Tally
 
 HEAD_FRAMES: Final = 1_000

@@ -11,8 +11,7 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.ending import report
-from tickrig.host.canmon.output.listening import follow, span_option
+from tickrig.host.canmon.output.listening import follow, report, span_option
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.verbs.source_command import source_command

@@ -11,7 +11,7 @@ import click
 
 from tickrig.host.canmon.errors import SourceFailed, until_unread
 from tickrig.host.canmon.output.clocks import Pace
-from tickrig.host.canmon.output.ending import until_interrupted
+from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.sources.opening import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.refused import Refused

@@ -8,8 +8,7 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.ending import report
-from tickrig.host.canmon.output.listening import bit_rate_of, follow, span_option
+from tickrig.host.canmon.output.listening import bit_rate_of, follow, report, span_option
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.source_command import source_command

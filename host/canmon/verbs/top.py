@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.ending import report
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
-from tickrig.host.canmon.output.listening import bit_rate_of, follow, span_option
+from tickrig.host.canmon.output.listening import bit_rate_of, follow, report, span_option
 from tickrig.host.canmon.sources.opening import open_any
 from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (

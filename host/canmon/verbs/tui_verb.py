@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.monitor_setup import MonitorSetup
-from tickrig.host.canmon.output.ending import report
+from tickrig.host.canmon.output.listening import report
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     eds_paths,
@@ -84,8 +84,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
-    from tickrig.host.canmon.tui.tasks.model import Model  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.tui.tasks.session import open_session  # noqa: PLC0415
+    from tickrig.host.canmon.tui.tasks.session import Model, open_session  # noqa: PLC0415 - slow
 
     try:
         workspace = Workspace() if path is None else Workspace.read(path)

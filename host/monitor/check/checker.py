@@ -15,7 +15,7 @@ from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
 from tickrig.host.monitor.frames.ident import ERROR, ident_of
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.load import Load, Window
+from tickrig.host.monitor.traffic.traffic import Load, Window
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.can_error import ErrorFrame

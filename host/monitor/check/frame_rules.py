@@ -125,7 +125,7 @@ ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID 
 
 
 class NodesPresent(Rule):
-    """These nodes are heard."""
+    """These nodes are heard: each has sent anything on one of its default COB-IDs."""
 
     name = "nodes"
 

@@ -1,8 +1,9 @@
-"""All rules of a check, as values."""
+"""All rules of a check: as values, and as people write them on a command line or in TOML."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -21,6 +22,8 @@ from tickrig.host.monitor.check.time_rules import (
     MaxGap,
     MaxLoad,
 )
+from tickrig.host.monitor.frames.ident import ident_text, parse_ident
+from tickrig.host.text.values import parse_time_us
 
 NO_LOSS: Final = "no-loss"
 """The rule that no frame was lost and every line of a log is one."""
@@ -85,3 +88,138 @@ class Rules:
         if bit_rate is None:
             raise ValueError("a limit of the load needs the bit rate: give -b, as -b 500000")
         return MaxLoad(self.max_load, bit_rate)
+
+
+RuleValues = Mapping[str, object]
+"""Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
+
+LoadRule = Callable[[str], Callable[[], Rule]]
+
+SWITCHES: Final = ("no_emcy", "no_sdo_abort", "no_error_frames", "no_reboot", "no_loss")
+NUMBERS: Final = ("max_load", "bitrate")
+LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
+VALUES: Final = (*NUMBERS, *LISTS)
+
+_HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
+_MAX_NODE: Final = 127
+_MAX_IDENTS: Final = 1 << 16
+
+
+def _no_rule(name: str) -> Callable[[], Rule]:
+    raise ValueError(f"no rule {name!r}")
+
+
+def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
+    """Read rules.
+
+    Args:
+        words: the rules.
+        load_rule: returns what makes a rule of another package, by its name under `rule`.
+
+    Raises:
+        ValueError: one that is not known, or not like it must be.
+
+    >>> parse_rules({"no_emcy": True, "heartbeat": ["3=100ms±20%"]}).heartbeats
+    (HeartbeatTimes(node=3, low_us=80000, high_us=120000),)
+    """
+    known = (*SWITCHES, *VALUES)
+    for name in words:
+        if name not in known:
+            raise ValueError(f"rule {name!r} is none of {', '.join(known)}")
+    switches = {name: _switch(name, words[name]) for name in SWITCHES if name in words}
+    gaps = (text.partition("=") for text in _texts("max_gap", words))
+    idents = [ident for text in _lists("known", words) for ident in _idents(text)]
+    nodes = {node for text in _lists("nodes", words) for node in _nodes(text)}
+    return Rules(
+        **switches,
+        max_load=_percent(words.get("max_load")),
+        bit_rate=_bit_rate(words.get("bitrate")),
+        heartbeats=tuple(_heartbeat(text) for text in _texts("heartbeat", words)),
+        nodes=tuple(sorted(nodes)),
+        max_gaps=tuple((parse_ident(ident), _time_us(time)) for ident, _, time in gaps),
+        known=frozenset(idents) if "known" in words else None,
+        others=tuple(map(load_rule, _lists("rule", words))),
+    )
+
+
+def joined(first: RuleValues, second: RuleValues) -> RuleValues:
+    """Return the rules of both; a number of the second goes before one of the first.
+
+    >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
+    {'known': ['181', '182'], 'max_load': 60}
+    """
+    out = dict(first)
+    for name, value in second.items():
+        both = name in LISTS and name in first
+        out[name] = [*_texts(name, first), *_texts(name, second)] if both else value
+    return out
+
+
+def _switch(name: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} = {value!r} is not true or false")
+    return value
+
+
+def _percent(value: object) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
+        raise ValueError(f"max_load {value!r} is not 0 to 100 percent")
+    return value
+
+
+def _bit_rate(value: object) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or value <= 0:
+        raise ValueError(f"bitrate {value!r} is not a number of bits a second, as 500000")
+    return value
+
+
+def _texts(name: str, words: RuleValues) -> list[str]:
+    """Return what a rule is given as texts; a table is texts with `=`."""
+    value = words.get(name, ())
+    if isinstance(value, Mapping):
+        return [f"{key}={entry}" for key, entry in value.items()]
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [str(entry) for entry in value]
+    return [str(value)]
+
+
+def _lists(name: str, words: RuleValues) -> list[str]:
+    return [part.strip() for text in _texts(name, words) for part in text.split(",")]
+
+
+def _heartbeat(text: str) -> HeartbeatTimes:
+    match = _HEARTBEAT.fullmatch(text)
+    if match is None or not 1 <= int(match[1]) <= _MAX_NODE:
+        raise ValueError(f"heartbeat {text!r} is not like 3=100ms±20% or 3=100ms+-5ms")
+    period_us = _time_us(match[2])
+    if match[4] == "%":
+        off_us = int(period_us * float(match[3]) / 100)
+    else:
+        off_us = _time_us(match[3] + match[4])
+    return HeartbeatTimes(int(match[1]), max(0, period_us - off_us), period_us + off_us)
+
+
+def _time_us(text: str) -> int:
+    return parse_time_us(text.strip())
+
+
+def _nodes(text: str) -> range:
+    first, _, last = text.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal()):
+        raise ValueError(f"nodes {text!r} is not like 3 or 3-7")
+    nodes = range(int(first), int(last or first) + 1)
+    if not nodes or nodes[0] < 1 or nodes[-1] > _MAX_NODE:
+        raise ValueError(f"nodes {text!r}: node-IDs are 1 to {_MAX_NODE}")
+    return nodes
+
+
+def _idents(text: str) -> range:
+    first, _, last = text.partition("-")
+    idents = range(parse_ident(first), parse_ident(last or first) + 1)
+    if not 0 < len(idents) <= _MAX_IDENTS:
+        raise ValueError(f"known {text!r}: {ident_text(idents.start)} is not below the other end")
+    return idents

@@ -9,7 +9,7 @@ from tickrig.host.monitor.check.rule import FrameSelection, Rule
 from tickrig.host.monitor.frames.ident import ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.load import WINDOW_US, Window
+from tickrig.host.monitor.traffic.traffic import WINDOW_US, Window
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 
 

@@ -21,9 +21,8 @@ from tickrig.host.monitor.frames.ident import ERROR
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.controller import ErrorStatistics
 from tickrig.host.monitor.traffic.gaps import EXACT_US, SUB_BITS, Gaps
-from tickrig.host.monitor.traffic.load import WINDOW_US, Load, Window
 from tickrig.host.monitor.traffic.tally import BitRow, IdRow
-from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot
+from tickrig.host.monitor.traffic.traffic import WINDOW_US, BusRow, Load, Snapshot, Window
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

@@ -12,8 +12,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.monitor.frames.candump_filter import flagged_id
-from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE
+from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.tally import Tally

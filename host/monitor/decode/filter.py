@@ -45,7 +45,7 @@ from tickrig.host.monitor.decode.filter_terms import (
     signal_test,
     word_test,
 )
-from tickrig.host.monitor.frames.candump_filter import CandumpFilter
+from tickrig.host.monitor.frames.ident import CandumpFilter
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
 

@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.object_text import BITS
 from tickrig.host.monitor.decode.sdo.transfer import Outcome
-from tickrig.host.monitor.frames.candump_filter import CandumpFilter, flagged_id
+from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame

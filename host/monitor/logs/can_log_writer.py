@@ -24,6 +24,9 @@ _END: Final = "End TriggerBlock\n"
 class AscWriter:
     """Begins at a millisecond of local time; a frame from before begins another block.
 
+    python-can's own dates the file with the time of writing, writes 5 ms of a date as `.5`, and a
+    frame from before the start with its absolute time.
+
     Args:
         file: a text file, which is closed with the log.
     """
@@ -81,7 +84,7 @@ TRC_STEP_US: Final = 10_546_875
 
 
 class TrcWriter(can.TRCWriter):
-    """Begins at a multiple of `TRC_STEP_US`."""
+    """Begins at a multiple of `TRC_STEP_US`: a date that the text holds to the microsecond."""
 
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""

@@ -1,7 +1,20 @@
-"""A log file as the frames that are in it."""
+r"""Log files, and logs that come in pieces, as the frames that are in them.
+
+>>> lines = WholeLines()
+>>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
+(b'one\n', b'', b'two\n', b'')
+
+>>> tally = Tally()
+>>> record = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
+>>> record.at_us, record.channel, str(record.frame), record.sent
+(10000, 'vcan0', '705#7F', True)
+>>> parse_log_line("(0000000000.020000) vcan0 123##1AABB", 2, tally), tally.passed_over
+(None, Counter({'CAN FD frames': 1}))
+"""
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Iterator
 from importlib import import_module
@@ -10,8 +23,168 @@ from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, open_log
-from tickrig.host.monitor.logs.log_lines import LogLines
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
+from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
+from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
+from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import WireError
+
+LONGEST: Final = 1 << 20
+"""Bytes; of a longer line the beginning is kept, and no line of a log is so long."""
+
+
+class WholeLines:
+    """Holds back a line that has begun, in time and memory that do not grow with its pieces."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._held = 0
+
+    def push(self, data: bytes, /) -> bytes:
+        """Return the lines that end in these bytes, each with its LF."""
+        lines, end, rest = data.rpartition(b"\n")
+        if not end:
+            self._hold(rest)
+            return b""
+        whole = b"".join((*self._pieces, lines, end))
+        self._pieces, self._held = [], 0
+        self._hold(rest)
+        return whole
+
+    def finish(self) -> bytes:
+        """Return a last line without LF."""
+        rest = b"".join(self._pieces)
+        self._pieces, self._held = [], 0
+        return rest
+
+    def _hold(self, rest: bytes) -> None:
+        if self._held < LONGEST:
+            self._pieces.append(rest)
+            self._held += len(rest)
+
+
+COMMENTS: Final = ("#", ";", "//")
+
+_LINE: Final = re.compile(
+    r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
+)
+_FD: Final = re.compile(r"(?:[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})##[0-9A-Fa-f](?:[0-9A-Fa-f]{2}){0,64}")
+_XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
+
+
+def parse_log_line(
+    line: str, number: int, tally: Tally, clock: ScreenClock | None = None
+) -> Record | None:
+    """Read a line; None if it holds no frame, and then the tally says why.
+
+    Beyond what `candump -L` writes at present it reads what others write in its name: stamps in
+    nanoseconds or with fewer digits, a direction behind the frame, the raw length code behind
+    eight bytes, error frames with less than eight bytes.
+
+    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault.
+
+    Args:
+        line: without its LF.
+        number: of the line, from 1.
+        tally: takes what was no frame.
+        clock: of the lines of a screen.
+    """
+    text = line.strip()
+    if not text or text.startswith(COMMENTS):
+        return None
+    record = _parsed(line, text, tally, clock or ScreenClock())
+    if record is None:
+        tally.bad_lines.add(number, line.rstrip("\r"))
+    return record if isinstance(record, Record) else None
+
+
+def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+    """Return a frame, what was counted instead, or None for a bad line."""
+    if text.startswith("{"):
+        return parse_json_line(text, tally)
+    if match := _LINE.fullmatch(text):
+        return _logged(match, tally)
+    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally)
+
+
+def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
+    """Return what a line of `candump -L` says."""
+    seconds, fraction, channel, notation, direction = match.groups()
+    for kind, pattern in ((CAN_FD, _FD), (CAN_XL, _XL)):
+        if pattern.fullmatch(notation):
+            tally.passed_over[kind] += 1
+            return kind
+    at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
+    try:
+        return Record(at_us, channel, parse_frame(notation), direction == "T")
+    except WireError:
+        return None
+
+
+_USUAL: Final = re.compile(
+    r"^\(([0-9]{1,12})\.([0-9]{6})\) ([!-~]{1,32}) ([0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7})"
+    r"#((?:[0-9A-Fa-f]{2}){0,8})(?: ([RT]))?\r?$",
+    re.ASCII | re.MULTILINE,
+)
+"""A line with a data frame, as candump writes it: nearly all are so."""
+
+
+class LogLines:
+    """A decoder of a log in text: `push` what has come in, `finish` at its end.
+
+    Bytes that are no ASCII make a line bad; they never raise.
+
+    Attributes:
+        tally: what was no frame.
+    """
+
+    def __init__(self) -> None:
+        self.tally = Tally()
+        self._whole, self._number = WholeLines(), 0
+        self._clock: ScreenClock | None = None
+
+    @property
+    def deltas(self) -> bool:
+        """Whether stamps count from frame to frame: only all of the log tells the time."""
+        return self._clock is not None and self._clock.deltas
+
+    def push(self, data: bytes, /) -> list[Record]:
+        """Return the frames of the lines that end in these bytes."""
+        lines = self._whole.push(data)
+        return self._frames(lines[:-1].decode("latin-1")) if lines else []
+
+    def finish(self) -> list[Record]:
+        """Return the frame of a last line without LF."""
+        rest = self._whole.finish()
+        return self._frames(rest.decode("latin-1")) if rest else []
+
+    def _frames(self, text: str) -> list[Record]:
+        count, begin = text.count("\n") + 1, self._number
+        self._number += count
+        usual = _USUAL.findall(text)
+        if len(usual) == count:
+            return _usual_frames(usual)
+        clock = self._clock = self._clock or ScreenClock.of(text)
+        lines = enumerate(text.split("\n"), begin + 1)
+        frames = (parse_log_line(line, number, self.tally, clock) for number, line in lines)
+        return [record for record in frames if record]
+
+
+def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
+    """Return the frames of what `_USUAL` found; made without the constructors, for speed."""
+    records: list[Record] = []
+    add, new, unhex = records.append, tuple.__new__, bytes.fromhex
+    second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()
+    for seconds, micros, channel, ident, data, direction in lines:
+        if seconds != second:
+            second, second_us = seconds, int(seconds) * 1_000_000
+        if ident not in idents:
+            idents[ident] = int(ident, 16), len(ident) == 8
+        can_id, extended = idents[ident]
+        frame = new(CanFrame, (can_id, unhex(data), False, extended, 0))
+        add(new(Record, (second_us + int(micros), channel, frame, direction == "T")))
+    return records
+
 
 BLOCK_BYTES: Final = 1 << 13
 """So few frames at once that the garbage collector seldom meets them."""

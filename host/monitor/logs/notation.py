@@ -45,6 +45,10 @@ LINE_EVENT: Final = "line"
 def json_line(record: Record, more: str = "") -> str:
     """Write a frame; `more` are further members, each with its comma in front.
 
+    A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
+    (hex); a remote frame has `rtr`, its length, and an error frame has `err`: 1 and its class as
+    `id`. `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
+
     >>> json_line(Record(1_500_000, "can0", CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
     """
@@ -144,7 +148,11 @@ _DUMPED: Final = re.compile(
 
 
 def csv_row(record: Record) -> str:
-    """Write a frame below `LOG_HEADER`."""
+    """Write a frame below `LOG_HEADER`.
+
+    python-can does not tell who sent a frame. Here a `>` behind its data, which base64 does not
+    have and python-can passes over, says that this program did.
+    """
     at_us, _, frame, sent = record
     if isinstance(frame, ErrorFrame):
         what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"

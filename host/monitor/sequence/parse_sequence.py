@@ -8,8 +8,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from tickrig.host.monitor.sequence.conditions import FrameCondition, parse_pattern
-from tickrig.host.monitor.sequence.sequence_run import FrameStep, Sequence
+from tickrig.host.monitor.sequence.sequence_run import (
+    FrameCondition,
+    FrameStep,
+    Sequence,
+    parse_pattern,
+)
 from tickrig.host.monitor.sequence.variables import fill_in
 from tickrig.host.text.steps import FOREVER, Place, StepError, content_lines
 from tickrig.host.text.toml_place import line_of

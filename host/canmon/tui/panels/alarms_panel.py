@@ -13,12 +13,10 @@ from textual.widgets import Static, TextArea
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
-from tickrig.host.canmon.tui.tasks.session import Session, Task
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarms import HEAD, Alarms, State, render_alarms
-from tickrig.host.monitor.check.parse_rules import SWITCHES, VALUES, parse_rules
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.tui.line_view import Line, LineView, plain
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER

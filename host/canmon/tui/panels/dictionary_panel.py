@@ -12,8 +12,7 @@ from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import text_of
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.monitor.dictionary.node_dictionary import (

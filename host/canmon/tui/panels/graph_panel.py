@@ -20,8 +20,7 @@ from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
-from tickrig.host.canmon.tui.tasks.session import Session, Task
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH

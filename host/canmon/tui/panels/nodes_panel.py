@@ -7,7 +7,7 @@ from typing import Final
 from textual.app import ComposeResult
 
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.tasks.model import Model
+from tickrig.host.canmon.tui.tasks.session import Model
 from tickrig.host.monitor.decode.board_text import render_board
 from tickrig.host.tui.line_view import Line, LineView, plain
 

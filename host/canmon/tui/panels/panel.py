@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 from textual.containers import Vertical
 
 from tickrig.host.canmon.tui.settings import checked_bus
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session, Task
+from tickrig.host.canmon.tui.tasks.session import Model, Session, Task
 from tickrig.host.tui.line_view import LineView
 
 

@@ -14,7 +14,6 @@ from textual.widgets import Static, TextArea
 
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
-from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.sequence_task import (
     NEW,
     SequenceTask,
@@ -22,7 +21,7 @@ from tickrig.host.canmon.tui.tasks.sequence_task import (
     sequence_name,
     texts_settings,
 )
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.monitor.sequence.sequence_run import (
     EventType,
     Sequence,

@@ -15,11 +15,10 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, truth
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.monitor.views.top_columns import PLAIN, REVERSE
-from tickrig.host.monitor.views.top_table import UNBOUNDED, Order
+from tickrig.host.monitor.views.top_model import UNBOUNDED, Order
 from tickrig.host.tui.line_view import Line, LineView, plain
 
 

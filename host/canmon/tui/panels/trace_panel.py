@@ -12,8 +12,7 @@ from textual.widgets import Input, Static
 
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, text_of, truth
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
-from tickrig.host.canmon.tui.tasks.session import Session, Task
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter

@@ -15,8 +15,7 @@ from textual.binding import Binding, BindingType
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
 from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
-from tickrig.host.canmon.tui.tasks.session import Session, Task
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame
-from tickrig.host.canmon.tui.tasks.session import Task
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Task
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.monitor.decode.decoder import Decoder

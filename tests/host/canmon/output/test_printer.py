@@ -6,7 +6,7 @@ from tickrig.host.canmon.output.printer import Output, printer_of
 from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
 from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.frames.record import LineRecord
-from tickrig.host.monitor.logs.log_lines import LogLines
+from tickrig.host.monitor.logs.log_reader import LogLines
 
 
 def line(data: bytes) -> LineRecord:

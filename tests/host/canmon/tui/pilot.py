@@ -18,8 +18,7 @@ from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session, open_session
+from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui.line_view import LineView, line_text
 

@@ -10,8 +10,7 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import Session
+from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame

@@ -25,8 +25,7 @@ from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.tabs import TABS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.tasks.model import DecodedFrame, Model
-from tickrig.host.canmon.tui.tasks.session import open_session
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, open_session
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui.framed_app import FramedApp

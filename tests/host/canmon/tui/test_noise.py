@@ -10,10 +10,10 @@ from tests.host.monitor.strategies import data_frame
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
 from tickrig.host.canmon.tui.panels.graph_panel import GraphTask
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
-from tickrig.host.canmon.tui.tasks.model import Model
 from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
+from tickrig.host.canmon.tui.tasks.session import Model
 from tickrig.host.monitor.check.alarms import render_alarms
-from tickrig.host.monitor.check.parse_rules import parse_rules
+from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.dictionary.node_dictionary import render_dictionary
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode

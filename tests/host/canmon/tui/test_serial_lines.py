@@ -9,8 +9,7 @@ import pytest
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
-from tickrig.host.canmon.tui.tasks.model import Model
-from tickrig.host.canmon.tui.tasks.session import open_session
+from tickrig.host.canmon.tui.tasks.session import Model, open_session
 from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused

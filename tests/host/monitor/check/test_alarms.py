@@ -11,7 +11,7 @@ from tickrig.host.monitor.check.alarms import (
     State,
     render_alarms,
 )
-from tickrig.host.monitor.check.parse_rules import parse_rules
+from tickrig.host.monitor.check.rules import parse_rules
 
 S = 1_000_000
 

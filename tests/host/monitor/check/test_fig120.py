@@ -13,8 +13,8 @@ from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
 from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.column_check import check_columns
-from tickrig.host.monitor.check.parse_rules import parse_rules
 from tickrig.host.monitor.check.rule import Finding, Rule
+from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.frames.ident import EXTENDED
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame

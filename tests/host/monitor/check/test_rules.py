@@ -6,8 +6,7 @@ import pytest
 
 from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.check.checker import Checker
-from tickrig.host.monitor.check.parse_rules import parse_rules
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.rules import Rules, parse_rules
 
 
 def broken(

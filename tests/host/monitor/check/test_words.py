@@ -4,8 +4,7 @@ import re
 
 import pytest
 
-from tickrig.host.monitor.check.parse_rules import parse_rules
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.rules import Rules, parse_rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
 
 

@@ -8,13 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.columns.candump_block import CandumpBlock
-from tickrig.host.monitor.columns.column_reader import read_columns
+from tickrig.host.monitor.columns.column_reader import CandumpBlock, read_columns
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
-from tickrig.host.monitor.frames.candump_filter import flagged_id
+from tickrig.host.monitor.frames.ident import flagged_id
 from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_lines import LogLines
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, read_log
 from tickrig.host.monitor.logs.tally import Tally
 
 HEX = "0123456789abcdefABCDEF"

@@ -12,8 +12,7 @@ from tests.host.monitor.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.output.printer import csv_printer
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.log_lines import LogLines
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, read_log
 from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.host.monitor.logs.notation import DUMP_HEADER
 from tickrig.host.monitor.logs.tally import Tally

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_lines import (
+from tickrig.host.monitor.logs.log_reader import (
     LONGEST,
     LogLines,
     WholeLines,

@@ -13,8 +13,7 @@ from tickrig.host.canmon.verbs.info import read_head
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_lines import LogLines, parse_log_line
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, parse_log_line, read_log
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame

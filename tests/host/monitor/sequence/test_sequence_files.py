@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence.conditions import parse_pattern
 from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import outline
+from tickrig.host.monitor.sequence.sequence_run import outline, parse_pattern
 from tickrig.host.monitor.sequence.variables import evaluate, fill_in, parse_variable
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import CanFrame

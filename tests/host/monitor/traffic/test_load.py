@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from tickrig.host.monitor.traffic.load import Load, Window
+from tickrig.host.monitor.traffic.traffic import Load, Window
 
 S = 1_000_000
 

@@ -1,8 +1,7 @@
 from __future__ import annotations
 
 from tests.host.monitor.record_log import hear
-from tickrig.host.monitor.views.top_model import TopModel
-from tickrig.host.monitor.views.top_table import Order
+from tickrig.host.monitor.views.top_model import Order, TopModel
 
 
 def top(text: str) -> TopModel:

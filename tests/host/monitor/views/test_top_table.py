@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.host.monitor.record_log import hear, snapshot
 from tests.host.monitor.strategies import traffic
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.views.top_table import Order, View, render
+from tickrig.host.monitor.views.top_model import Order, View, render
 
 LOG = hear(
     "\n".join(f"{0.1 * n:.1f} 181#{n:02X}000{n // 8}" for n in range(20))
