@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario.player import Player
@@ -39,10 +39,10 @@ def picture() -> str:
     Player(emulator, scenario, Transcript(emulator, lambda line: None))
     while emulator.running:
         emulator.step()
-    return asyncio.run(_draw(Control(emulator)))
+    return asyncio.run(_draw(EmulatorControl(emulator)))
 
 
-async def _draw(control: Control) -> str:
+async def _draw(control: EmulatorControl) -> str:
     async def ask(requests: Sequence[Object]) -> list[Object]:
         return [control.answer(request) for request in requests]
 

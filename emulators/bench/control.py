@@ -19,7 +19,7 @@ MAX_PRESS_US: Final = 10**15
 """As long as a command line can say."""
 
 
-class Control(RequestDispatcher):
+class EmulatorControl(RequestDispatcher):
     """Answers requests about one emulator.
 
     Args:

@@ -1,4 +1,4 @@
-"""RequestDispatcher to an emulator from another thread, served between its steps."""
+"""Requests to an emulator from another thread, served between its steps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.host.control.requests import Object
 
 Answers = Future[list[Object]]
@@ -23,7 +23,7 @@ class Inbox:
         control: answers the requests, as those of the control socket.
     """
 
-    def __init__(self, control: Control) -> None:
+    def __init__(self, control: EmulatorControl) -> None:
         self._control = control
         self._posted: SimpleQueue[tuple[Sequence[Object], Answers]] = SimpleQueue()
         self._closed = False

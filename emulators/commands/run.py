@@ -13,7 +13,7 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.scenario.player import Player
@@ -69,7 +69,7 @@ class EmulatorRun(ABC):
             bench = self._running = self._open(stack)
             stack.callback(bench.close)
             if path := self._shared.control:
-                stack.enter_context(serving_control(path, Control(bench), self._clock))
+                stack.enter_context(serving_control(path, EmulatorControl(bench), self._clock))
             if self._in_real_time:
                 self._greet(bench)
                 sys.stdout.flush()

@@ -58,7 +58,7 @@ def _play_fig120(bus: BusOptions) -> list[Sample]:
 
 
 def _draw_fig120(samples: list[Sample], plot: Path) -> None:
-    from tickrig.emulators.fig120.plot import write_plot  # noqa: PLC0415
+    from tickrig.emulators.fig120.samples import write_plot  # noqa: PLC0415
 
     try:
         write_plot(samples, plot)

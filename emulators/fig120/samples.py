@@ -1,9 +1,15 @@
-"""What the demonstration looks at while it runs."""
+"""What the demonstration looks at while it runs, as a table and as a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig.emulators.commands.picture import new_figure, write_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FULL_SCALE: Final = 32_767
 FULL_SCALE_DEG: Final = 180.0
@@ -53,3 +59,34 @@ def thin(samples: Sequence[Sample], period_s: float) -> list[Sample]:
         if not kept or sample.time_s // period_s > kept[-1].time_s // period_s:
             kept.append(sample)
     return kept
+
+
+TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32"
+
+
+def write_plot(samples: Sequence[Sample], path: Path) -> None:
+    """Draw voltage, reference and angle over time into a file, PNG, SVG or HTML.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    write_figure(_draw(samples), TITLE, path)
+
+
+def _draw(samples: Sequence[Sample]) -> Figure:
+    figure = new_figure(9, 6)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+    times = [sample.time_s for sample in samples]
+    figure.suptitle(TITLE)
+    above.plot(times, [sample.volts for sample in samples], color="tab:orange")
+    above.set_ylabel("analogue input 1, V")
+    above.set_ylim(-0.2, 5.2)
+    references = [sample.reference_deg for sample in samples]
+    below.plot(times, references, color="tab:gray", drawstyle="steps-post", label="reference")
+    below.plot(times, [sample.angle_deg for sample in samples], color="tab:blue", label="shaft")
+    below.set_ylabel("angle, degrees")
+    below.set_xlabel("time, s")
+    below.legend(loc="upper left")
+    for axes in (above, below):
+        axes.grid(visible=True, alpha=0.3)
+    return figure

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Final
 
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.inbox import Inbox
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.serial.emulator import Emulator
@@ -21,7 +21,7 @@ SWITCH_S: Final = 0.000_2
 
 def run_panel(emulator: Emulator) -> None:
     """Show the panel until it is left or the emulator is stopped."""
-    inbox = Inbox(Control(emulator))
+    inbox = Inbox(EmulatorControl(emulator))
 
     def run() -> None:
         with _ending(emulator, inbox):

@@ -17,7 +17,7 @@ from tests.host.live import live_rrc, pty
 from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.client import ControlClient
@@ -120,7 +120,7 @@ class Bench:
 def sim_bench() -> Iterator[Bench]:
     """Put an emulated RRC into virtual time."""
     emulator = Emulator("rrc", Rrc())
-    control = Control(emulator)
+    control = EmulatorControl(emulator)
     link = SpyLink(SimLink(emulator.rig, emulator.host_end))
     with RrcClient(link) as client:
         operator = EmulatorOperator(

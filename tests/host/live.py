@@ -14,7 +14,7 @@ from serial.rfc2217 import PortManager
 
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.serial.emulator import Emulator, Outside
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.control.clock import RealClock
@@ -35,7 +35,7 @@ class LiveRrc:
     def __init__(self, outside: Outside, config: RrcConfig) -> None:
         self._rrc = Rrc(config)
         self._emulator = Emulator("rrc", self._rrc, outside=outside, clock=RealClock())
-        self._control = Control(self._emulator)
+        self._control = EmulatorControl(self._emulator)
         self._calls: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)

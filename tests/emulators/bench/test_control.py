@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import RequestDispatcher
 
@@ -20,7 +20,7 @@ def emulator() -> Emulator:
 
 def ask(emulator: Emulator, do: object, **fields: object) -> Any:
     line = json.dumps({"v": 1, "do": do, **fields}).encode()
-    answer = json.loads(Control(emulator).answer_line(line))
+    answer = json.loads(EmulatorControl(emulator).answer_line(line))
     assert answer["v"] == 1
     return answer
 
@@ -122,7 +122,7 @@ def test_a_bad_request_is_answered_and_changes_nothing(
     emulator: Emulator, request_: dict[str, object], error: str
 ) -> None:
     before = ask(emulator, "get")
-    answer = json.loads(Control(emulator).answer_line(json.dumps(request_).encode()))
+    answer = json.loads(EmulatorControl(emulator).answer_line(json.dumps(request_).encode()))
     assert answer["ok"] is False
     assert error in answer["error"]
     assert ask(emulator, "get") == before
@@ -143,7 +143,7 @@ def test_a_bad_request_is_answered_and_changes_nothing(
     ],
 )
 def test_what_is_no_object_is_answered(emulator: Emulator, line: bytes) -> None:
-    answer = json.loads(Control(emulator).answer_line(line))
+    answer = json.loads(EmulatorControl(emulator).answer_line(line))
     assert answer["v"] == 1
     if not line.startswith(b'{"v":1,"do":"get"'):
         assert not answer["ok"]
@@ -160,7 +160,7 @@ def test_what_is_no_object_is_answered(emulator: Emulator, line: bytes) -> None:
     ],
 )
 def test_a_line_is_json_in_utf_8(emulator: Emulator, line: bytes, error: str) -> None:
-    answer = Control(emulator).answer_line(line)
+    answer = EmulatorControl(emulator).answer_line(line)
     assert answer.count(b"\n") == 1
     assert error in json.loads(answer)["error"]
 
@@ -174,6 +174,6 @@ def test_a_number_that_json_lacks_is_text() -> None:
 
 @given(st.binary(max_size=300))
 def test_noise_is_answered_with_one_line(noise: bytes) -> None:
-    answer = Control(Emulator("lamp", Lamp())).answer_line(noise)
+    answer = EmulatorControl(Emulator("lamp", Lamp())).answer_line(noise)
     assert answer.count(b"\n") == 1
     assert json.loads(answer)["ok"] is False

@@ -11,7 +11,7 @@ from click.shell_completion import BashComplete
 from click.testing import CliRunner
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.cli.start import load
@@ -37,7 +37,10 @@ def completed(line: str) -> str:
 @pytest.fixture
 def lamp(tmp_path: Path) -> Iterator[Path]:
     """Serve the control socket of a lamp."""
-    server, done = ControlServer(tmp_path / "ctl", Control(Emulator("lamp", Lamp()))), [False]
+    server, done = (
+        ControlServer(tmp_path / "ctl", EmulatorControl(Emulator("lamp", Lamp()))),
+        [False],
+    )
 
     def serve() -> None:
         while not done[0]:

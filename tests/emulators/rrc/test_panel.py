@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.inbox import EmulatorEnded, Inbox
 from tickrig.emulators.rrc import panel as rrc_panel
 from tickrig.emulators.rrc import panel_text, small_panel_text
@@ -27,7 +27,7 @@ Act = Callable[[RrcPanel, Emulator, Any], Awaitable[None]]
 def on_panel(act: Act, size: tuple[int, int] = (80, 24)) -> None:
     """Run a panel on an emulator in virtual time: 10 ms pass with each look at it."""
     emulator = Emulator("rrc", Rrc(), link="/tmp/rrc")
-    control = Control(emulator)
+    control = EmulatorControl(emulator)
 
     async def ask(requests: Sequence[Object]) -> list[Object]:
         pass_time(emulator, 10_000)
@@ -357,7 +357,7 @@ def test_what_goes_wrong_in_the_rig_is_not_lost(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_an_inbox_answers_together_and_refuses_after_the_end() -> None:
-    inbox = Inbox(Control(Emulator("rrc", Rrc())))
+    inbox = Inbox(EmulatorControl(Emulator("rrc", Rrc())))
     asked = inbox.post([{"v": 1, "do": "get", "names": ["gauge"]}, {"v": 1, "do": "nope"}])
     assert not asked.done()
     inbox.serve()

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.server import (
     IDLE_S,
@@ -29,7 +29,7 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def server(path: Path) -> Iterator[ControlServer]:
-    server = ControlServer(path, Control(Emulator("lamp", Lamp())))
+    server = ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())))
     yield server
     server.close()
 
@@ -163,7 +163,7 @@ Full = tuple[ControlServer, list[Client], list[float]]
 @pytest.fixture
 def full(path: Path) -> Iterator[Full]:
     now_s = [0.0]
-    server = ControlServer(path, Control(Emulator("lamp", Lamp())), lambda: now_s[0])
+    server = ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())), lambda: now_s[0])
     clients = []
     for _ in range(MAX_CLIENTS):
         clients.append(Client(server, path))
@@ -228,7 +228,7 @@ def test_the_file_of_a_killed_emulator_is_replaced(path: Path) -> None:
     dead = socket.socket(socket.AF_UNIX)
     dead.bind(str(path))
     dead.close()
-    server = ControlServer(path, Control(Emulator("lamp", Lamp())))
+    server = ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())))
     with Client(server, path) as client:
         client.send(GET)
         assert [answer["ok"] for answer in client.answers()] == [True]
@@ -238,7 +238,7 @@ def test_the_file_of_a_killed_emulator_is_replaced(path: Path) -> None:
 
 def test_a_live_one_is_left_alone(server: ControlServer, path: Path) -> None:
     with pytest.raises(FileExistsError, match="another process listens there"):
-        ControlServer(path, Control(Emulator("lamp", Lamp())))
+        ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())))
     with Client(server, path) as client:
         client.send(GET)
         assert [answer["ok"] for answer in client.answers()] == [True]
@@ -247,13 +247,13 @@ def test_a_live_one_is_left_alone(server: ControlServer, path: Path) -> None:
 def test_another_file_is_left_alone(path: Path) -> None:
     path.write_text("precious")
     with pytest.raises(FileExistsError):
-        ControlServer(path, Control(Emulator("lamp", Lamp())))
+        ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())))
     assert path.read_text() == "precious"
 
 
 def test_a_path_that_is_too_long_is_an_os_error(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="too long"):
-        ControlServer(tmp_path / ("x" * 120), Control(Emulator("lamp", Lamp())))
+        ControlServer(tmp_path / ("x" * 120), EmulatorControl(Emulator("lamp", Lamp())))
 
 
 def test_a_socket_that_somebody_else_put_there_stays(server: ControlServer, path: Path) -> None:
@@ -264,7 +264,7 @@ def test_a_socket_that_somebody_else_put_there_stays(server: ControlServer, path
 
 
 def test_the_last_answer_is_sent_before_hanging_up(path: Path) -> None:
-    server = ControlServer(path, Control(Emulator("lamp", Lamp())))
+    server = ControlServer(path, EmulatorControl(Emulator("lamp", Lamp())))
     with Client(server, path) as client:
         client.send(b'{"v":1,"do":"stop"}\n')
         server.serve(0)

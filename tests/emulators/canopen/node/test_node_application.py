@@ -11,7 +11,7 @@ import pytest
 from tests.emulators.canopen.dimmer import Dimmer
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
-from tickrig.emulators.bench.control import Control
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
@@ -30,7 +30,7 @@ def dimmers(*ids: int) -> CanEmulator:
 
 
 def ask(bench: CanEmulator, **request: object) -> dict[str, Any]:
-    answer = Control(bench).answer({"v": 1, **request})
+    answer = EmulatorControl(bench).answer({"v": 1, **request})
     assert answer["ok"], answer
     return answer
 
