@@ -153,7 +153,7 @@ class RtcLiteNode(Copyable):
         """Give out the answer that was due, and look how long the line has been silent."""
         self._free_us = 0
         sent = self._take()
-        if self._receiver.expired(now_us):
+        if self._receiver.drop_broken_off(now_us):
             self._send(now_us, [fault_frame(LiteLinkFault.TIMEOUT)])
         return sent
 

@@ -65,7 +65,7 @@ class LiteReceiver:
             self._waiting += data[:room]
             self.dropped += max(0, len(data) - room)
 
-    def expired(self, now_us: int) -> bool:
+    def drop_broken_off(self, now_us: int) -> bool:
         """Drop a frame that was broken off; True if there was one."""
         if self._waiting or now_us < self.due_us:
             return False

@@ -61,7 +61,7 @@ class _PacketSplitter:
 
 def _split(receiver: LiteReceiver, at_us: int, data: bytes) -> list[bytes]:
     """Listen as a node listens, with the same time-outs."""
-    out = [SHOWN[LiteLinkFault.TIMEOUT]] if receiver.expired(at_us) else []
+    out = [SHOWN[LiteLinkFault.TIMEOUT]] if receiver.drop_broken_off(at_us) else []
     for at in range(0, len(data), BUFFER_BYTES):
         receiver.push(at_us, data[at : at + BUFFER_BYTES])
         while (found := receiver.pull()) is not None:

@@ -37,7 +37,7 @@ class PeriodicTimer:
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)
-    >>> [timer.elapsed(now_us) for now_us in (99, 100, 101, 450, 460, 500)]
+    >>> [timer.advance(now_us) for now_us in (99, 100, 101, 450, 460, 500)]
     [False, True, False, True, False, True]
 
     Args:
@@ -55,8 +55,11 @@ class PeriodicTimer:
         if self._period_us:
             self.due_us = now_us + self._period_us
 
-    def elapsed(self, now_us: int) -> bool:
-        """Whether a period is over; the next is over where it would be without a pause."""
+    def advance(self, now_us: int) -> bool:
+        """Begin the next period if one is over; return whether one was.
+
+        The next is over where it would be without a pause.
+        """
         if now_us < self.due_us:
             return False
         self.due_us = now_us - (now_us - self.due_us) % self._period_us + self._period_us
@@ -132,9 +135,9 @@ class RtcCanopenServer:
             self._carry_out()
             self._activate_next()
         self._data.send_values()
-        if self._sync.elapsed(now_us):
+        if self._sync.advance(now_us):
             self.send(SYNC_COB_ID, b"")
-        if self._heartbeat.elapsed(now_us):
+        if self._heartbeat.advance(now_us):
             self._error_control(NmtState.OPERATIONAL)
         timers_us = min(self._heartbeat.due_us, self._sync.due_us)
         self.due_us = min(self._nodes_due_us, self.manager.due_us, timers_us)
