@@ -271,10 +271,12 @@ def test_a_frame_that_begins_when_a_node_is_back_does_not_hold_it_up() -> None:
     node, host, _ = wire.end(), wire.end(), wire.end()
     bus_off(wire, node)
     node.on_error_state = lambda at_us, state: told.append(at_us)
-    node.recover(100_000)
-    host.send(100_000 + RETURN_BITS, frames("555#"))
-    assert node.poll(110_000) == frames("555#")
-    assert told == [100_000 + RETURN_BITS]
+    wire.faults.arm("delay", 1)
+    host.send(100_000 + RETURN_BITS, frames("555#"))  # 10 ms later
+    wire.faults.clear("delay")
+    node.recover(110_000)
+    assert node.poll(120_000) == frames("555#")
+    assert told == [110_000 + RETURN_BITS]
 
 
 def test_a_frame_that_waits_while_a_node_returns_is_sent() -> None:
@@ -318,6 +320,16 @@ def test_a_node_that_was_alone_sends_when_another_comes() -> None:
     wire.end()
     wire.advance(2_000_000)
     assert log.times_us[-1] == 1_000_000 + bits("705#00") - 3
+
+
+def test_nobody_hears_the_error_flag_of_a_passive_loser() -> None:
+    wire = CanWire()
+    log, first, second, _ = Log(wire), wire.end(), wire.end(), wire.end()
+    make_passive(wire, second)
+    first.send(0, frames("185#0002"))
+    second.send(0, frames("185#0102"))
+    wire.advance(wire.due_us)
+    assert log.lines == [f"{bits('185#0002') - 3} 185#0002"]
 
 
 def test_a_collision_goes_on_while_one_of_the_losers_is_active() -> None:

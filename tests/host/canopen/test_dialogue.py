@@ -162,7 +162,7 @@ def test_an_answer_that_comes_too_late_for_the_one_before_is_passed_over() -> No
 
 def test_without_an_answer_the_transfer_is_aborted() -> None:
     talk = Talk(upload(0x1000, 0))
-    assert talk.dialogue.due_us == SDO_TIMEOUT_US
+    assert talk.dialogue.due_us == 500_000
     talk.dialogue.tick(SDO_TIMEOUT_US - 1)
     assert talk.failure is None
     talk.dialogue.tick(SDO_TIMEOUT_US)
