@@ -2,26 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
 
+from tests.device.canopen import reference
+from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.rtc_lite.reference_model import checked
+from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.device_rtc.component import CanopenEcho
+from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.device.canopen.ds401.module import Ds401
+from tickrig.device.canopen.ds402.drive import Ds402
+from tickrig.device.canopen.models.epos import make_epos
+from tickrig.device.canopen.models.f_palette import make_f_palette
+from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
+from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.twin import Copyable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
+from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.testing.check_device import _Bench
+from tickrig.emulators.testing.strategies import Session
 from tickrig.testing import check_device, strategies
+from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import Request, encode_request
 from tickrig.wire.modbus.rtu import encode_frame
 from tickrig.wire.rrc import commands as cmd
@@ -73,43 +94,101 @@ URG_LINES = [
     *("SCIP2.0", "V", "L0", "L1", "G38038603", "S1152000000000"),
 ]
 
+CAN_FRAMES = [
+    *("000#0105", "000#8005", "000#8105", "000#0205", "705#R", "701#05", "080#", "205#0F00"),
+    *("605#4000100000000000", "605#2B1710000A000000", "605#2140200008000000", "605#0041424344"),
+    *(
+        "605#2F60600003000000",
+        "605#2F60600001000000",
+        "605#2F60600006000000",
+        "605#2F6060000A000000",
+    ),
+    *(
+        "605#2B40600006000000",
+        "605#2B40600007000000",
+        "605#2B4060000F000000",
+        "605#2B4060001F000000",
+    ),
+    *("605#23FF600090010000", "605#237A6000B80B0000", "605#2B40600080000000", "305#01020304"),
+    *("605#2F0018020A000000", "605#2B0118050F000000", "605#A010100104000000", "605#C1"),
+]
+CAN_IDS = [0x000, 0x080, 0x100, 0x205, 0x305, 0x405, 0x505, 0x605, 0x705, 0x7E5]
+
 BASE = BaseParameters(friction=0.1, noise=0.05, seed=3, delay_ms=7)
 POST = World(posts=(Post(2, 0, 0.5),))
 
 
-def lite(framing: Framing = Framing.LITE, **settings: Any) -> Callable[[], None]:
-    return partial(
-        check_device,
-        partial(RtcLiteNode, LiteEcho, LiteConfig(framing, **settings)),
-        wire=partial(SerialLine, 57_600),
-        traffic=strategies.chunks(LITE_FRAMES, 90),
-        start=LITE_ACTIVE,
-    )
+def lite(framing: Framing = Framing.LITE, **settings: Any) -> dict[str, Any]:
+    return {
+        "device_type": partial(RtcLiteNode, LiteEcho, LiteConfig(framing, **settings)),
+        "wire": partial(SerialLine, 57_600),
+        "traffic": strategies.chunks(LITE_FRAMES, 90),
+        "start": LITE_ACTIVE,
+    }
 
 
-def urg(scip: str) -> Callable[[], None]:
-    return partial(
-        check_device,
-        partial(Urg, UrgParameters(noise=0.5, scip=scip), POST),
-        traffic=strategies.chunks([f"{line}\n".encode() for line in URG_LINES]),
-    )
+def urg(scip: str) -> dict[str, Any]:
+    lines = [f"{line}\n".encode() for line in URG_LINES]
+    sensor = partial(Urg, UrgParameters(noise=0.5, scip=scip), POST)
+    return {"device_type": sensor, "traffic": strategies.chunks(lines)}
 
 
-def rh3(parameters: BaseParameters) -> Callable[[], None]:
+def rh3(parameters: BaseParameters) -> dict[str, Any]:
     orders = [encode_frame(1, encode_request(order)) for order in RH3_ORDERS]
-    return partial(
-        check_device,
-        partial(Rh3Base, parameters),
-        traffic=strategies.chunks(orders),
-        start=RH3_ENABLED,
-    )
+    return {
+        "device_type": partial(Rh3Base, parameters),
+        "traffic": strategies.chunks(orders),
+        "start": RH3_ENABLED,
+        "max_examples": 15,
+    }
 
 
-CHECKS: dict[str, Callable[[], None]] = {
-    "RRC": partial(check_device, Rrc, traffic=strategies.chunks(RRC_LINES)),
-    "RRC that is on": partial(
-        check_device, Rrc, traffic=strategies.chunks(RRC_LINES), start=RRC_ON, max_examples=60
-    ),
+class WithInputs(Copyable):
+    """A slave with the physical side of its application where `check_device` looks for it."""
+
+    def __init__(self, make: Callable[[], CanopenSlave]) -> None:
+        self.slave = slave = make()
+        self.application = Application.of(slave)
+        self.inputs, self.outputs = self.application.inputs, tuple(self.application.outputs)
+        self.reset, self.tick, self.bus_state = slave.reset, slave.tick, slave.bus_state
+        self.read, self.tick_us = self.application.read, slave.tick_us
+
+    due_us = property(lambda self: self.slave.due_us)
+    accepts = property(lambda self: self.slave.accepts)
+    reconfigured_by = property(lambda self: self.slave.reconfigured_by)
+    on_accepts = property(lambda self: self.slave.on_accepts)
+
+
+def reference_slave() -> CanopenSlave:
+    return make_slave(reference.make_dictionary(()), 5)
+
+
+def reference_drive() -> CanopenSlave:
+    return make_slave(make_dictionary({DRIVE}), 5, application=Ds402)
+
+
+def reference_io() -> CanopenSlave:
+    return make_slave(make_dictionary({GENERIC_IO}), 5, application=Ds401)
+
+
+def canopen(make: Callable[[], CanopenSlave]) -> dict[str, Any]:
+    return {
+        "device_type": partial(WithInputs, make),
+        "wire": CanWire,
+        "traffic": strategies.frames(CAN_FRAMES, CAN_IDS),
+        "start": [(10_000, "send", (CanFrame.parse("000#0105"),))],
+        "max_examples": 15,
+    }
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "RRC": {"device_type": Rrc, "traffic": strategies.chunks(RRC_LINES)},
+    "RRC that is on": {
+        "device_type": Rrc,
+        "traffic": strategies.chunks(RRC_LINES),
+        "start": RRC_ON,
+        "max_examples": 60,
+    },
     "RTC-Lite node": lite(),
     "its timer": lite(context=LiteContextType.TIMER, rate_hz=300),
     "its slow timer": lite(context=LiteContextType.TIMER, rate_hz=7),
@@ -118,12 +197,48 @@ CHECKS: dict[str, Callable[[], None]] = {
     "RH3 base at once": rh3(BaseParameters()),
     "URG of SCIP 1.1": urg("1.1"),
     "URG of SCIP 2.0": urg("2.0"),
+    "CANopen slave": canopen(reference_slave),
+    "CiA 401 module": canopen(reference_io),
+    "CiA 402 drive": canopen(reference_drive),
+    "f-palette": canopen(partial(make_f_palette, 5)),
+    "motor core unit": canopen(partial(make_motor_core_unit, 5)),
+    "EPOS": canopen(partial(make_epos, 5)),
+    "DeviceRTC": canopen(partial(make_device_rtc, CanopenEcho, 5)),
 }
 
 
-@pytest.mark.parametrize("name", CHECKS)
+@pytest.mark.parametrize("name", KINDS)
 def test_a_device_keeps_what_every_device_must_keep(name: str) -> None:
-    CHECKS[name]()
+    check_device(**KINDS[name])
+
+
+@pytest.fixture(scope="module")
+def elsewhere() -> Iterator[ProcessPoolExecutor]:
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        yield pool
+
+
+def go_on(pickled: bytes, session: Session) -> list[tuple[object, ...]]:
+    """Go on in another process."""
+    bench: _Bench = pickle.loads(pickled)
+    return bench.play(session)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_device_goes_on_in_another_process(name: str, elsewhere: ProcessPoolExecutor) -> None:
+    kind = {"wire": SerialLine, "start": (), **KINDS[name]}
+    make = kind["device_type"]
+    sessions = strategies.sessions(make(), kind["traffic"])
+
+    @settings(max_examples=3)
+    @given(sessions, sessions)
+    def check(before: Session, after: Session) -> None:
+        bench = _Bench(make, kind["wire"], kind["start"])
+        bench.play(before)
+        answer = elsewhere.submit(go_on, pickle.dumps(bench), after)
+        assert answer.result() == bench.play(after)
+
+    check()
 
 
 @pytest.mark.parametrize("name", DEVICES.built_in)

@@ -8,10 +8,14 @@ from typing import Any
 
 from tests.emulators.can.test_can_rig import Node
 from tests.emulators.echo import Echo
+from tickrig.device.canopen.models.epos import make_epos
+from tickrig.device.canopen.models.f_palette import make_f_palette
+from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node.node import Node as CanopenNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
@@ -92,6 +96,21 @@ def can() -> Bench:
     hosts = [wire.end(), wire.end(frozenset({0x201, 0x202}))]
     hosts[0].auto_recovery = True
     return Bench(Rig(*(Station(node, wire.end()) for node in nodes)), hosts, wire.faults)
+
+
+def canopen() -> Bench:
+    """Devices of CANopen, and one with a plug and a supply."""
+    wire = CanWire(500_000, seed=1)
+    slaves = (make_f_palette(1), make_epos(2), make_motor_core_unit(3))
+    node = CanopenNode("drive", make_epos(4), wire)
+    stations = [*(Station(slave, wire.end()) for slave in slaves), Station(node, node.port)]
+    bench = Bench(Rig(*stations), [wire.end()], wire.faults)
+    bench.act([(10_000, "send", (0, ["000#0100"])), (10_000, "send", (0, ["080#"]))])
+    node.physical["unplugged"].write(1)
+    node.physical["emergency"].write(0x3100)
+    bench.act([(20_000, "send", (0, []))])
+    node.physical["unplugged"].write(0)
+    return bench
 
 
 def both() -> Bench:

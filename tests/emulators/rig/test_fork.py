@@ -34,6 +34,10 @@ line_sends = st.tuples(
 )
 can_sends = st.tuples(st.integers(0, 1), st.lists(st.sampled_from(BURST), max_size=4))
 
+SDO = ("000#0100", "000#8101", "080#", "000#8000", "601#4000100000000000", "602#2F60600003000000")
+DRIVE = ("602#2B4060000F000000", "604#2B40600006000000", "604#2B4060000F000000")
+sdos = st.tuples(st.just(0), st.lists(st.sampled_from((*SDO, *DRIVE)), max_size=4))
+
 
 def acts(sends: st.SearchStrategy[Any], faults: list[Any], names: list[str]) -> Any:
     things = [
@@ -52,6 +56,7 @@ FRAMES = [("corrupt", 0.2), ("drop", 0.2), ("duplicate", 0.2), ("delay", 0.2), (
 RIGS: dict[str, tuple[Callable[[], Bench], Any]] = {
     "serial": (forks.serial, acts(line_sends, BYTES, ["power_button", "bus_noise", "rrc_power"])),
     "rs485": (forks.rs485, acts(line_sends, BYTES, ["emergency_stop", "power_cut"])),
+    "CANopen": (forks.canopen, acts(sdos, [*FRAMES, ("babble",)], [])),
     "CAN": (forks.can, acts(can_sends, [*FRAMES, ("babble",)], [])),
     "both": (forks.both, acts(st.tuples(st.just(0), can_sends.map(lambda it: it[1])), FRAMES, [])),
 }
