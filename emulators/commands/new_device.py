@@ -46,7 +46,15 @@ how it is built, connected and shown.
 DEVICE: Final = '''\
 """The machine: time and bytes in, bytes out; it reads no clock and does no I/O."""
 
-from tickrig import NEVER, Copyable, InputBank, InputSignal, LineSplitter, OutputSignal, SignalType
+from tickrig import (
+    NEVER,
+    Copyable,
+    InputBank,
+    InputSignal,
+    LineSplitter,
+    OutputSignal,
+    SignalType,
+)
 
 INPUTS = (
     InputSignal("button", "a button: it says so when it is pressed", SignalType.BUTTON),
@@ -130,7 +138,14 @@ DEVICE = DeviceType(
 '''
 
 TEST: Final = """\
+from tickrig.testing import check_device, strategies
+
 from $module.device import $cls
+from $module.device_type import DEVICE
+
+
+def test_it_keeps_what_every_device_keeps() -> None:
+    check_device(DEVICE, traffic=strategies.chunks([b"hello\\n"]))
 
 
 def test_it_greets_and_answers() -> None:

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from kettle_emu import Kettle
+from kettle_emu import DEVICE, Kettle
+
+from tickrig.testing import check_device, strategies
+
+LINES = [b"heat\n", b"stop\n", b"temp?\n"]
+
+
+def test_it_keeps_what_every_device_keeps() -> None:
+    check_device(DEVICE, traffic=strategies.chunks(LINES), max_examples=10)
 
 
 def test_water_boils_in_its_time() -> None:
