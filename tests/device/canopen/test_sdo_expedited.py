@@ -40,10 +40,11 @@ def test_what_is_no_request_to_this_node_is_ignored(request_: str) -> None:
     assert bus.step(request_) + bus.run(50) == []
 
 
-def test_an_object_that_is_made_on_demand_is_asked_for_its_value() -> None:
-    bus = booted()
-    bus.slave.dictionary[0x1000, 0].source = lambda entry: bytes.fromhex("01020304")
-    assert bus.step("605#4000100000000000") == ["585#4300100001020304"]
+def test_an_object_that_is_made_on_demand_is_asked_each_time() -> None:
+    bus, made = booted(), [b"\4\0\0\0", b"\5\0\0\0"]
+    bus.slave.dictionary[0x1000, 0].source = lambda entry: made.pop()
+    answers = [text for _ in range(2) for text in bus.step("605#4000100000000000")]
+    assert answers == ["585#4300100005000000", "585#4300100004000000"]
 
 
 DOWNLOADS = [

@@ -121,6 +121,13 @@ def test_every_request_begins_the_5_s_anew() -> None:
     assert bus.step("605#7000000000000000") == ["585#10636520736C6176"]
 
 
+def test_a_value_that_is_written_at_once_ends_a_running_transfer() -> None:
+    bus = booted()
+    assert bus.step("605#4003200000000000") == ["585#4103200008000000"]
+    assert bus.step("605#2F002000A5000000") == ["585#6000200000000000"]
+    assert bus.step("605#6000000000000000") == ["585#8000000001000405"]
+
+
 def test_a_new_request_ends_a_running_transfer() -> None:
     dialogue(
         booted(),
