@@ -27,23 +27,23 @@ class UrgScan:
         first: step of the first number.
         cluster: steps for each number.
         distances_mm: as they came; what is below DMIN is a code, no distance.
-        kind: limits and steps of the sensor.
+        specification: limits and steps of the sensor.
     """
 
     time_ms: int
     first: int
     cluster: int
     distances_mm: tuple[int, ...]
-    kind: Specification
+    specification: Specification
 
     def angle_rad(self, place: int) -> float:
         """Return the direction of a number, from straight ahead to the left."""
         step = self.first + place * self.cluster + (self.cluster - 1) / 2
-        return (step - self.kind.front) * tau / self.kind.resolution
+        return (step - self.specification.front) * tau / self.specification.resolution
 
     def points(self) -> Iterator[tuple[float, float]]:
         """Yield direction in rad and distance in m, where there is one."""
-        low, high = self.kind.nearest_mm, self.kind.farthest_mm
+        low, high = self.specification.nearest_mm, self.specification.farthest_mm
         for place, distance_mm in enumerate(self.distances_mm):
             if low <= distance_mm <= high:
                 yield self.angle_rad(place), distance_mm / 1_000
@@ -69,14 +69,14 @@ class UrgClient:
         interval: scans that are left out after each, 0..9.
 
     Attributes:
-        kind: what the sensor told of itself, None before.
+        specification: what the sensor told of itself, None before.
         garbled: replies and scans that were none.
         restarts: how often it began again.
     """
 
     def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:
         self._link, self._cluster, self._interval = link, cluster, interval
-        self.kind: Specification | None = None
+        self.specification: Specification | None = None
         self.restarts = self._spoilt = 0
         self._begin()
 
@@ -118,20 +118,22 @@ class UrgClient:
     def _take(self, reply: Reply) -> list[UrgScan]:
         command = Command.parse(reply.echo)
         if command.symbol == "PP" and reply.status == status.OK:
-            self.kind = Specification.parse(reply.lines)
+            self.specification = Specification.parse(reply.lines)
             self._received_us = self._link.now_us
-            self._measure(self.kind)
+            self._measure(self.specification)
         if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
             return []
         if reply.status != status.DATA:
             raise DeviceRefused(f"{reply.echo!r}: status {reply.status}", reply.status)
-        if self.kind is None:
+        if self.specification is None:
             return []
         time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
         self._received_us = self._link.now_us
-        return [UrgScan(time_ms, self.kind.first, self._cluster, distances, self.kind)]
+        return [
+            UrgScan(time_ms, self.specification.first, self._cluster, distances, self.specification)
+        ]
 
-    def _measure(self, kind: Specification) -> None:
-        steps = f"{kind.first:04}{kind.last:04}"
+    def _measure(self, specification: Specification) -> None:
+        steps = f"{specification.first:04}{specification.last:04}"
         rest = f"{self._cluster:02}{self._interval}{ENDLESS:02}"
         self._link.send(Command("MD", steps + rest).encode())

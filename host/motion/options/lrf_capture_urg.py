@@ -80,16 +80,16 @@ class LrfCaptureUrg(RtComponent):
 
 
 def _range_data(now: Time, scan: UrgScan) -> RangeData:
-    kind, numbers = scan.kind, scan.distances_mm
-    low, high = kind.nearest_mm, kind.farthest_mm
+    specification, numbers = scan.specification, scan.distances_mm
+    low, high = specification.nearest_mm, specification.farthest_mm
     config = RangerConfig(
         minAngle=scan.angle_rad(0),
         maxAngle=scan.angle_rad(len(numbers) - 1),
-        angularRes=scan.cluster * tau / kind.resolution,
+        angularRes=scan.cluster * tau / specification.resolution,
         minRange=low / 1_000,
         maxRange=high / 1_000,
         rangeRes=0.001,
-        frequency=kind.speed_rpm / 60,
+        frequency=specification.speed_rpm / 60,
     )
     ranges = tuple(n / 1_000 if low <= n <= high else 0.0 for n in numbers)
     return RangeData(now, ranges, config=config)

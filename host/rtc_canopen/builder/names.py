@@ -23,7 +23,7 @@ COMPONENT_NAMES: Final = frozenset(
         *("category", "error_check", "inputs", "on_aborting", "on_activated", "on_deactivated"),
         *("on_error", "on_execute", "on_finalize", "on_initialize", "on_reset", "physical"),
         *("ports", "product_code", "profile", "rate_hz", "strict_cia301", "type_name"),
-        *("vendor", "version", "new_in_twins"),
+        *("vendor", "version"),
     )
 )
 """What a component has beside its ports."""

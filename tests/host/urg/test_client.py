@@ -29,7 +29,7 @@ REPLIES = [
 def test_it_measures_ten_times_a_second() -> None:
     bench = SensorBench()
     scans = bench.run(1_050)
-    assert bench.client.kind == URG_04LX
+    assert bench.client.specification == URG_04LX
     assert [scan.time_ms for scan in scans] == list(range(100, 1_000, 100))
     assert {len(scan.distances_mm) for scan in scans} == {682}
 
