@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 from rich.segment import Segment
 from rich.style import Style
@@ -12,59 +12,12 @@ from textual.widget import Widget
 
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.frames.quantity import load_text
-from tickrig.host.monitor.traffic.traffic import BusRow
 from tickrig.host.tui.line_view import Line
 
 ARMED: Final = (" ARMED ", "bold white on red")
 LISTENING: Final = (" LISTEN-ONLY ", "bold black on green")
 WARNING: Final = "bold yellow"
 ALARM: Final = "bold red"
-
-
-class Status(NamedTuple):
-    """What the line tells.
-
-    Attributes:
-        armed: frames are sent.
-        buses: what each bus did.
-        bit_rate: of the buses, None if it is not known.
-        frames: taken in all.
-        rate: frames in the latest second.
-        lost: frames that did not get here.
-        unread: what came and is no frame of classic CAN.
-        sent: frames that this program sent.
-        trouble: what is wrong; empty if nothing.
-        ended: no more will come.
-    """
-
-    armed: bool = False
-    buses: tuple[BusRow, ...] = ()
-    bit_rate: int | None = None
-    frames: int = 0
-    rate: int = 0
-    lost: int = 0
-    unread: int = 0
-    sent: int = 0
-    trouble: str = ""
-    ended: bool = False
-
-
-def status_line(status: Status) -> Line:
-    """Return the line."""
-    line = [ARMED if status.armed else LISTENING]
-    for bus in status.buses:
-        line.append((f" {bus.channel} {load_text(bus.load.latest.bits, status.bit_rate)}", ""))
-        if bus.errors.state is not None:
-            state = bus.errors.state.name.lower().replace("_", "-")
-            line.append((f" {state}", "" if state == "active" else ALARM))
-        line += [(f" {bus.errors.frames} error frames", WARNING)] if bus.errors.frames else []
-    line.append((f"  {status.frames} frames  {status.rate}/s", ""))
-    line.append((f"  lost {status.lost}", ALARM if status.lost else ""))
-    line += [(f"  passed over {status.unread}", ALARM)] if status.unread else []
-    line += [(f"  sent {status.sent}", "")] if status.sent else []
-    line += [(f"  {status.trouble}", ALARM)] if status.trouble else []
-    line += [("  end of the log", "")] if status.ended and not status.trouble else []
-    return tuple(line)
 
 
 class StatusLine(Widget):
@@ -85,26 +38,31 @@ class StatusLine(Widget):
     def refresh_view(self) -> None:
         """Show how things are now; called ten times a second."""
         with self._session.lock:
-            line = status_line(self._status())
+            line = self._status()
         if line != self.line:
             self.line = line
             self.refresh()
 
-    def _status(self) -> Status:
+    def _status(self) -> Line:
+        """Return the line: who may send, the buses, counts, what is wrong."""
         session, model = self._session, self._session.model
         self._counts = [*self._counts[-10:], model.frames]
-        return Status(
-            session.armed,
-            model.top.traffic.buses(model.now_us),
-            model.top.view.bit_rate,
-            model.frames,
-            model.frames - self._counts[0],
-            model.lost,
-            model.unread,
-            session.sent,
-            session.trouble or model.failed,
-            model.ended,
-        )
+        line = [ARMED if session.armed else LISTENING]
+        for bus in model.top.traffic.buses(model.now_us):
+            load = load_text(bus.load.latest.bits, model.top.view.bit_rate)
+            line.append((f" {bus.channel} {load}", ""))
+            if bus.errors.state is not None:
+                state = bus.errors.state.name.lower().replace("_", "-")
+                line.append((f" {state}", "" if state == "active" else ALARM))
+            line += [(f" {bus.errors.frames} error frames", WARNING)] if bus.errors.frames else []
+        line.append((f"  {model.frames} frames  {model.frames - self._counts[0]}/s", ""))
+        line.append((f"  lost {model.lost}", ALARM if model.lost else ""))
+        line += [(f"  passed over {model.unread}", ALARM)] if model.unread else []
+        line += [(f"  sent {session.sent}", "")] if session.sent else []
+        trouble = session.trouble or model.failed
+        line += [(f"  {trouble}", ALARM)] if trouble else []
+        line += [("  end of the log", "")] if model.ended and not trouble else []
+        return tuple(line)
 
     def render_line(self, y: int) -> Strip:
         """Return the line for the screen."""

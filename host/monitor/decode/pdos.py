@@ -173,6 +173,16 @@ class Pdo(NamedTuple):
         """As `Decoded.kind`."""
         return f"{_RPDO if self.receives else _TPDO}{self.number}"
 
+    @property
+    def parameter(self) -> int:
+        """The index of its communication parameter."""
+        return _INDICES[_RPDO if self.receives else _TPDO][0] + self.number - 1
+
+    @property
+    def mapping(self) -> int:
+        """The index of its mapping."""
+        return self.parameter + 0x200
+
 
 class PdoTable:
     """PDOs by CAN-ID, as far as anybody said what they are."""
@@ -191,7 +201,7 @@ class PdoTable:
         before = self._can_ids.pop(pdo, None)
         if before is not None:
             del self._by_can_id[before][pdo]
-        can_id, layout = _can_id(pdo, memory), _layout(pdo, memory)
+        can_id, layout = can_id_of(pdo, memory), _layout(pdo, memory)
         if can_id is None or layout is None:
             return set() if before is None else {before}
         self._can_ids[pdo] = can_id
@@ -213,10 +223,10 @@ def pdos_of(node: int, indices: Iterable[int]) -> set[Pdo]:
     return {pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
 
 
-def _can_id(pdo: Pdo, memory: NodeMemory) -> int | None:
+def can_id_of(pdo: Pdo, memory: NodeMemory) -> int | None:
     """Return its CAN-ID; None if it is not valid or not known."""
-    parameter, _, predefined = _INDICES[_RPDO if pdo.receives else _TPDO]
-    cob_id = memory.number(parameter + pdo.number - 1, 1)
+    predefined = _INDICES[_RPDO if pdo.receives else _TPDO][2]
+    cob_id = memory.number(pdo.parameter, 1)
     if cob_id is not None:
         return None if cob_id & (INVALID | EXTENDED) else cob_id & CAN_ID_MASK
     if pdo.number > PREDEFINED:
@@ -225,12 +235,10 @@ def _can_id(pdo: Pdo, memory: NodeMemory) -> int | None:
 
 
 def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
-    parameter, mapping, _ = (
-        first + pdo.number - 1 for first in _INDICES[_RPDO if pdo.receives else _TPDO]
-    )
+    mapping = pdo.mapping
     count, source = memory.number(mapping, 0), memory.source(mapping)
     if count is None:
-        source = memory.source(parameter)
+        source = memory.source(pdo.parameter)
         note = f"{UNMAPPED}: {mapping:04X}h was not heard"
         return PdoLayout((pdo.kind, pdo.node, source), note=note) if source else None
     if count in MPDO:

@@ -8,20 +8,15 @@ from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.node_memory import EdsObjects, NodeMemory
 from tickrig.host.monitor.decode.object_text import ObjectText
+from tickrig.host.monitor.decode.pdos import PDOS, Pdo, can_id_of
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.text.values import Setting, parse_setting
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject, pack_bits
 from tickrig.wire.errors import FieldError
 
 _PDO: Final = re.compile(r"([0-9]{1,3})\.([rt])pdo([0-9]{1,3})", re.IGNORECASE | re.ASCII)
-_BASES: Final = {"r": (0x1400, 0x1600, 0x200), "t": (0x1800, 0x1A00, 0x180)}
-"""First communication parameter, first mapping, pre-defined CAN-ID of the first PDO."""
-
-PREDEFINED: Final = 4
-PDOS: Final = 512
 
 
 class _Place(NamedTuple):
@@ -60,20 +55,15 @@ class PdoFrames:
             raise ValueError(f"{pdo}: nobody described node {node}; give --eds {node}=FILE")
         if not 1 <= number <= PDOS:
             raise ValueError(f"{pdo}: PDOs are numbered 1 to {PDOS}")
-        index, mapping, can_id = _BASES[match[2].lower()]
-        places = _places(memory, mapping + number - 1, pdo)
+        sent = Pdo(match[2].lower() == "r", node, number)
+        places = _places(memory, sent.mapping, pdo)
         values = _values(places, settings, pdo)
         fields = [(values[place], place.mapped.bits) for place in places]
-        predefined = can_id + 0x100 * (number - 1) + node if number <= PREDEFINED else None
-        return CanFrame(_can_id(memory, index + number - 1, predefined, pdo), pack_bits(fields))
-
-
-def _can_id(memory: NodeMemory, index: int, predefined: int | None, pdo: str) -> int:
-    cob_id = memory.number(index, 1)
-    cob_id = predefined if cob_id is None else cob_id
-    if cob_id is None or cob_id & (INVALID | EXTENDED):
-        raise ValueError(f"{pdo}: it has no CAN-ID ({write_entry((index, 1))} is not valid)")
-    return cob_id & CAN_ID_MASK
+        can_id = can_id_of(sent, memory)
+        if can_id is None:
+            entry = write_entry((sent.parameter, 1))
+            raise ValueError(f"{pdo}: it has no CAN-ID ({entry} is not valid)")
+        return CanFrame(can_id, pack_bits(fields))
 
 
 def _places(memory: NodeMemory, index: int, pdo: str) -> list[_Place]:
