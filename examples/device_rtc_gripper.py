@@ -1,7 +1,6 @@
 """A gripper as DeviceRTC: an RT component on the microcontroller of a CANopen slave.
 
 Run it with `canopen-slave-emu --rtc examples/device_rtc_gripper.py:Gripper --node-id 16`.
-NMT Start activates it; while its motor is hot it ends in Error.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ STEP_UM, HOT_DC = 500, 900
 
 
 class Gripper(CanopenComponent):
-    """Opens to what the in-port says, 500 um each 10 ms, and says how wide it is."""
+    """Opens to what the in-port says once NMT Start activated it; ends in Error while hot."""
 
     type_name = "Gripper"
     category = "actuator"
