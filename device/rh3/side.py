@@ -9,8 +9,7 @@ from typing import Final
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import PER_MILLE, BaseParameters
-from tickrig.device.rh3.position_loop import PositionLoop
-from tickrig.device.rh3.speed_loop import SpeedLoop
+from tickrig.device.rh3.speed_loop import PositionLoop, SpeedLoop
 from tickrig.device.rh3.wheel import Wheel
 from tickrig.wire.rh3 import Fault
 

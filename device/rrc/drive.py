@@ -3,13 +3,63 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
+from math import isqrt
 
 from tickrig.device.physical import InputBank
 from tickrig.device.rrc.gearbox import Gear, Gearbox
-from tickrig.device.rrc.limits import apply_limits
 from tickrig.device.rrc.settings import Settings
-from tickrig.device.rrc.shaping import shape
 from tickrig.device.rrc.states import RrcState
+from tickrig.wire.rrc.commands import Limit
+
+
+@lru_cache(maxsize=256)
+def shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
+    """Return the output magnitude for each input magnitude from 0 to 100 %.
+
+    The exponent acts on the stick position between the dead zones, and the
+    result is rounded half up (DECISION R16).
+
+    Args:
+        low_pct: what counts as 0, 0..99 %.
+        high_pct: what counts as 100, above `low_pct`, at most 100 %.
+        exponent: 0..15; the power is 1 + 0.1 * exponent.
+    """
+    span, power = high_pct - low_pct, 1 + 0.1 * exponent
+    positions = [min(max(a - low_pct, 0), span) / span for a in range(101)]
+    return tuple(int(100 * s**power + 0.5 + 1e-9) for s in positions)
+
+
+def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
+    """Shape one axis, -100..100 %; the sign is kept (RRC manual, `joystick` #1 to #6).
+
+    >>> shape(-50, 0, 100, 5)
+    -35
+    """
+    table = shape_table(low_pct, high_pct, exponent)
+    return table[value_pct] if value_pct >= 0 else -table[-value_pct]
+
+
+def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
+    """Return translation and rotation within the limits, signs kept (RRC manual, `limit`).
+
+    First each input is cut off at its own limit. Then one common factor, which
+    keeps the direction, is the smallest that sum, product and radius ask for;
+    all is integer and rounds down (DECISION R19).
+
+    >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
+    (-45, -65)
+    """
+    a, b = min(abs(v_pct), limit.v_pct), min(abs(w_pct), limit.w_pct)
+    candidates = [(a, b)]
+    if a + b > limit.sum_pct:
+        candidates.append((a * limit.sum_pct // (a + b), b * limit.sum_pct // (a + b)))
+    if a * b > (product := 100 * limit.product_pct):
+        candidates.append((isqrt(product * a // b), isqrt(product * b // a)))
+    if (square := a * a + b * b) > (most := limit.radius_pct * limit.radius_pct):
+        candidates.append((isqrt(a * a * most // square), isqrt(b * b * most // square)))
+    a, b = min(c[0] for c in candidates), min(c[1] for c in candidates)
+    return (a if v_pct >= 0 else -a), (b if w_pct >= 0 else -b)
 
 
 @dataclass(slots=True)

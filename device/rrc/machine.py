@@ -10,10 +10,9 @@ from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.controller import chosen_mode, look_at_buttons
 from tickrig.device.rrc.drive import Drive
-from tickrig.device.rrc.interpreter import read_line
 from tickrig.device.rrc.load import LoadAccount
 from tickrig.device.rrc.power import PowerSequence
-from tickrig.device.rrc.receive_buffer import ReceiveBuffer
+from tickrig.device.rrc.receive_buffer import ReceiveBuffer, read_line
 from tickrig.device.rrc.settings import Settings
 from tickrig.device.rrc.states import NEXT_STATE, POWERED_ON, Move, RrcState
 from tickrig.device.rrc.terminals import OUTPUTS, new_inputs

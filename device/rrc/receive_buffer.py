@@ -1,9 +1,14 @@
-"""The RRC's receive buffer and what happens when it is full."""
+"""What comes over the line: bytes that wait, lines, commands and refusals."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+
+from tickrig.wire.errors import ChecksumError
+from tickrig.wire.rrc.check import strip_check
+from tickrig.wire.rrc.commands import BadParameters, Command, UnknownCommand, parse_command
+from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, COMMAND_UNKNOWN, Refusal
 
 
 @dataclass(slots=True)
@@ -55,3 +60,18 @@ class ReceiveBuffer:
         self._used += len(piece)
         self._begun += piece
         return False
+
+
+def read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:
+    """Return what a line without LF asks for, its refusal (DECISION R11), or None if empty."""
+    message = line.removesuffix(b"\r")
+    if not message:
+        return None
+    try:
+        return parse_command(strip_check(message) if check_wanted else message)
+    except ChecksumError:
+        return Refusal(COMMAND_CHECKSUM)
+    except UnknownCommand:
+        return Refusal(COMMAND_UNKNOWN)
+    except BadParameters as error:
+        return Refusal(error.name.decode())

@@ -1,4 +1,4 @@
-"""A byte link into a rig in virtual time."""
+"""What is beside a rig and makes its virtual time pass: a byte link, a clock."""
 
 from __future__ import annotations
 
@@ -69,3 +69,24 @@ class SimLink:
     def _check_open(self) -> None:
         if self._closed:
             raise LinkClosed("the link was closed")
+
+
+class RigClock:
+    """A clock whose time passes as its rig is stepped.
+
+    With it a system of RT components (`host.rtc.real_time`) and the emulated
+    devices behind its proxies run in virtual time together.
+
+    Args:
+        rig: stepped while somebody waits.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig, self._start_us = rig, rig.now_us
+
+    def wait_until(self, t_us: int, /) -> int:
+        """Step the rig until it is `t_us`; return by how much it was late."""
+        late_us = self._rig.now_us - self._start_us - t_us
+        if late_us < 0:
+            self._rig.run_for(-late_us)
+        return max(0, late_us)

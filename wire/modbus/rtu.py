@@ -4,14 +4,22 @@ r"""Frames of Modbus RTU: an address, a message, and a CRC with its low byte fir
 '01 03 02 00 00 01 85 b2'
 >>> parse_frame(bytes.fromhex("01 03 02 00 00 01 85 b2"))
 (1, b'\x03\x02\x00\x00\x01')
+>>> f"{crc16(b'123456789'):04X}"
+'4B37'
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
+import crcmod
+
 from tickrig.wire.errors import ChecksumError, FramingError
-from tickrig.wire.modbus.crc import crc16
+
+crc16: Final[Callable[[bytes], int]] = crcmod.mkCrcFun(0x1_8005, 0xFFFF, rev=True, xorOut=0)
+"""The CRC over address, function code and data: polynomial 8005h, reflected, initial value FFFFh
+(Modbus over Serial Line 1.02, CRC Checking)."""
 
 MAX_FRAME_BYTES: Final = 256
 MIN_FRAME_BYTES: Final = 4

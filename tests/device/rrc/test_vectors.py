@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from tests.device.rrc.bench import RrcBench
+from tickrig.device.rrc.drive import apply_limits, shape
 from tickrig.device.rrc.gearbox import Gearbox
-from tickrig.device.rrc.limits import apply_limits
-from tickrig.device.rrc.shaping import shape
 from tickrig.wire.rrc.commands import Joystick, Limit
 
 VECTORS: dict[str, list[dict[str, Any]]] = json.loads(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tickrig.device.servo.i2t import I2t
+from tickrig.device.servo.heat import I2t
 from tickrig.device.servo.presets import EPOS_24_5
 
 PEAK, CONTINUOUS = 10.0, 5.0

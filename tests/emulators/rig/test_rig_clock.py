@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.rig_clock import RigClock
+from tickrig.emulators.rig.sim_link import RigClock
 
 
 def test_waiting_steps_the_rig() -> None:

@@ -26,8 +26,7 @@ from tickrig.emulators.canopen.build import make_bench
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.rig.rig_clock import RigClock
-from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.sim_link import RigClock, SimLink
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator
