@@ -98,3 +98,18 @@ def test_a_silent_client_is_waited_for_as_long_as_was_said() -> None:
 def test_limits_that_cannot_be_are_refused(wrong: dict[str, int], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         SdoLimits(**wrong)
+
+
+def test_all_strings_and_domains_may_hold_64_mib_unless_told_otherwise() -> None:
+    bus = booted()
+    client = Client(bus)
+    left = 64 * 1024 * 1024 - len("text")
+    refused = client.ask(BlockDownloadInitiateRequest(FIRMWARE, 1, crc=True, size=left + 1))
+    assert refused == aborted(AbortCode.OUT_OF_MEMORY)
+    taken = client.ask(BlockDownloadInitiateRequest(FIRMWARE, 1, crc=True, size=left))
+    assert not isinstance(taken, Abort)
+
+
+def test_the_shortest_time_out_is_1_us_and_the_smallest_memory_nothing() -> None:
+    limits = SdoLimits(timeout_us=1, memory_bytes=0)
+    assert (limits.timeout_us, limits.memory_bytes) == (1, 0)
