@@ -1,6 +1,6 @@
 """f-palette-CANopen: 8 digital inputs, 8 digital outputs, 8 analogue inputs (NEDO report, table 7).
 
-Its documents are lost; channels, node-ID and converter are decision K22 of the project.
+Its documents are lost; channels, node-ID and converter are DECISION K22.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Objects of the motor core unit Ver. 1.1 (NEDO report, 3.4.43.3, Tables 5 and 6; ours: K19)."""
+"""Objects of the motor core unit Ver. 1.1 (NEDO report, 3.4.43.3, Tables 5 and 6; DECISION K19)."""
 
 from __future__ import annotations
 

@@ -174,7 +174,7 @@ MEASURED: Final = 0x6401
 
 
 class Status(IntFlag):
-    """Bits of 2001h (our decision K19)."""
+    """Bits of 2001h (DECISION K19)."""
 
     ON = 1
     REACHED = 2

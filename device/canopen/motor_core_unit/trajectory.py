@@ -16,7 +16,7 @@ from math import isqrt
 from typing import Final
 
 CONTROL_US: Final = 10_000
-"""The control tick (our decision K19)."""
+"""The control tick (DECISION K19)."""
 
 DEGREE: Final = 1_000_000_000
 """Nanodegrees."""

@@ -18,7 +18,7 @@ SETTINGS: Final = (CURRENT_SETTING, POSITION_SETTING, VELOCITY_SETTING)
 class PositionSetting(LatchedSetPoint):
     """Position mode, -1: 2062h in position units.
 
-    That bit 8 of the controlword does nothing in these modes is our decision.
+    That bit 8 of the controlword does nothing in these modes is DECISION K21.
     """
 
     index = POSITION_SETTING
@@ -33,7 +33,7 @@ class VelocitySetting(Mode):
     """Velocity mode, -2: 206Bh in velocity units.
 
     When the mode is chosen while the drive is enabled, 206Bh takes the present
-    velocity (ours).
+    velocity (DECISION K21).
     """
 
     control = Control.VELOCITY
@@ -57,7 +57,7 @@ class CurrentSetting(Mode):
     """Current mode, -3: 2030h in milliamperes.
 
     When the mode is chosen while the drive is enabled, 2030h takes the present
-    current (ours).
+    current (DECISION K21).
     """
 
     control = Control.CURRENT
