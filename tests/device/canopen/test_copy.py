@@ -12,6 +12,8 @@ from tests.device.canopen.pdo_bench import OFF, PdoBench
 from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
+from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame, Frames
 
@@ -85,3 +87,16 @@ def test_a_copy_of_a_drive_that_moves_moves_on(
         now_us += 1_000
         assert twin.tick(now_us, ()) == slave.tick(now_us, ())
     assert [entry.data for entry in twin.dictionary] == [entry.data for entry in slave.dictionary]
+
+
+@each_copy
+def test_a_copy_of_a_unit_with_a_fault_has_it_too(
+    copied: Callable[[CanopenSlave], CanopenSlave],
+) -> None:
+    slave = make_motor_core_unit(5)
+    slave.tick(1_000, ())
+    unit = MotorCoreUnit.of(slave)
+    unit.inputs.set("supply_v", 80)
+    slave.tick(2_000, ())
+    twin = MotorCoreUnit.of(copied(slave))
+    assert unit.read("status") == twin.read("status") == "over-voltage"

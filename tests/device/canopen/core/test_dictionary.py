@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import pytest
 
+from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.wire.canopen.datatypes import DataType
+from tickrig.device.canopen.core.entry import Entry
+from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.sdo.abort import AbortCode
 
 
 def make(index: int, sub: int = 0) -> EntryDescription:
@@ -27,3 +30,20 @@ def test_elements_end_at_a_gap() -> None:
     dictionary = Dictionary([make(0x2000, sub) for sub in (0, 1, 2, 4)])
     assert [entry.sub for entry in dictionary.elements(0x2000)] == [1, 2]
     assert [entry.sub for entry in dictionary.elements(0x2000, most=1)] == [1]
+
+
+def test_a_dictionary_has_as_many_entries_as_were_described() -> None:
+    assert len(Dictionary([make(0x2000), make(0x2001)])) == 2
+
+
+def test_an_owner_judges_a_value_before_it_is_there() -> None:
+    entry = Dictionary([make(0x2000)])[0x2000, 0]
+    entry.check_owner(b"\x07")
+
+    def guard(entry: Entry, value: Value) -> None:
+        raise SdoAbort(AbortCode.LOCAL_CONTROL)
+
+    entry.guard = guard
+    with pytest.raises(SdoAbort, match="LOCAL_CONTROL"):
+        entry.check_owner(b"\x07")
+    assert entry.value == 0

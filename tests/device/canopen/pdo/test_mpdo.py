@@ -103,6 +103,11 @@ def test_without_such_a_tpdo_nothing_is_written(sam: PdoBench) -> None:
     assert sam.step() == []
 
 
+def test_an_event_without_an_object_sends_no_mpdo(sam: PdoBench) -> None:
+    PdoProducer.of(sam.slave).request(1)
+    assert sam.run(3) == []
+
+
 def test_source_address_mode_sends_each_change_of_a_scanned_object(sam: PdoBench) -> None:
     sam.set(0x6000, 1, 1)
     sam.set(0x6401, 4, -2)
