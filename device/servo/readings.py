@@ -9,9 +9,10 @@ from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import Plant
 from tickrig.device.servo.setting import Setting
 from tickrig.device.servo.thermal import Temperatures
+from tickrig.device.twin import Copyable
 
 
-class Readings:
+class Readings(Copyable):
     """The servo as seen; `Servo` says what its attributes are.
 
     Whole numbers are what the drive measures, fractions what an observer sees.

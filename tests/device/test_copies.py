@@ -34,6 +34,7 @@ from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Copyable, NonCopyable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
@@ -64,6 +65,7 @@ MACHINES: Final[dict[str, Callable[[], object]]] = {
     "RH3 base": Rh3Base,
     "Modbus slave": lambda: Rh3Base().slave,
     "URG": Urg,
+    "servo": lambda: Servo(EPOS_WHEEL),
     "wheeled body": lambda: WheeledBody(WHEELS),
     "omni body": OmniBody,
     "CANopen slave": slave,
@@ -145,3 +147,15 @@ FROZEN: Final = (
 @pytest.mark.parametrize("value", FROZEN, ids=lambda value: type(value).__name__)
 def test_values_are_copied(value: object) -> None:
     assert copy.copy(value) == copy.deepcopy(value) == pickle.loads(pickle.dumps(value)) == value
+
+
+def test_a_servo_goes_on_in_its_copy_and_leaves_it_alone() -> None:
+    servo, alone = Servo(EPOS_WHEEL), Servo(EPOS_WHEEL)
+    for each in (servo, alone):
+        each.drive_velocity(5_000.0)
+        each.step_to(40_000)
+    twin, other = copy.deepcopy(servo), pickle.loads(pickle.dumps(servo))
+    other.drive_current(-3.0)
+    for each in (other, twin, servo, alone):
+        each.step_to(1_000_000)
+    assert twin.counts == servo.counts == alone.counts != other.counts
