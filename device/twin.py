@@ -90,6 +90,8 @@ class NonCopyable:
 class Listeners(list[T]):
     """Callbacks of somebody outside. A twin begins with none: nobody listens to it yet."""
 
+    __slots__ = ()
+
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> tuple[type[Listeners[T]], tuple[()]]:
         """Copy none of them."""
         return Listeners, ()
@@ -97,6 +99,8 @@ class Listeners(list[T]):
 
 class Cache(dict[K, T]):
     """What can be worked out again. A twin begins with nothing."""
+
+    __slots__ = ()
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> tuple[type[Cache[K, T]], tuple[()]]:
         """Copy nothing of it."""
