@@ -19,6 +19,11 @@ VIOLATIONS = {
         "device/__init__.py",
         "import tickrig.host.links.link",
     ),
+    "a rig knows a wire": ("emulators/rig/rig.py", "import tickrig.emulators.can.wire"),
+    "one wire knows another": (
+        "emulators/serial/serial_line.py",
+        "import tickrig.emulators.can.wire",
+    ),
     "wire knows an emulator": ("wire/errors.py", "import tickrig.emulators.rig.clock"),
 }
 
