@@ -76,18 +76,18 @@ def test_a_pty_and_the_control_socket_reach_it(
     assert running.stdout is not None
     assert running.stdout.readline() == b"tty\n"  # it is up
     with ControlClient(tmp_path / "control") as control:
-        assert control.ask("get", names=["state"])["values"] == {"state": "Cold"}
+        assert control.request("get", names=["state"])["values"] == {"state": "Cold"}
         link = SerialLink(str(tmp_path / "tty"), 9_600)
         link.send(b"heat\n")
         heard = b""
         while not heard.endswith(b"\n"):
             heard += link.receive(5_000_000)
         assert heard == b"ok\n"
-        control.ask("set", name="water_ml", value=0)
-        control.ask("press", name="lid_open")
-        assert control.ask("status")["device"] == "kettle"
+        control.request("set", name="water_ml", value=0)
+        control.request("press", name="lid_open")
+        assert control.request("status")["device"] == "kettle"
         link.close()
-        control.ask("stop")
+        control.request("stop")
     assert running.wait() == 0
 
 

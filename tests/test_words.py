@@ -19,20 +19,33 @@ RETIRED = frozenset(
 
 
 def names(tree: ast.AST) -> Iterator[str]:
-    """Yield the names that a module gives: classes, functions, arguments, attributes, values."""
+    """Yield the names of classes, functions, their arguments, attributes, fields."""
     for node in ast.walk(tree):
         match node:
-            case ast.ClassDef(name=name) | ast.FunctionDef(name=name):
+            case ast.ClassDef(name=name, body=body):
                 yield name
-            case ast.AsyncFunctionDef(name=name) | ast.Attribute(attr=name):
+                yield from _fields(body)
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
                 yield name
-            case ast.Name(id=name, ctx=ast.Store()):
+            case ast.Attribute(attr=name) | ast.arg(arg=name):
+                yield name
+            case ast.Module(body=body):
+                yield from _fields(body)
+
+
+def _fields(body: list[ast.stmt]) -> Iterator[str]:
+    """Yield what stands in the body of a class or a module: fields, constants."""
+    for statement in body:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
                 yield name
 
 
 def test_names_are_found() -> None:
-    source = "class Old:\n    def tell(self, told):\n        self.late_us = taken = told.agenda\n"
-    assert {*names(ast.parse(source))} == {"Old", "tell", "late_us", "taken", "agenda"}
+    source = (
+        "class A:\n    b = 1\n    c: int\n    def d(self, e):\n        self.f = l = e.g\nH = 1\n"
+    )
+    assert {*names(ast.parse(source))} == {"A", "b", "c", "d", "self", "e", "f", "g", "H"}
 
 
 def test_no_retired_word_is_left() -> None:

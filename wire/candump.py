@@ -30,17 +30,17 @@ class LogLine(NamedTuple):
     Attributes:
         at_us: when it had ended.
         channel: name of the bus, without blanks.
-        heard: what was on the bus.
+        received: what was on the bus.
     """
 
     at_us: int
     channel: str
-    heard: CanFrame | ErrorFrame
+    received: CanFrame | ErrorFrame
 
     def __str__(self) -> str:
         """Write the line, without LF."""
         seconds, micros = divmod(self.at_us, 1_000_000)
-        return f"({seconds:010d}.{micros:06d}) {self.channel} {self.heard}"
+        return f"({seconds:010d}.{micros:06d}) {self.channel} {self.received}"
 
 
 def parse_line(line: str, number: int = 1) -> LogLine:

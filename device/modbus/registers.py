@@ -60,7 +60,7 @@ class Registers:
         }
         self._measured = measured
         self._values: dict[str, int] = {}
-        self._asked, self._places = (0, 0), list[tuple[str, int]]()  # of the latest read
+        self._latest_read, self._places = (0, 0), list[tuple[str, int]]()  # of the latest read
         self.reset()
 
     def reset(self) -> None:
@@ -78,11 +78,11 @@ class Registers:
 
     def check(self, first: int, count: int) -> None:
         """Raise Refusal if a register is not there."""
-        if (first, count) == self._asked:
+        if (first, count) == self._latest_read:
             return
         found = [self._find(address) for address in range(first, first + count)]
         self._places = [(r.name, 16 * (r.words - 1 - word)) for r, word in found]
-        self._asked = (first, count)
+        self._latest_read = (first, count)
 
     def read(self, first: int, count: int) -> list[int]:
         """Return registers; Refusal if one is not there."""

@@ -34,14 +34,14 @@ class ModbusSlave(Copyable):
 
     Args:
         registers: what it holds.
-        written: told what a master wrote, by name.
+        written: called with what a master wrote, by name.
         address: 1..247.
         silence_us: what ends a frame.
 
     Attributes:
         served: requests for this slave that were answered or obeyed.
         garbled: frames with a wrong length or CRC.
-        heard_us: when the last request for this slave was served.
+        last_request_us: when the last request for this slave was served.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class ModbusSlave(Copyable):
     def reset(self) -> None:
         """Forget what was heard."""
         self._frame, self._last_us = b"", 0
-        self.served = self.garbled = self.heard_us = 0
+        self.served = self.garbled = self.last_request_us = 0
 
     @property
     def due_us(self) -> int:
@@ -83,7 +83,7 @@ class ModbusSlave(Copyable):
             return b""
         if address not in (BROADCAST, self._address):
             return b""
-        self.served, self.heard_us = self.served + 1, now_us
+        self.served, self.last_request_us = self.served + 1, now_us
         answer = self._obey(message)
         return b"" if address == BROADCAST else encode_frame(address, answer)
 

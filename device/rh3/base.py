@@ -192,7 +192,7 @@ class Rh3Base(Copyable):
     def _step(self) -> None:
         driver, ground = self._driver, self.ground
         if self._on:
-            driver.step(self.slave.heard_us)
+            driver.step(self.slave.last_request_us)
         else:
             driver.coast()
         left, right = self.sides

@@ -92,15 +92,15 @@ class Driver:
         if values.keys() & DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
-    def step(self, heard_us: int) -> None:
+    def step(self, last_request_us: int) -> None:
         """Let a millisecond pass.
 
         Args:
-            heard_us: when the master was heard last.
+            last_request_us: when the master was heard last.
         """
         if self._waiting:
             self._take_waiting()
-        if self.now_us - heard_us >= self._watch_us:
+        if self.now_us - last_request_us >= self._watch_us:
             self._watch()
         left, right = self.sides
         if left.stalled or right.stalled:

@@ -80,7 +80,7 @@ def obey(sensor: Sensor, now_us: int, line: bytes) -> bytes:
     return encode_reply(line, ERROR)
 
 
-def _tell(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
+def _version(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     lines = (f"{key}:{text}".encode() for key, text in first_version(sensor.serial).items())
     return encode_reply(match[0], OK, lines)
 
@@ -111,7 +111,7 @@ def _switch(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
 
 
 _COMMANDS: Final[Mapping[re.Pattern[bytes], Callable[[Sensor, int, re.Match[bytes]], bytes]]] = {
-    re.compile(rb"V"): _tell,
+    re.compile(rb"V"): _version,
     re.compile(rb"L([01])"): _laser,
     re.compile(rb"G(\d{3})(\d{3})(\d\d)"): _get,
     re.compile(rb"S(\d{6})\d{7}"): _rate,

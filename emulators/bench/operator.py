@@ -77,7 +77,7 @@ class Operator(Copyable):
         tick_us: the device's control period.
         event_queue: where releases and faults of a later time are entered.
         wire: the port at which wire faults are armed.
-        note: told of each change, as `power_button=1`.
+        note: called with each change, as `power_button=1`.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}

@@ -30,7 +30,7 @@ class RunningEmulator(ABC):
         event_queue: what is to be done between ticks, by whoever makes the rig's time pass.
         log: the latest lines or frames on the wire.
         rig: the rig.
-        after_step: told the time after each step.
+        after_step: called with the time after each step.
         running: False once `stop` was called.
     """
 

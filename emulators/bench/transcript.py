@@ -34,13 +34,13 @@ class Transcript:
         self._emulator, self._write, self._wanted = emulator, write, wanted
         self._shown: dict[str, Setting] = {}
         self._sending = False
-        emulator.operator.note = lambda text: self.tell(emulator.effective_us, "!", text)
+        emulator.operator.note = lambda text: self.write(emulator.effective_us, "!", text)
         emulator.log.listeners.append(self._hear)
         emulator.after_step.append(self._look)
         if STATE in emulator.device.outputs:
             self.watch(emulator.effective_us, STATE)
 
-    def tell(self, now_us: int, mark: str, text: str) -> None:
+    def write(self, now_us: int, mark: str, text: str) -> None:
         """Write a line."""
         self._write(f"{format_time(now_us)} {mark} {text}".rstrip())
 
@@ -52,7 +52,7 @@ class Transcript:
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
         """Send as the host, and show it at once, line or not."""
-        self.tell(now_us, Mark.TO_DEVICE, escape(shown))
+        self.write(now_us, Mark.TO_DEVICE, escape(shown))
         self._sending = True
         self._emulator.send(now_us, data)
         self._sending = False
@@ -61,11 +61,11 @@ class Transcript:
         for name, shown in self._shown.items():
             if (value := look_at(self._emulator.device, name)) != shown:
                 self._shown[name] = value
-                self.tell(now_us, "*", f"{name} {value}")
+                self.write(now_us, "*", f"{name} {value}")
 
     def _hear(self, line: WireLine) -> None:
         if not self._sending and self._wanted(line):
-            self.tell(line.at_us, line.mark, escape(line.data))
+            self.write(line.at_us, line.mark, escape(line.data))
 
 
 class FrameTranscript(Transcript):

@@ -82,7 +82,7 @@ class CanEnd(Copyable):
         held: no frame of it starts before this, in units of the segment.
         lost: frames that found a queue or inbox full, or the node bus-off.
         unfiltered: its filter is out of use until it is polled.
-        on_error_state: told the time and the new state when the error state changes.
+        on_error_state: called with the time and the new state when the error state changes.
         auto_recovery: it leaves bus-off by itself, as most drivers let it.
     """
 
@@ -172,7 +172,7 @@ class CanEnd(Copyable):
         """Take a frame from the bus."""
         if not self.inbox:
             self.wake(at_us)
-            self.segment.heard = True
+            self.segment.received = True
         elif len(self.inbox) >= QUEUE_FRAMES:
             self.lost += 1
             return
@@ -215,4 +215,4 @@ class CanEnd(Copyable):
         if self.auto_recovery and self.controller.state is ErrorState.BUS_OFF:
             self.recover(at_us)
         self.wake(at_us)
-        self.segment.heard = True
+        self.segment.received = True

@@ -93,7 +93,7 @@ class FaultConfinement:
 
     Args:
         ends: all ends of the bus.
-        changed: told the time and the end whenever an error state changes.
+        changed: called with the time and the end whenever an error state changes.
 
     Attributes:
         marked: ends with a counter that is not 0.

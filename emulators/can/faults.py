@@ -63,7 +63,7 @@ class CanFaults:
 
     Args:
         seed: seed of all chance in it.
-        changed: told of each fault that begins (True) or ends (False).
+        changed: called with each fault that begins (True) or ends (False).
 
     Attributes:
         fault_types: the faults that can be armed, by name.

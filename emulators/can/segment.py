@@ -36,7 +36,7 @@ class CanSegment(TransmissionOutcomes):
     Attributes:
         now_us: how far the bus was moved on.
         shorted: nobody can send.
-        heard: a frame woke a station since `advance_until_heard` was called.
+        received: a frame woke a station since `advance_until_received` was called.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class CanSegment(TransmissionOutcomes):
     ) -> None:
         super().__init__(bit_rate, faults, observers)
         self.now_us, self.shorted = start_us, False
-        self.heard: bool
+        self.received: bool
         self._lengths: Cache[CanFrame, int] = Cache()
         self._finish: Callable[[], None]  # of the plan
 
@@ -62,23 +62,23 @@ class CanSegment(TransmissionOutcomes):
 
     def advance(self, now_us: int) -> None:
         """Let everything end that ends by `now_us`."""
-        while self.advance_until_heard(now_us):
+        while self.advance_until_received(now_us):
             pass
         self.now_us = max(self.now_us, now_us)
 
-    def advance_until_heard(self, until_us: int) -> bool:
+    def advance_until_received(self, until_us: int) -> bool:
         """Let everything end up to the first frame that wakes a station; False if none did."""
-        self.heard = False
+        self.received = False
         if self._stale:
             self._plan()
         while self._due_us <= until_us:
             self._finish()
             self._stale = True
             if self._news:
-                self._tell_news()
+                self._notify_changes()
             if self._stale:
                 self._plan()
-            if self.heard:
+            if self.received:
                 return True
         return False
 
@@ -212,10 +212,10 @@ class CanSegment(TransmissionOutcomes):
     def _collide(self) -> None:
         """Plan what happens when several send one identifier with different contents."""
         frames = [end.queue[0] for end in self._winners]
-        heard = dominant(frames)
-        losers = [end for end in self._winners if end.queue[0] != heard]
+        received = dominant(frames)
+        losers = [end for end in self._winners if end.queue[0] != received]
         if all(end.controller.state is ErrorState.PASSIVE for end in losers):
-            self._settle(self._override, self._length(heard))
+            self._settle(self._override, self._length(received))
         else:
             self._settle(self._fail, first_difference(frames) + ECHO_BITS + ERROR_BITS)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
 Observer = Callable[[int, CanFrame | ErrorFrame], None]
-"""Told each frame and each error frame with the time at which it had ended."""
+"""Called with each frame and each error frame with the time at which it had ended."""
 
 RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
 SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
@@ -79,12 +79,12 @@ class TransmissionOutcomes:
         for end in self.routes.receivers(frame):
             if end not in winners:
                 end.receive(at_us, frame)
-        self._tell(frame)
+        self._notify(frame)
         self._confinement.failed_to_send(at_us, winners)
         self._end_attempt()
 
     def _override(self) -> None:
-        """Let the dominant frame through; the error flags of passive nodes are not heard."""
+        """Let the dominant frame through; the error flags of passive nodes are not received."""
         frame = dominant([end.queue[0] for end in self._winners])
         losers = [end for end in self._winners if end.queue[0] != frame]
         self._winners = [end for end in self._winners if end not in losers]
@@ -96,20 +96,20 @@ class TransmissionOutcomes:
     def _fail(self) -> None:
         """Tell all that a frame was broken; its senders will send again."""
         self._confinement.failed(self._due_us, self._winners)
-        self._tell(BIT_ERROR)
+        self._notify(BIT_ERROR)
         self._end_attempt()
 
     def _fail_alone(self) -> None:
         """The same, but nobody else hears anything."""
         self._confinement.failed_to_send(self._due_us, self._winners)
-        self._tell(BIT_ERROR)
+        self._notify(BIT_ERROR)
         self._end_attempt()
 
     def _go_unheard(self) -> None:
         """Find nobody to acknowledge; once that changes nothing more, it is not looked at."""
         passive = all(end.controller.state is ErrorState.PASSIVE for end in self._winners)
         self._confinement.unheard(self._due_us, self._winners)
-        self._tell(NO_ACK)
+        self._notify(NO_ACK)
         self._end_attempt()
         self._repeating = passive
 
@@ -124,7 +124,7 @@ class TransmissionOutcomes:
             end.queue.popleft()
         if self._confinement.marked:
             self._confinement.sent(self._due_us, self._winners)
-        self._tell(frame)
+        self._notify(frame)
         self._end_attempt()
 
     def _end_attempt(self) -> None:
@@ -147,16 +147,16 @@ class TransmissionOutcomes:
                 end.held = max(end.held, self._free + SUSPEND_BITS * self.bit)
                 self._arbiter.slow = True
 
-    def _tell(self, heard: CanFrame | ErrorFrame) -> None:
+    def _notify(self, received: CanFrame | ErrorFrame) -> None:
         for observe in self._observers:
-            observe(self._due_us, heard)
+            observe(self._due_us, received)
 
     def _state_changed(self, at_us: int, end: CanEnd) -> None:
         end.open(on_bus=end.controller.state is not ErrorState.BUS_OFF)
         self._recount(at_us)
         self._news.append((at_us, end))
 
-    def _tell_news(self) -> None:
+    def _notify_changes(self) -> None:
         news, self._news = self._news, []
         for at_us, end in news:
             end.error_state_changed(at_us)

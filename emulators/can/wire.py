@@ -41,7 +41,7 @@ class CanWire(Copyable):
         bit_rate: bits a second.
         bus: what all connected ends hear.
         faults: what is armed; `arm` and `clear` act at the time the bus has reached.
-        observers: told each frame and each error frame on the bus with its time.
+        observers: called with each frame and each error frame on the bus with its time.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()
@@ -93,7 +93,7 @@ class CanWire(Copyable):
             for apart in self._apart.values():
                 apart.advance(now_us)
 
-    def advance_until_heard(self, until_us: int) -> bool:
+    def advance_until_received(self, until_us: int) -> bool:
         """Let everything end up to the first frame that somebody heard.
 
         Args:
@@ -103,7 +103,7 @@ class CanWire(Copyable):
             Whether there was one.
         """
         if not self._apart:
-            return self.bus.advance_until_heard(until_us)
+            return self.bus.advance_until_received(until_us)
         due_us = self.due_us
         self.advance(min(due_us, until_us))
         return due_us <= until_us

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.control import ask
+from tickrig.host.cli.control import request
 from tickrig.host.cli.refused import time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
@@ -22,26 +22,28 @@ Names = Callable[[Any], Iterator[str]]
 """Gives names of what an emulator says to `describe`."""
 
 
-def buttons(told: Any) -> Iterator[str]:
+def buttons(described: Any) -> Iterator[str]:
     """Give what can be pressed."""
-    return (each["name"] for each in told.get("inputs", ()) if each["kind"] == "button")
+    return (each["name"] for each in described.get("inputs", ()) if each["kind"] == "button")
 
 
-def faults(told: Any) -> Iterator[str]:
+def faults(described: Any) -> Iterator[str]:
     """Give faults of the wire, then of the device."""
-    yield from (each["name"] for each in told.get("wire_faults", ()))
-    yield from (each["name"] for each in told.get("inputs", ()) if each["kind"] == "fault")
+    yield from (each["name"] for each in described.get("wire_faults", ()))
+    yield from (each["name"] for each in described.get("inputs", ()) if each["kind"] == "fault")
 
 
-def settable(told: Any) -> Iterator[str]:
+def settable(described: Any) -> Iterator[str]:
     """Give groups and inputs."""
-    yield from told.get("groups", ())
-    yield from (each["name"] for each in told.get("inputs", ()))
+    yield from described.get("groups", ())
+    yield from (each["name"] for each in described.get("inputs", ()))
 
 
-def seen(told: Any) -> Iterator[str]:
+def seen(described: Any) -> Iterator[str]:
     """Give inputs and outputs."""
-    yield from (each["name"] for each in [*told.get("inputs", ()), *told.get("outputs", ())])
+    yield from (
+        each["name"] for each in [*described.get("inputs", ()), *described.get("outputs", ())]
+    )
 
 
 def complete(names: Names) -> Complete:
@@ -51,10 +53,10 @@ def complete(names: Names) -> Complete:
         assert context.parent is not None
         try:
             with ControlClient(context.parent.params["socket"], PATIENCE_S) as client:
-                told = client.ask("describe")
+                described = client.request("describe")
         except (OSError, ValueError):  # nobody is there, or somebody else
             return []
-        return [name for name in names(told) if name.startswith(begun)]
+        return [name for name in names(described) if name.startswith(begun)]
 
     return completed
 
@@ -136,7 +138,7 @@ def verb(
 
         @wraps(fields)
         def run(socket: str, as_json: bool, **arguments: Any) -> None:
-            answer = ask(socket, whom, do, **fields(**arguments))
+            answer = request(socket, whom, do, **fields(**arguments))
             for line in [json.dumps(answer)] if as_json else show(answer):
                 click.echo(line)
 

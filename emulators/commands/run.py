@@ -62,7 +62,7 @@ class EmulatorRun(ABC):
         """
         faults, scenario = self._checked()
         with ExitStack() as stack:
-            if self._tells_warnings:
+            if self._shows_warnings:
                 stack.enter_context(warnings_shown())
             if self._in_real_time:
                 stack.enter_context(stopped_by_signals(self._stop))
@@ -82,7 +82,7 @@ class EmulatorRun(ABC):
         return self._sum_up(bench, player)
 
     @property
-    def _tells_warnings(self) -> bool:
+    def _shows_warnings(self) -> bool:
         """Whether warnings go to standard error."""
         return True
 

@@ -89,7 +89,7 @@ class SerialRun(EmulatorRun):
             raise Refused("--panel needs Textual: pip install 'tickrig[tui]'")
 
     @property
-    def _tells_warnings(self) -> bool:
+    def _shows_warnings(self) -> bool:
         return not self._options.panel
 
     def _open(self, stack: ExitStack) -> Emulator:
@@ -112,10 +112,10 @@ class SerialRun(EmulatorRun):
         except OSError as error:
             refuse_path("link", error)
         stack.callback(pty.close)
-        pty.watch_setting(self._type.line.baud, self._tell_setting)
+        pty.watch_setting(self._type.line.baud, self._show_setting)
         return pty
 
-    def _tell_setting(self, setting: str) -> None:
+    def _show_setting(self, setting: str) -> None:
         if not self._options.panel:
             own = f"{self._type.line.baud} 8N1"
             say(

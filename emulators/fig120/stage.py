@@ -114,14 +114,14 @@ class BusStage:
 
     def get(self, name: str) -> Setting:
         """Ask the emulator."""
-        values = self._hand.ask("get", names=[name])["values"]
+        values = self._hand.request("get", names=[name])["values"]
         assert isinstance(values, dict)
         value: Setting = values[name]
         return value
 
     def set(self, name: str, value: Setting) -> None:
         """Tell the emulator."""
-        self._hand.ask("set", name=name, value=value)
+        self._hand.request("set", name=name, value=value)
 
 
 @contextmanager

@@ -36,12 +36,12 @@ class CandumpFile:
         self._path, self._channel, self.error = path, channel, ""
         self._file = path.open("w", buffering=1, encoding="ascii")
 
-    def hear(self, at_us: int, heard: CanFrame | ErrorFrame) -> None:
+    def hear(self, at_us: int, received: CanFrame | ErrorFrame) -> None:
         """Write what was on the bus."""
         if self.error:
             return
         try:
-            self._file.write(f"{LogLine(at_us, self._channel, heard)}\n")
+            self._file.write(f"{LogLine(at_us, self._channel, received)}\n")
         except OSError as error:
             self.error = f"{self._path}: {error.strerror}"
             _logger.warning("recording ended: %s; the emulator goes on", self.error)

@@ -125,18 +125,18 @@ def _first_difference(recorded: Sequence[Record], replayed: Sequence[Record]) ->
 class _ReplayPort:
     """Gives the device what it heard at the ticks it heard it."""
 
-    def __init__(self, heard: Iterable[Record]) -> None:
-        self._heard = deque(heard)
+    def __init__(self, recorded: Iterable[Record]) -> None:
+        self._recorded = deque(recorded)
         self.sent: list[Record] = []
 
     @property
     def due_us(self) -> int:
-        return self._heard[0].at_us if self._heard else NEVER
+        return self._recorded[0].at_us if self._recorded else NEVER
 
     def poll(self, now_us: int, /) -> bytes:
         out = b""
-        while self._heard and self._heard[0].at_us <= now_us:
-            out += self._heard.popleft().data
+        while self._recorded and self._recorded[0].at_us <= now_us:
+            out += self._recorded.popleft().data
         return out
 
     def send(self, now_us: int, traffic: bytes, /) -> None:

@@ -44,7 +44,7 @@ class WireLog:
         splitter: makes what cuts the bytes of one direction, into lines unless given.
 
     Attributes:
-        listeners: told each line when it is whole.
+        listeners: called with each line when it is whole.
     """
 
     def __init__(

@@ -67,7 +67,7 @@ class Wire(Protocol):
     def advance(self, now_us: int, /) -> None:
         """Let everything end that ends by `now_us`, and wake who received it."""
 
-    def advance_until_heard(self, until_us: int, /) -> bool:
+    def advance_until_received(self, until_us: int, /) -> bool:
         """Let things end until a station was woken; False if none was by `until_us`."""
         ...
 

@@ -294,8 +294,8 @@ class Rig(Copyable):
             limit_us = end_us = min(next_us - 1, until_us)
             if len(self._wires) > 1:  # what ends on one may let a station send on another
                 end_us = min(limit_us, self._wires_due_us)
-            heard = [wire.advance_until_heard(end_us) for wire in self._wires]
-            if not any(heard) and self._wires_due_us > limit_us:
+            received = [wire.advance_until_received(end_us) for wire in self._wires]
+            if not any(received) and self._wires_due_us > limit_us:
                 return next_us
 
     def _happen(self, next_us: int) -> None:

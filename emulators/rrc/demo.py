@@ -104,7 +104,7 @@ def run_demo(echo: Echo) -> None:
         with RrcClient(transcript) as rrc:
             for title in _chapters(rrc, transcript, hand, echo):
                 echo(f"\n{title}")
-        status = hand.ask("status")
+        status = hand.request("status")
         echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
 
 
@@ -119,7 +119,7 @@ def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo
         echo(f"  # {sample.effect}")
         rrc.command(sample.command)
     yield "The operator switches VR2 off and on again."
-    hand.ask("press", name="power_button")
+    hand.request("press", name="power_button")
     rrc.wait_for(RrcEvent.INITIALIZED, 2_000_000)
     rrc.run_for(300_000)
     _switch_on(rrc, hand)
@@ -137,5 +137,5 @@ def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo
 
 
 def _switch_on(rrc: RrcClient, hand: ControlClient) -> None:
-    hand.ask("press", name="power_button")
+    hand.request("press", name="power_button")
     rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, 2_000_000)

@@ -21,7 +21,7 @@ from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter
 
 Values = dict[str, int | str]
-Ask = Callable[[Sequence[Object]], Awaitable[list[Object]]]
+SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Makes requests of an emulator, those of the control socket, and brings the answers."""
 
 REFRESH_S: Final = 0.1
@@ -57,7 +57,7 @@ class RrcPanel(FramedApp):
     Below 80 x 24 it draws no square for the stick and no frames; 60 x 15 is the least.
 
     Args:
-        ask: reaches the emulator.
+        send: sends requests to the emulator, and returns its answers.
         ready: called when the screen stands, to start the emulator.
     """
 
@@ -105,9 +105,9 @@ class RrcPanel(FramedApp):
         ],
     ]
 
-    def __init__(self, ask: Ask, ready: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, send: SendRequests, ready: Callable[[], None] = lambda: None) -> None:
         super().__init__()
-        self._ask, self._when_ready = ask, ready
+        self._send, self._when_ready = send, ready
         self.view = View()
         self._seen = 0  # number of the latest line
         self._report = Line(0, -REPORT_US, "", "")  # the latest SA
@@ -190,7 +190,7 @@ class RrcPanel(FramedApp):
 
     async def _request(self, *requests: Object) -> list[Object]:
         try:
-            return await self._ask(requests)
+            return await self._send(requests)
         except EmulatorEnded:
             self.exit()
             return []

@@ -29,7 +29,7 @@ def run_panel(emulator: Emulator) -> None:
                 emulator.step()
                 inbox.serve()
 
-    async def ask(requests: Sequence[Object]) -> list[Object]:
+    async def send(requests: Sequence[Object]) -> list[Object]:
         return await asyncio.wrap_future(inbox.post(requests))
 
     started: list[Future[None]] = []
@@ -37,7 +37,7 @@ def run_panel(emulator: Emulator) -> None:
     sys.setswitchinterval(SWITCH_S)
     try:
         with ThreadPoolExecutor(1, "rig") as pool, _ending(emulator, inbox):
-            RrcPanel(ask, lambda: started.append(pool.submit(run))).run()
+            RrcPanel(send, lambda: started.append(pool.submit(run))).run()
     finally:
         sys.setswitchinterval(before_s)
     for rig in started:

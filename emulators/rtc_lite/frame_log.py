@@ -77,7 +77,7 @@ class MonitoredLink:
 
     Args:
         link: the other one.
-        show: told a line of text, as `> AE  EXECUTE`.
+        show: called with a line of text, as `> AE  EXECUTE`.
 
     Attributes:
         shown: whether frames are told just now.

@@ -69,7 +69,7 @@ class Player:
             self._do(step, now_us)
         except ValueError as error:
             self.missed += 1
-            self._transcript.tell(now_us, "?", f"{step.place}: {error}")
+            self._transcript.write(now_us, "?", f"{step.place}: {error}")
 
     def _do(self, step: ScenarioStep, now_us: int) -> None:
         operator = self._emulator.operator
@@ -97,9 +97,9 @@ class Player:
             case _ as never:
                 assert_never(never)
 
-    def _hear(self, heard: WireLine) -> None:
-        text = escape(heard.data)
-        if heard.mark is Mark.FROM_DEVICE:
+    def _hear(self, line: WireLine) -> None:
+        text = escape(line.data)
+        if line.mark is Mark.FROM_DEVICE:
             for item in [item for item in self._open if item.wanted[0].matches(text)]:
                 self._open.remove(item)
                 self._emulator.event_queue.drop(item)
@@ -110,7 +110,7 @@ class Player:
         self.missed += 1
         text, since = step.wanted[0].text, format_time(step.at_us or 0)
         within = f"within {step.within_us / 1_000:g} ms of {since}"
-        self._transcript.tell(now_us, "?", f"{step.place}: no line {text!r} {within}")
+        self._transcript.write(now_us, "?", f"{step.place}: no line {text!r} {within}")
 
     def _end(self, now_us: int) -> None:
         self.finish(now_us)

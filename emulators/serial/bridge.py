@@ -55,7 +55,7 @@ class HostEnd:
 
     Args:
         end: the end behind it.
-        hear: told the time, the direction and the bytes.
+        hear: called with the time, the direction and the bytes.
     """
 
     def __init__(self, end: ByteEnd, hear: Callable[[int, Mark, bytes], None]) -> None:
@@ -101,7 +101,7 @@ class Tap(Generic[W]):
 
     Args:
         port: the port behind it, where the host is.
-        hear: told the time, the direction and the traffic.
+        hear: called with the time, the direction and the traffic.
     """
 
     def __init__(self, port: Port[W], hear: Callable[[int, Mark, W], None]) -> None:

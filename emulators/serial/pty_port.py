@@ -32,15 +32,15 @@ class HostSetting:
     Args:
         terminal: either side, open.
         baud: the device's rate, with 8N1. It is set, so that a host which sets nothing has it.
-        tell: called with a setting as `9600 8N1` that is not the device's.
+        notify: called with a setting as `9600 8N1` that is not the device's.
 
     Attributes:
         differing: the present setting, if it is not the device's.
     """
 
-    def __init__(self, terminal: int, baud: int, tell: Callable[[str], None]) -> None:
-        self._terminal, self._tell = terminal, tell
-        self._told: set[str] = set()
+    def __init__(self, terminal: int, baud: int, notify: Callable[[str], None]) -> None:
+        self._terminal, self._notify = terminal, notify
+        self._notified: set[str] = set()
         self._next_us = 0
         self.differing = ""
         codes = [code for code, rate in BAUDS.items() if rate == baud]
@@ -58,9 +58,9 @@ class HostSetting:
         self._next_us = now_us + LOOK_US
         setting = setting_of(self._terminal)
         self.differing = "" if setting == self._wanted else setting
-        if self.differing and setting not in self._told:
-            self._told.add(setting)
-            self._tell(setting)
+        if self.differing and setting not in self._notified:
+            self._notified.add(setting)
+            self._notify(setting)
 
 
 def setting_of(terminal: int) -> str:
@@ -124,9 +124,9 @@ class PtyPort(NonCopyable):
         """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
         return self._setting.differing if self._setting else ""
 
-    def watch_setting(self, baud: int, tell: Callable[[str], None]) -> None:
+    def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
         """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`."""
-        self._setting = HostSetting(self._slave, baud, tell)
+        self._setting = HostSetting(self._slave, baud, notify)
 
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""

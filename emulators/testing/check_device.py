@@ -53,7 +53,7 @@ def check_device(
     - A reset device is as one that was reset twice, with the same inputs.
     - A fresh device that meets the same does the same; on a line from its trace, too.
     - A copy, by `copy.deepcopy`, by pickle and with its rig, goes on as the original; what is
-      done to it leaves the original untouched.
+      done to it leaves the original unchanged.
 
     Args:
         device_type: what makes the device: its `DeviceType`, class or function.
@@ -133,14 +133,14 @@ class _Bench:
     def play(
         self, session: Session, afterwards_us: int = AFTERWARDS_US
     ) -> list[tuple[object, ...]]:
-        """Play a session; return what was heard of the device and seen on it."""
+        """Play a session; return what was received of the device and seen on it."""
         log = []
         for wait_us, verb, what in [*session, (afterwards_us, "send", self.nothing)]:
             self.rig.run_for(wait_us)
-            heard = self.end.poll(self.rig.now_us)
-            assert type(heard) is type(self.nothing)
+            received = self.end.poll(self.rig.now_us)
+            assert type(received) is type(self.nothing)
             seen = [self.device.read(name) for name in getattr(self.device, "outputs", ())]
-            log.append((self.rig.now_us, heard, *seen))
+            log.append((self.rig.now_us, received, *seen))
             if verb == "reset":
                 self.reset()
             elif verb == "set":
@@ -186,13 +186,13 @@ def _check_replay(bench: Benches, session: Session, _: Session, __: Session) -> 
 
 
 def _check_copies(bench: Benches, before: Session, after: Session, otherwise: Session) -> None:
-    original, untouched = bench(), bench()
+    original, unchanged = bench(), bench()
     original.play(before)
-    untouched.play(before)
+    unchanged.play(before)
     forks = {way: original.fork(copied) for way, copied in COPIES.items()}
     alone = [copied(original.device) for copied in (copy.deepcopy, _pickled)]
     original.fork(twin).play(otherwise)
-    now_us, wanted = original.rig.now_us, untouched.play(after)
+    now_us, wanted = original.rig.now_us, unchanged.play(after)
     for way, fork in forks.items():
         assert fork.play(after) == wanted, f"a copy by {way} goes on otherwise"
     assert original.play(after) == wanted, "a copy acts on the original"

@@ -30,7 +30,7 @@ SDO_TIMEOUT_US: Final = 500_000
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class SdoRequest:
     """Send an SDO request; gives the response, raises SdoTimeout without one."""
 
     request: bytes
@@ -39,7 +39,7 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
-class Tell:
+class SdoFrame:
     """Send an SDO frame that has no answer."""
 
     request: bytes
@@ -53,7 +53,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Await:
+class AwaitState:
     """Wait until a heartbeat or boot-up says a state; raises StateTimeout."""
 
     state: NmtState
@@ -67,12 +67,12 @@ class Pause:
     duration_us: int
 
 
-Step = Ask | Tell | Command | Await | Pause
+Step = SdoRequest | SdoFrame | Command | AwaitState | Pause
 
 T = TypeVar("T")
 
 Script = Generator[Step, Any, T]
-"""A script that returns a T; it is sent the `Response` of an `Ask`, else None."""
+"""A script that returns a T; it is sent the `Response` of an `SdoRequest`, else None."""
 
 Answer = Response | None
 
@@ -90,9 +90,9 @@ class QueuedScript:
 
     Attributes:
         what: for people.
-        done: told its result.
-        failed: told what it raised.
-        dropped: told if it is forgotten before its end.
+        done: called with its result.
+        failed: called with what it raised.
+        dropped: called if it is forgotten before its end.
         moves: it may change the NMT state of the node.
     """
 
@@ -152,7 +152,7 @@ class Dialogue:
     def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take a response; one that nobody asked for, or too late, is passed over."""
         self._now_us = now_us
-        if isinstance(self._step, Ask):
+        if isinstance(self._step, SdoRequest):
             try:
                 answer = parse_response(data)
             except WireError:
@@ -163,7 +163,7 @@ class Dialogue:
     def receive_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
         self._now_us = now_us
-        if isinstance(self._step, Await) and self._step.state is state:
+        if isinstance(self._step, AwaitState) and self._step.state is state:
             self._go_on(None)
 
     def tick(self, now_us: int) -> None:
@@ -172,10 +172,10 @@ class Dialogue:
         if now_us < self.due_us:
             return
         match self._step:
-            case Ask() as ask:
-                self._say(Abort(ask.index, ask.sub, AbortCode.TIMEOUT).encode())
-                self._go_on(SdoTimeout(ask.index, ask.sub))
-            case Await() as wait:
+            case SdoRequest() as request:
+                self._say(Abort(request.index, request.sub, AbortCode.TIMEOUT).encode())
+                self._go_on(SdoTimeout(request.index, request.sub))
+            case AwaitState() as wait:
                 self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
             case _:
                 self._go_on(None)
@@ -199,24 +199,24 @@ class Dialogue:
         except (SdoFailed, StateTimeout, WrongIdentity) as error:
             self._end(job.failed, error)
 
-    def _end(self, tell: Callable[[Any], None], what: object) -> None:
+    def _end(self, callback: Callable[[Any], None], what: object) -> None:
         """End a job, tell how, and go on with the next unless that began one."""
         self.job = None
-        tell(what)
+        callback(what)
         if self.job is None:
             self._next()
 
     def _take(self, step: Step) -> bool:
         """Take a step; True if it waits."""
         match step:
-            case Ask():
+            case SdoRequest():
                 self._say(step.request)
                 self._step, self.due_us = step, self._now_us + SDO_TIMEOUT_US
-            case Await():
+            case AwaitState():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
             case Pause():
                 self._step, self.due_us = step, self._now_us + step.duration_us
-            case Tell():
+            case SdoFrame():
                 self._say(step.request)
             case Command():
                 self._send(NMT_COB_ID, bytes((step.command, self._node_id)))
@@ -226,7 +226,7 @@ class Dialogue:
         self._send(REQUEST_COB_ID + self._node_id, data)
 
 
-def _answers(ask: Ask, answer: Response) -> bool:
+def _answers(request: SdoRequest, answer: Response) -> bool:
     """Say whether a response is of the object that was asked for, as far as it says so.
 
     An abort of 0000h:00 is of whatever is under way: the server could not read the request.
@@ -235,7 +235,7 @@ def _answers(ask: Ask, answer: Response) -> bool:
         case Abort(index=0, sub=0):
             return True
         case Abort() | DownloadInitiateResponse() | UploadInitiateResponse():
-            return (answer.index, answer.sub) == (ask.index, ask.sub)
+            return (answer.index, answer.sub) == (request.index, request.sub)
     return True
 
 

@@ -7,7 +7,7 @@ Not emulated: block transfer, which a server of a device must not insist on.
 
 from __future__ import annotations
 
-from tickrig.host.canopen.dialogue import Answer, Ask, Script, Tell
+from tickrig.host.canopen.dialogue import Answer, Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
@@ -30,7 +30,7 @@ def upload(index: int, sub: int) -> Script[bytes]:
         SdoAborted: the device refuses, or answers something else.
         SdoTimeout: it does not answer.
     """
-    answer = yield Ask(UploadInitiateRequest(index, sub).encode(), index, sub)
+    answer = yield SdoRequest(UploadInitiateRequest(index, sub).encode(), index, sub)
     match answer:
         case UploadInitiateResponse():
             if answer.data is not None:
@@ -45,7 +45,7 @@ def download(index: int, sub: int, data: bytes) -> Script[None]:
         request = DownloadInitiateRequest(index, sub, data, len(data))
     else:
         request = DownloadInitiateRequest(index, sub, None, len(data))
-    answer = yield Ask(request.encode(), index, sub)
+    answer = yield SdoRequest(request.encode(), index, sub)
     match answer:
         case DownloadInitiateResponse():
             if request.data is None:
@@ -67,7 +67,7 @@ def download_number(index: int, sub: int, value: int, size: int) -> Script[None]
 def _upload_segments(index: int, sub: int) -> Script[bytes]:
     data, toggle = b"", False
     while True:
-        answer = yield Ask(UploadSegmentRequest(toggle).encode(), index, sub)
+        answer = yield SdoRequest(UploadSegmentRequest(toggle).encode(), index, sub)
         match answer:
             case Segment() if answer.toggle == toggle:
                 data += answer.data
@@ -82,7 +82,7 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
     toggle = False
     for start in range(0, max(1, len(data)), SEGMENT_BYTES):
         part, last = data[start : start + SEGMENT_BYTES], start + SEGMENT_BYTES >= len(data)
-        answer = yield Ask(Segment(toggle, part, last).encode(), index, sub)
+        answer = yield SdoRequest(Segment(toggle, part, last).encode(), index, sub)
         if not isinstance(answer, DownloadSegmentResponse) or answer.toggle != toggle:
             yield from _fail(index, sub, answer)
         toggle = not toggle
@@ -94,5 +94,5 @@ def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
         raise SdoAborted(index, sub, answer.code)
     toggled = isinstance(answer, Segment | DownloadSegmentResponse)
     code = AbortCode.TOGGLE_BIT if toggled else AbortCode.COMMAND_SPECIFIER
-    yield Tell(Abort(index, sub, code).encode())
+    yield SdoFrame(Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _NOBODY: Final = (FileNotFoundError, ConnectionRefusedError)
 
 
-def ask(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
+def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
     """Make one request and return its answer.
 
     Args:
@@ -28,12 +28,12 @@ def ask(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
         Refused: nobody answers, or with an error.
     """
     with refused_by(socket, whom), ControlClient(socket) as client:
-        return client.ask(do, **fields)
+        return client.request(do, **fields)
 
 
 @contextmanager
 def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
-    """Raise Refused in place of what a `ControlClient` raises; arguments as those of `ask`."""
+    """Raise Refused in place of what a `ControlClient` raises; arguments as those of `request`."""
     try:
         yield
     except TimeoutError:

@@ -58,22 +58,22 @@ class ExtensionGroup(Generic[T]):
         known = ", ".join(self.names())
         raise ExtensionError(f"no {self.what} {name!r}; known: {known}")
 
-    def load_all(self, tell: Callable[[str], None]) -> dict[str, T]:
+    def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
         """Return all members by name; what cannot be loaded is left out, and told in a line.
 
         Args:
-            tell: takes a line for people.
+            notify: takes a line for people.
         """
-        return {name: self.load(name) for name in self.built_in} | self.load_foreign(tell)
+        return {name: self.load(name) for name in self.built_in} | self.load_foreign(notify)
 
-    def load_foreign(self, tell: Callable[[str], None]) -> dict[str, T]:
+    def load_foreign(self, notify: Callable[[str], None]) -> dict[str, T]:
         """Return the members of other packages as `load_all` does."""
         members = dict[str, T]()
         for point in self._foreign():
             try:
                 members.setdefault(point.name, self._load_foreign(point))
             except ExtensionError as error:
-                tell(str(error))
+                notify(str(error))
         return members
 
     def _foreign(self) -> Iterator[EntryPoint]:

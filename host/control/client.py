@@ -40,7 +40,7 @@ class ControlClient:
             self._socket.close()
             raise
 
-    def ask(self, do: str, **fields: object) -> Object:
+    def request(self, do: str, **fields: object) -> Object:
         """Make a request and return its answer.
 
         Raises:

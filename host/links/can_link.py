@@ -103,7 +103,7 @@ class CanLink:
 
     Attributes:
         lost: frames that the bus did not take.
-        on_error_state: told the error state of the controller, where the driver says it.
+        on_error_state: called with the error state of the controller, where the driver says it.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:

@@ -84,10 +84,10 @@ class ModbusMaster:
         Raises:
             LinkClosed: the line is gone.
         """
-        heard = self._link.receive(0)
+        received = self._link.receive(0)
         if (request := self.pending) is None:
             return None
-        self._received = (self._received + heard)[-MAX_FRAME_BYTES:]
+        self._received = (self._received + received)[-MAX_FRAME_BYTES:]
         answer = self._parse(request)
         if answer is not None:
             self.pending, self.misses = None, 0

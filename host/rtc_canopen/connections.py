@@ -23,7 +23,7 @@ class PortConnections:
     Args:
         manager: has the ports.
         wanted: connectors to be made.
-        notify: told what became of each.
+        notify: called with what became of each.
 
     Attributes:
         wanted: those that have not been made.
@@ -102,7 +102,7 @@ class PdoLinks:
     Args:
         nodes: by node-ID.
         links: those of the System Definition.
-        notify: told what became of each.
+        notify: called with what became of each.
 
     Attributes:
         links: all that are wanted.

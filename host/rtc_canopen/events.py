@@ -89,7 +89,7 @@ class EventLog:
     """The events of a server, the latest last.
 
     Attributes:
-        listeners: told each event as it happens.
+        listeners: called with each event as it happens.
     """
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from tickrig.host.canopen.dialogue import Ask, Step
+from tickrig.host.canopen.dialogue import SdoRequest, Step
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import InPort
@@ -51,7 +51,7 @@ def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry])
 
 def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None:
     """Answer as a device that has these values, and takes any."""
-    match parse_request(step.request) if isinstance(step, Ask) else None:
+    match parse_request(step.request) if isinstance(step, SdoRequest) else None:
         case UploadInitiateRequest(index=index, sub=sub):
             if (data := values.get((index, sub))) is None:
                 return Abort(index, sub, AbortCode.NO_OBJECT)

@@ -41,7 +41,7 @@ class ServerRunner:
         running: False once `stop` was called.
         late_ticks: how many ticks began more than 1 ms after they were due.
         worst_late_us: by how much the worst of them was late, us.
-        after_tick: told the time after each tick.
+        after_tick: called with the time after each tick.
         serve: called between the ticks with the time in us that it may take, every 20 ms
             at least; a control socket, say.
     """

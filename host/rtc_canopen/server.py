@@ -216,7 +216,7 @@ class RtcCanopenServer:
 
     def _node(self, entry: NodeEntry, files: Mapping[str, DeviceFile]) -> ServedNode:
         writes = tuple(write for write in self.definition.sdo if write.node == entry.id)
-        remove_us = 1_000 * self.definition.master.remove_ms
+        remove_us = 1_000 * self.definition.master.remove_after_ms
         return ServedNode(entry, files[entry.eds], writes, remove_us, self)
 
     def _start(self) -> None:

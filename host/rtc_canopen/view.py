@@ -255,8 +255,8 @@ class ServerView:
 
     def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> PendingTransfer:
         transfer = PendingTransfer()
-        tell = transfer.succeed, transfer.fail, transfer.drop
-        job = QueuedScript("transfer", script, *tell, moves=False)
+        callbacks = transfer.succeed, transfer.fail, transfer.drop
+        job = QueuedScript("transfer", script, *callbacks, moves=False)
         self._node(node_id).run(self._server.now_us, job)
         return transfer
 

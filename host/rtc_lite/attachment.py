@@ -63,7 +63,7 @@ class Attachment:
         link: the line to the device; it stays open.
         base_name: of the proxy, without its number.
         settings: waits, and whether the device is looked for.
-        listener: told of events.
+        listener: called with events.
         context: execution context of the proxy; None for one of its own.
         rate_hz: of its own one.
         proxy: the latest one.
@@ -164,7 +164,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
         link: the line to the device.
         base_name: of the proxy, without its number.
         settings: waits, checksum, rediscovery.
-        listener: told of events.
+        listener: called with events.
         context: an execution context to take part in, in place of an own one.
         rate_hz: of its own one.
 

@@ -59,7 +59,7 @@ class RtcLiteProxy(RtComponent):
         instance_name: unique in a system.
         link: the line to the device. The time on its clock is the proxy's.
         settings: waits and checksum.
-        listener: told of events.
+        listener: called with events.
 
     Attributes:
         device: what the device says of itself; None before `on_initialize`.

@@ -154,7 +154,7 @@ def real_bench(rig: RigFile, config: pytest.Config) -> Iterator[Bench]:
         if rig.control is None:
             operator = TerminalOperator(Terminal(config, client), client, rig.stick_pct)
         else:
-            ask = host.beside(stack.enter_context(closing(ControlClient(rig.control))).ask)
+            ask = host.beside(stack.enter_context(closing(ControlClient(rig.control))).request)
             parts["emulator"] = EmulatorPace(ask)
             operator = EmulatorOperator(ask, client, rig.time_us)
         stack.callback(operator.switch_off)

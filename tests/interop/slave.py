@@ -36,16 +36,16 @@ class Slave:
 
     def status(self) -> Any:
         with ControlClient(self.control, PATIENCE_S) as client:
-            return client.ask("status")
+            return client.request("status")
 
     def get(self, name: str) -> Any:
         with ControlClient(self.control, PATIENCE_S) as client:
-            values: Any = client.ask("get", names=[name])["values"]
+            values: Any = client.request("get", names=[name])["values"]
             return values[name]
 
     def set(self, name: str, value: float | str) -> None:
         with ControlClient(self.control, PATIENCE_S) as client:
-            client.ask("set", name=name, value=value)
+            client.request("set", name=name, value=value)
 
     def wait_for(self, name: str, value: float | str) -> None:
         deadline = time.monotonic() + PATIENCE_S

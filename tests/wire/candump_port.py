@@ -32,9 +32,9 @@ class CandumpPort:
         start_us: int = 0,
     ) -> None:
         self._heard = deque(
-            (line.at_us - start_us, line.heard)
+            (line.at_us - start_us, line.received)
             for line in lines
-            if isinstance(line.heard, CanFrame) and heard(line.heard)
+            if isinstance(line.received, CanFrame) and heard(line.received)
         )
         self.sent: list[tuple[int, CanFrame]] = []
 

@@ -52,7 +52,7 @@ def test_a_rig_is_recorded_with_its_error_frames(tmp_path: Path) -> None:
     wire.advance(wire.due_us)
     wire.faults.clear("corrupt")
     wire.advance(1_000)
-    assert [line.heard for line in parse_log(path.read_text())] == [BIT_ERROR, *frames("705#7F")]
+    assert [line.received for line in parse_log(path.read_text())] == [BIT_ERROR, *frames("705#7F")]
     file.close()
     file.close()
 

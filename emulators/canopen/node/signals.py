@@ -64,7 +64,7 @@ def find_object(dictionary: Dictionary, name: str) -> Entry | None:
     return dictionary.find(int(match[1], 16), int(match[2] or "0", 0)) if match else None
 
 
-Later = Callable[[Callable[[], None]], None]
+DeferredCall = Callable[[Callable[[], None]], None]
 """Takes what is to be done at the beginning of the node's next tick."""
 
 
@@ -82,8 +82,8 @@ class ObjectSignal:
         later: where the change is left.
     """
 
-    def __init__(self, name: str, entry: Entry, later: Later) -> None:
-        self._name, self._entry, self._later = name, entry, later
+    def __init__(self, name: str, entry: Entry, defer: DeferredCall) -> None:
+        self._name, self._entry, self._defer = name, entry, defer
 
     @property
     def item(self) -> InputSignal:
@@ -121,7 +121,7 @@ class ObjectSignal:
             entry.check_owner(data)
         except SdoAbort as abort:
             raise ValueError(f"{self._name} {value}: refused, {abort}") from None
-        self._later(partial(entry.force, data))
+        self._defer(partial(entry.force, data))
 
     def _encode(self, value: Setting) -> bytes:
         entry, data_type = self._entry.description, self._entry.data_type
@@ -194,7 +194,7 @@ class Switch:
     Args:
         name: what it is called.
         text: what it is, for people.
-        switch: told the new value.
+        switch: called with the new value.
     """
 
     def __init__(self, name: str, text: str, switch: Callable[[int], None]) -> None:
@@ -225,10 +225,10 @@ class Emergency:
         later: where it is left.
     """
 
-    def __init__(self, slave: CanopenSlave, later: Later) -> None:
+    def __init__(self, slave: CanopenSlave, defer: DeferredCall) -> None:
         text = "error seen by the application: emergency error code, 0 when it is gone"
         self.item = InputSignal("emergency", text, high=0xFFFF)
-        self._slave, self._later, self._code = slave, later, 0
+        self._slave, self._defer, self._code = slave, defer, 0
 
     def read(self) -> int:
         """Return the code that was set last."""
@@ -244,9 +244,9 @@ class Emergency:
         """Clear the error before, raise this one."""
         old, self._code = self._code, self.check(value)
         if old and old != self._code:
-            self._later(partial(self._slave.emergency_clear, old))
+            self._defer(partial(self._slave.emergency_clear, old))
         if code := self._code:
-            self._later(partial(self._slave.emergency, code, _register_bit(code)))
+            self._defer(partial(self._slave.emergency, code, _register_bit(code)))
 
 
 class Quantity:

@@ -83,7 +83,7 @@ class DemoRun:
         for name in NODES:
             attach(
                 *(manager, self._links[name], name, SETTINGS),
-                listener=self._heard,
+                listener=self._on_event,
                 context=context,
             )
         self._sink = manager.add(ConsoleOut("ConsoleOut0"), context=context)
@@ -138,7 +138,7 @@ class DemoRun:
     def _await(self, kind: ProxyEventType) -> None:
         self._run_until(lambda: any(event.kind is kind for event in self._events))
 
-    def _heard(self, event: ProxyEvent) -> None:
+    def _on_event(self, event: ProxyEvent) -> None:
         self._events.append(event)
         self._say(f"* {event.kind} of {event.instance_name}")
 

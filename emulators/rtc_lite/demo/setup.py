@@ -92,9 +92,9 @@ class PtySetup:
     def power(self, name: str, *, on: bool) -> None:
         """Tell the emulator."""
         if on:
-            self._controls[name].ask("clear", name=POWER_CUT)
+            self._controls[name].request("clear", name=POWER_CUT)
         else:
-            self._controls[name].ask("fault", spec=POWER_CUT)
+            self._controls[name].request("fault", spec=POWER_CUT)
 
 
 @contextmanager

@@ -78,7 +78,7 @@ class SocketReader:
         select([self._socket], [], [], timeout_us / 1e6)
         try:
             while len(records) < BATCH:
-                records += self._heard(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
+                records += self._records(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
         except BlockingIOError:
             pass
         except OSError as error:
@@ -90,7 +90,7 @@ class SocketReader:
         """Close the bus."""
         self._bus.shutdown()
 
-    def _heard(
+    def _records(
         self, data: bytes, ancillary: list[tuple[int, int, bytes]], flags: int, address: Any
     ) -> tuple[Record, ...]:
         at_us = 0

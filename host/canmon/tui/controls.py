@@ -123,7 +123,7 @@ class PromptLine(Vertical):
         yield Input(id="answer", compact=True)
         yield Static(id="wrong", markup=False)
 
-    def ask(self, question: str, answer: str, take: Take) -> None:
+    def prompt(self, question: str, answer: str, take: Take) -> None:
         """Ask something.
 
         Args:

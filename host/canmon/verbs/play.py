@@ -140,14 +140,14 @@ def _play(
             pace = Pace()
         for at_us, channel, frame in _due(plan):
             if step:
-                _ask(f"{buses[channel].name} {frame}")
+                _confirm(f"{buses[channel].name} {frame}")
                 at_us = pace.now_us  # noqa: PLW2901 - now is when it is due
             late.add(pace.wait_until(at_us))
             buses[channel].send(frame)
-    told = [f"{late.count} frames in {pace.now_us / 1e6:.3f} s"]
-    told += [str(late)] if plan.speed and not step else []
-    told += [f"{plan.left_out} left out"] if plan.left_out else []
-    click.echo("; ".join(told), err=True)
+    summary = [f"{late.count} frames in {pace.now_us / 1e6:.3f} s"]
+    summary += [str(late)] if plan.speed and not step else []
+    summary += [f"{plan.left_out} left out"] if plan.left_out else []
+    click.echo("; ".join(summary), err=True)
 
 
 def _due(plan: ReplayPlan) -> Iterator[Due]:
@@ -173,7 +173,7 @@ def _same_id(one: CanFrame, other: CanFrame) -> bool:
     return (one.can_id, one.extended) == (other.can_id, other.extended)
 
 
-def _ask(what: str) -> None:
+def _confirm(what: str) -> None:
     """Show what comes next, and wait for Enter; the end of the input ends the replay."""
     click.echo(what)
     if not sys.stdin.readline():

@@ -154,7 +154,7 @@ class NoReboot(Rule):
     name = "no-reboot"
 
     def __init__(self) -> None:
-        self._asked: set[int] = set()
+        self._commanded: set[int] = set()
         self._present: set[tuple[str, int]] = set()
 
     def wants(self, ident: int, /) -> bool:
@@ -175,15 +175,15 @@ class NoReboot(Rule):
         node = sender_of(frame.can_id)
         if node is None:
             if len(frame.data) == 2 and frame.data[0] in RESETS:
-                self._ask(frame.data[1])
+                self._expect_reset(frame.data[1])
             return None
         is_new = (record.channel, node) not in self._present
         self._present.add((record.channel, node))
         if frame.can_id not in ERROR_CONTROL_IDS or frame.data != BOOT_UP:
             return None
-        expected = is_new or node in self._asked
-        self._asked.discard(node)
+        expected = is_new or node in self._commanded
+        self._commanded.discard(node)
         return None if expected else f"node {node} boots again without an NMT reset"
 
-    def _ask(self, node: int) -> None:
-        self._asked |= set(range(1, 0x80)) if node == ALL_NODES else {node}
+    def _expect_reset(self, node: int) -> None:
+        self._commanded |= set(range(1, 0x80)) if node == ALL_NODES else {node}

@@ -92,7 +92,7 @@ class NodeStatus:
         A 0 of an EDS is not believed: heartbeats that are heard count more.
         """
         told = self.memory.number(*HEARTBEAT_TIME)
-        if told or self.memory.was_heard(HEARTBEAT_TIME):
+        if told or self.memory.was_received(HEARTBEAT_TIME):
             return told * 1_000 if told else None
         return _median(self._gaps) if self._gaps else None
 

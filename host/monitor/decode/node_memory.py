@@ -136,7 +136,7 @@ class NodeMemory:
         data = self._now.get((index, sub), self.eds.values.get((index, sub)))
         return None if data is None else int.from_bytes(data, "little")
 
-    def was_heard(self, entry: Entry) -> bool:
+    def was_received(self, entry: Entry) -> bool:
         """Say whether traffic told a value."""
         return entry in self._now
 

@@ -44,7 +44,7 @@ def missing_end(file: BinaryIO) -> str:
         file: a log that python-can has read without an error; it is read from its beginning.
     """
     file.seek(0)
-    _, header_bytes, told = _FILE.unpack(file.read(_FILE.size))
+    _, header_bytes, declared = _FILE.unpack(file.read(_FILE.size))
     file.seek(header_bytes)
     found, held = 0, b""
     for content in _contents(file):
@@ -54,7 +54,7 @@ def missing_end(file: BinaryIO) -> str:
         found += objects + 1
     if len(held) >= _OBJECT.size:
         return f"it is cut after {found} objects"
-    return f"it ends after {found} of {told} objects" if found < told else ""
+    return f"it ends after {found} of {declared} objects" if found < declared else ""
 
 
 def _contents(file: BinaryIO) -> Iterator[bytes | None]:

@@ -9,8 +9,8 @@ import click
 from tickrig.host.cli.options import PATH, NumberRange
 from tickrig.host.cli.refused import time_us
 from tickrig.host.cli.start import loading
-from tickrig.host.rtc.commands.ask import VARIABLE, default_path
 from tickrig.host.rtc.commands.conf import conf
+from tickrig.host.rtc.commands.request import VARIABLE, default_path
 from tickrig.host.rtc.commands.system_verbs import SYSTEM_VERBS
 from tickrig.host.rtc.commands.verbs import VERBS
 

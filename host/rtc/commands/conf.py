@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tickrig.host.cli.refused import Refused
-from tickrig.host.rtc.commands.ask import ask_system, at, complete_component, components
+from tickrig.host.rtc.commands.request import at, complete_component, components, request_system
 from tickrig.host.rtc.commands.texts import configuration_lines
 
 component_name = click.argument("name", shell_complete=complete_component)
@@ -58,7 +58,7 @@ def get(at: Path, name: str, parameter: str) -> None:
 @at
 def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
     """Change PARAMETER to VALUE; elements of a list have commas between."""
-    ask_system(at, "set_parameter", name=name, parameter=parameter, value=value, set=set_id)
+    request_system(at, "set_parameter", name=name, parameter=parameter, value=value, set=set_id)
 
 
 @conf.command()
@@ -67,7 +67,7 @@ def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
 @at
 def act(at: Path, name: str, set_id: str) -> None:
     """Let the values of SET hold."""
-    ask_system(at, "activate_set", name=name, set=set_id)
+    request_system(at, "activate_set", name=name, set=set_id)
 
 
 def _configuration(socket: Path, name: str) -> Any:

@@ -34,7 +34,7 @@ class _WatchedPort:
     """An InPort that takes what an OutPort writes."""
 
     port: InPort[Any]
-    asked_us: int
+    requested_us: int
     count: int = 0
     seen: deque[NumberedValue] = field(default_factory=lambda: deque(maxlen=HELD))
 
@@ -76,7 +76,7 @@ class Probes:
         if not isinstance(port, OutPort):
             raise RtcRefused(f"{name} is a {port.port_type}; values are shown of a DataOutPort")
         watch = self._watches.get(port) or self._start(port)
-        watch.asked_us = self._manager.now_us
+        watch.requested_us = self._manager.now_us
         watch.take()
         return tuple(seen for seen in watch.seen if seen.number > since), watch.count
 
@@ -104,7 +104,7 @@ class Probes:
         """Take what was written, and end what is not needed any more."""
         for port, watch in tuple(self._watches.items()):
             watch.take()
-            if now_us - watch.asked_us > LEASE_US or not watch.port.connectors:
+            if now_us - watch.requested_us > LEASE_US or not watch.port.connectors:
                 watch.port.disconnect_all()
                 del self._watches[port]
         for port, source in tuple(self._injections.items()):

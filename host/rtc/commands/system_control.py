@@ -135,9 +135,9 @@ class SystemControl(RequestDispatcher):
             return (self._manager.port(name),)
         return tuple(self._manager.find(name).ports.values())
 
-    def _move(self, ask: Callable[[str], None]) -> Callable[[Object], Object]:
+    def _move(self, action: Callable[[str], None]) -> Callable[[Object], Object]:
         def move(request: Object) -> Object:
-            ask(text_of(request, "name"))
+            action(text_of(request, "name"))
             return {}
 
         return move

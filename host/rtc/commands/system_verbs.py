@@ -10,7 +10,7 @@ import click
 
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading
-from tickrig.host.rtc.commands.ask import ask_system, at, components
+from tickrig.host.rtc.commands.request import at, components, request_system
 from tickrig.host.rtc.commands.verbs import as_json
 
 
@@ -22,7 +22,7 @@ def save(at: Path, file: Path | None) -> None:
     with loading():
         from tickrig.host.rtc.commands.system_file import file_format, write_system  # noqa: PLC0415
 
-    text = ask_system(at, "save", format="toml" if file is None else file_format(file))["text"]
+    text = request_system(at, "save", format="toml" if file is None else file_format(file))["text"]
     if file is None:
         click.echo(text)
     else:
@@ -34,7 +34,7 @@ def save(at: Path, file: Path | None) -> None:
 @at
 def status(at: Path, as_json: bool) -> None:
     """Show how the run is going: time, late ticks."""
-    answer = {key: value for key, value in ask_system(at, "status").items() if key != "ok"}
+    answer = {key: value for key, value in request_system(at, "status").items() if key != "ok"}
     if as_json:
         click.echo(json.dumps(answer))
         return
@@ -46,7 +46,7 @@ def status(at: Path, as_json: bool) -> None:
 @at
 def stop(at: Path) -> None:
     """End the system."""
-    ask_system(at, "stop")
+    request_system(at, "stop")
 
 
 @click.command()
@@ -66,7 +66,7 @@ def check(at: Path, file: Path) -> None:
 
     parse = parse_rts_profile if file_format(file) == "xml" else parse_toml
     wanted = read_system(file)
-    found = parse(ask_system(at, "save", format=file_format(file))["text"])
+    found = parse(request_system(at, "save", format=file_format(file))["text"])
     lines = tuple(differences(wanted, found))
     for line in lines:
         click.echo(line)

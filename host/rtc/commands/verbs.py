@@ -14,14 +14,14 @@ from tickrig.host.cli.control import refused_by
 from tickrig.host.cli.options import NumberRange
 from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.control.client import ControlClient
-from tickrig.host.rtc.commands.ask import (
+from tickrig.host.rtc.commands.request import (
     SYSTEM,
-    ask_system,
     at,
     complete_component,
     complete_port,
     complete_type,
     components,
+    request_system,
     settle,
 )
 from tickrig.host.rtc.commands.texts import component_lines, component_row, port_line, value_line
@@ -79,7 +79,7 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
 def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
     """Create a component of TYPE, and print its name, such as ConsoleIn0."""
     rate = {} if rate_hz is None else {"rate_hz": rate_hz}
-    click.echo(ask_system(at, "create", type=type_name, name=name, **rate)["name"])
+    click.echo(request_system(at, "create", type=type_name, name=name, **rate)["name"])
 
 
 @click.command()
@@ -98,7 +98,7 @@ def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: st
     tickrig rtc con A0.out B0.in -p subscription_type=new -p buffer.length=64
     """  # noqa: D301 - click wants the backspace
     given = dict(_property(word) for word in properties)
-    ask_system(at, "connect", ports=[first, second], properties=given, name=name)
+    request_system(at, "connect", ports=[first, second], properties=given, name=name)
 
 
 @click.command()
@@ -106,7 +106,7 @@ def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: st
 @at
 def dis(at: Path, ports: tuple[str, ...]) -> None:
     """End the connector between two PORTS, all of one port, or all of a component."""
-    ask_system(at, "disconnect", ports=list(ports))
+    request_system(at, "disconnect", ports=list(ports))
 
 
 @click.command("exit")
@@ -115,7 +115,7 @@ def dis(at: Path, ports: tuple[str, ...]) -> None:
 def exit_(at: Path, names: tuple[str, ...]) -> None:
     """End the components NAMES, and their connectors."""
     for name in names:
-        ask_system(at, "delete", name=name)
+        request_system(at, "delete", name=name)
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -138,7 +138,7 @@ def inject(at: Path, port: str, value: str) -> None:
         given = json.loads(value)
     except ValueError:
         raise Refused(f"{value!r} is not JSON, as 5, [1, 2], true or '\"text\"'") from None
-    ask_system(at, "inject", port=port, value=given)
+    request_system(at, "inject", port=port, value=given)
 
 
 @click.command("print")
@@ -174,7 +174,7 @@ def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
     def move(at: Path, names: tuple[str, ...], wait: str) -> None:
         wait_us = time_us("--wait", wait)
         for component in names:
-            ask_system(at, verb, name=component)
+            request_system(at, verb, name=component)
         for component in names:
             settle(at, component, wanted, wait_us)
 
@@ -198,10 +198,10 @@ def _property(word: str) -> tuple[str, str]:
 def _values(socket: Path, port: str, count: int | None, until_s: float | None) -> Iterator[Any]:
     """Yield values until there were enough of them, or it is time."""
     with refused_by(socket, SYSTEM), ControlClient(socket) as client:
-        latest = client.ask("seen", port=port)["latest"]
+        latest = client.request("seen", port=port)["latest"]
         given = 0
         while until_s is None or time.monotonic() < until_s:
-            answer: Any = client.ask("seen", port=port, since=latest)
+            answer: Any = client.request("seen", port=port, since=latest)
             _report_lost(answer, latest)
             latest = answer["latest"]
             for seen in answer["values"]:

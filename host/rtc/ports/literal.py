@@ -91,7 +91,7 @@ def _field(hint: Any, given: object, place: str) -> object:
 def _primitive(kind: Primitive, given: object, place: str) -> object:
     if kind is Primitive.OCTET_SEQ:
         return _octets(given, place)
-    taken, what, make = _KINDS.get(kind, _WHOLE)
+    taken, what, make = _LITERAL_TYPES.get(kind, _WHOLE)
     if not isinstance(given, taken) or (isinstance(given, bool) and taken is not bool):
         raise _refused(place, f"{what} ({kind.value})", given)
     try:
@@ -125,12 +125,12 @@ def _refused(place: str, wanted: str, given: object) -> RtcRefused:
     return RtcRefused(f"{place} takes {wanted}, not {text if len(text) <= 60 else text[:60]}")
 
 
-_Kind = tuple[type | tuple[type, ...], str, Callable[[Any], object]]
+_LiteralType = tuple[type | tuple[type, ...], str, Callable[[Any], object]]
 
-_WHOLE: Final[_Kind] = (int, "a whole number", int)
-_NUMBER: Final[_Kind] = ((int, float), "a number", float)
-_TEXT: Final[_Kind] = (str, "a string", str)
-_KINDS: Final[Mapping[Primitive, _Kind]] = {
+_WHOLE: Final[_LiteralType] = (int, "a whole number", int)
+_NUMBER: Final[_LiteralType] = ((int, float), "a number", float)
+_TEXT: Final[_LiteralType] = (str, "a string", str)
+_LITERAL_TYPES: Final[Mapping[Primitive, _LiteralType]] = {
     Primitive.BOOLEAN: (bool, "true or false", bool),
     Primitive.FLOAT: _NUMBER,
     Primitive.DOUBLE: _NUMBER,

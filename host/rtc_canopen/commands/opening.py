@@ -98,7 +98,7 @@ def open_link(
 
     Args:
         options: which bus.
-        bus_state: told what its CAN controller reports.
+        bus_state: called with what its CAN controller reports.
         stack: closes it.
     """
     from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow

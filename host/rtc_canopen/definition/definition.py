@@ -60,7 +60,7 @@ class MasterEntry:
         node: its node-ID.
         heartbeat_ms: its producer heartbeat time, 0 for none.
         rate_hz: of the execution context of the proxies.
-        remove_ms: after how long without a sign of life a proxy is removed.
+        remove_after_ms: after how long without a sign of life a proxy is removed.
         reconnect: whether a proxy that comes back has its connections again.
         leave: what the server leaves the nodes in: `pre_operational` or `stopped`.
         sync_ms: communication cycle period, 0 for no SYNC.
@@ -69,7 +69,7 @@ class MasterEntry:
     node: int = 127
     heartbeat_ms: int = 100
     rate_hz: float = 100.0
-    remove_ms: int = 1_000
+    remove_after_ms: int = field(default=1_000, metadata={"key": "remove_ms"})
     reconnect: bool = True
     leave: str = "pre_operational"
     sync_ms: int = 0

@@ -117,7 +117,10 @@ def _master(node: yaml.Node, place: str, ids: Collection[int]) -> MasterEntry:
         "reconnect": flag,
         "leave": one_of(*LEAVE),
     }
-    master = MasterEntry(**read_table(node, place, fields))
+    values = read_table(node, place, fields)
+    if "remove_ms" in values:
+        values["remove_after_ms"] = values.pop("remove_ms")
+    master = MasterEntry(**values)
     if master.node in ids:
         refuse(node, f"{place}: node {master.node} is one of the nodes")
     return master

@@ -90,9 +90,9 @@ def _sections(definition: SystemDefinition) -> Iterator[tuple[str, Table | list[
 
 
 def _changed(value: DataclassInstance) -> Table:
-    """Return the fields that are not as by default."""
+    """Return the fields that are not as by default, by their keys in the file."""
     return {
-        item.name: getattr(value, item.name)
+        item.metadata.get("key", item.name): getattr(value, item.name)
         for item in fields(value)
         if getattr(value, item.name) != _default(item)
     }

@@ -66,9 +66,9 @@ class SystemEditor(FramedApp):
         (130, "-wide"),
     ]
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("a", "ask('activate')", "activate"),
-        Binding("d", "ask('deactivate')", "deactivate"),
-        Binding("r", "ask('reset')", "reset"),
+        Binding("a", "request('activate')", "activate"),
+        Binding("d", "request('deactivate')", "deactivate"),
+        Binding("r", "request('reset')", "reset"),
         Binding("b", "boot", "set up again", show=False),
         Binding("S", "start", "activate all in the start order", show=False),
         Binding("m", "mark", "mark"),
@@ -150,7 +150,7 @@ class SystemEditor(FramedApp):
         if event.view is self.objects:
             self.action_write()
 
-    def action_ask(self, what: str) -> None:
+    def action_request(self, what: str) -> None:
         """Ask the proxy or component under the cursor for a state."""
         if (owner := self.system.owner) is not None:
             self._command(lambda view: ASK[what](view, owner.name))
@@ -213,18 +213,18 @@ class SystemEditor(FramedApp):
 
     def action_save(self) -> None:
         """Ask for a file, and save the definition with connections and links as they are."""
-        self._ask_path("save the System Definition as", self.session.save)
+        self._prompt_path("save the System Definition as", self.session.save)
 
     def action_load(self) -> None:
         """Ask for a file, and serve the definition in it."""
-        self._ask_path("load the System Definition", self._load)
+        self._prompt_path("load the System Definition", self._load)
 
     def _load(self, path: Path) -> None:
         self.session.load(path)
         self.system.forget()
         self.objects.forget()
 
-    def _ask_path(self, text: str, do: Callable[[Path], None]) -> None:
+    def _prompt_path(self, text: str, do: Callable[[Path], None]) -> None:
         def answered(path: str | None) -> None:
             if path and self._try(lambda: do(Path(path))):
                 self.notify(f"{text}: {path}", markup=False)

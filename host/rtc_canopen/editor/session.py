@@ -34,7 +34,7 @@ class EditorSession:
         path: its System Definition.
         link: the bus.
         add_components: puts more components into each server that is loaded.
-        listeners: told the events of each server.
+        listeners: called with the events of each server.
 
     Attributes:
         lock: of the server.

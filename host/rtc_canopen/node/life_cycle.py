@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.canopen.dialogue import Await, Command, Pause, Script
+from tickrig.host.canopen.dialogue import AwaitState, Command, Pause, Script
 from tickrig.host.canopen.errors import SdoFailed, StateTimeout
 from tickrig.host.canopen.sdo_transfer import download_number, upload_number
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
@@ -44,7 +44,7 @@ class LifeCycleScripts:
 def _to(command: NmtCommand, state: NmtState) -> Callable[[NodeEntry], Script[None]]:
     def move(entry: NodeEntry) -> Script[None]:
         yield Command(command)
-        yield Await(state, confirm_us(entry))
+        yield AwaitState(state, confirm_us(entry))
 
     return move
 

@@ -161,9 +161,9 @@ def test_only_a_frame_that_a_station_receives_is_heard() -> None:
     host, end = wire.end(frozenset()), wire.end()
     end.attach(Deaf(), woken.append)
     host.send(0, frames("080# 123#"))
-    assert wire.advance_until_heard(1_000) is True
+    assert wire.advance_until_received(1_000) is True
     assert woken == [bits("080#") - 3]
-    assert wire.advance_until_heard(1_000) is False
+    assert wire.advance_until_received(1_000) is False
     assert wire.load_permille() == 0
 
 

@@ -30,12 +30,12 @@ def test_a_key_drives_the_base_and_ctrl_c_ends() -> None:
         words = [str(EXAMPLE), str(base.link)]
         keys = pexpect.spawn(sys.executable, words, env=environment(), encoding="utf-8")
         deadline_s = time.monotonic() + PATIENCE_S
-        while control.ask("get", names=["x_m"])["values"]["x_m"] < 0.02:  # type: ignore[index]
+        while control.request("get", names=["x_m"])["values"]["x_m"] < 0.02:  # type: ignore[index]
             assert time.monotonic() < deadline_s
             keys.send("w")
         keys.kill(signal.SIGINT)
         keys.expect(pexpect.EOF, timeout=PATIENCE_S)
         keys.close()
         assert keys.exitstatus == 0
-        while control.ask("get", names=["speed_m_s"])["values"]["speed_m_s"]:  # type: ignore[index]
+        while control.request("get", names=["speed_m_s"])["values"]["speed_m_s"]:  # type: ignore[index]
             assert time.monotonic() < deadline_s

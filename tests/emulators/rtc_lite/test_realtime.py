@@ -26,14 +26,14 @@ def test_a_host_starts_a_node_up_and_loses_it_by_a_power_cut() -> None:
             expected = raw(*step["device"])
             port.write(raw(step["proxy"]))
             assert port.read(len(expected)) == expected
-        hand.ask("fault", spec="power_cut")
+        hand.request("fault", spec="power_cut")
         port.timeout = 0.1
         port.write(raw("0A 43 58 9B"))
         assert port.read(1) == b""
-        hand.ask("clear", name="power_cut")
+        hand.request("clear", name="power_cut")
         port.timeout = TIMEOUT_S
         deadline_s = time.monotonic() + TIMEOUT_S
-        while hand.ask("get", names=["state"])["values"] != {"state": "Created"}:
+        while hand.request("get", names=["state"])["values"] != {"state": "Created"}:
             assert time.monotonic() < deadline_s
         port.write(raw("0A 43 58 9B"))
         assert port.read(6) == raw("0A 43 58 40 43 1E")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tickrig.host.canopen.dialogue import (
     SDO_TIMEOUT_US,
-    Await,
+    AwaitState,
     Command,
     Dialogue,
     Failure,
@@ -208,7 +208,7 @@ def test_an_abort_of_no_object_ends_what_is_under_way() -> None:
     assert str(talk.failure).startswith("1000h:00")
 
 
-def steps(*waits: Await | Pause) -> Script[None]:
+def steps(*waits: AwaitState | Pause) -> Script[None]:
     yield from waits
 
 
@@ -248,7 +248,7 @@ def test_what_is_heard_before_the_first_job_is_passed_over() -> None:
 
 def test_a_state_that_is_awaited_ends_the_wait_and_no_other_does() -> None:
     dialogue, ended = idle(), list[str]()
-    dialogue.start(0, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))
+    dialogue.start(0, job(steps(AwaitState(NmtState.OPERATIONAL, 300)), ended))
     dialogue.receive_state(10, NmtState.PRE_OPERATIONAL)
     dialogue.receive_sdo(20, bytes.fromhex("4300100091010700"))
     assert ended == []
@@ -267,7 +267,7 @@ def test_a_state_is_nothing_to_who_awaits_an_answer_or_pauses() -> None:
 
 def test_a_state_that_does_not_come_in_time_fails() -> None:
     dialogue, ended = idle(), list[str]()
-    dialogue.start(1_000, job(steps(Await(NmtState.OPERATIONAL, 300)), ended))
+    dialogue.start(1_000, job(steps(AwaitState(NmtState.OPERATIONAL, 300)), ended))
     assert dialogue.due_us == 1_300
     dialogue.tick(1_299)
     assert ended == []
@@ -276,7 +276,7 @@ def test_a_state_that_does_not_come_in_time_fails() -> None:
 
 
 def test_each_wait_begins_when_the_one_before_has_ended() -> None:
-    wait = Await(NmtState.OPERATIONAL, 300)
+    wait = AwaitState(NmtState.OPERATIONAL, 300)
     dialogue = idle()
     dialogue.start(1_000, job(steps(Pause(50), wait, Pause(70)), []))
     assert dialogue.due_us == 1_050

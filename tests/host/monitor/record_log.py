@@ -14,7 +14,9 @@ def hear(text: str, channel: str = "can0") -> list[Record]:
 
 
 def _one(seconds: float, channel: str, frame: str) -> Record:
-    return Record(round(seconds * 1e6), channel, parse_line(f"(0.000000) {channel} {frame}").heard)
+    return Record(
+        round(seconds * 1e6), channel, parse_line(f"(0.000000) {channel} {frame}").received
+    )
 
 
 def snapshot(records: list[Record]) -> Snapshot:

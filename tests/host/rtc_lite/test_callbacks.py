@@ -158,10 +158,10 @@ def test_a_callback_goes_on_when_a_single_ping_was_lost() -> None:
     link.now_us = proxy.due_us
     link.answers[LiteCommand.PING] = []
     proxy.tick()
-    asked_us = link.now_us
+    requested_us = link.now_us
     assert proxy.on_activated(EC) is OK
     assert link.taken() == ["CY", "AA"]
-    assert 100_000 <= link.now_us - asked_us <= 102_000
+    assert 100_000 <= link.now_us - requested_us <= 102_000
     assert proxy.due_us == link.now_us + 1_000_000
 
 

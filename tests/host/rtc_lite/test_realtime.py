@@ -65,7 +65,7 @@ class Live:
     def cut(self, at: int) -> int:
         """Cut the power of a node, and return when."""
         with ControlClient(self.nodes[at].control) as hand:
-            hand.ask("fault", spec="power_cut")
+            hand.request("fault", spec="power_cut")
         return time.monotonic_ns() // 1_000
 
     def await_event(self, kind: str) -> int:

@@ -52,8 +52,8 @@ def test_the_state_is_asked_each_10th_tick_however_short_the_period_is() -> None
     bench.run_for(PERIOD_US)
     bench.links[0].sent.clear()
     bench.run_for(10 * PERIOD_US)
-    asked_us = [at_us for at_us, data in bench.links[0].sent if data[1:3] == b"CX"]
-    assert 9 <= len(asked_us) <= 10
+    requested_us = [at_us for at_us, data in bench.links[0].sent if data[1:3] == b"CX"]
+    assert 9 <= len(requested_us) <= 10
     assert bench.events == []
 
 

@@ -76,8 +76,8 @@ class DictionaryPanel(Panel):
         """Keep the objects of the node."""
         self._known = [(row.channel, row.node) for row in model.board.rows()]
         if self.node is None and self._known:
-            told = [node for node in self._known if node[1] == self._wanted_node]
-            self._choose((told or self._known)[0])
+            matching = [node for node in self._known if node[1] == self._wanted_node]
+            self._choose((matching or self._known)[0])
         self._rows = []
         if self.node is not None:
             self._rows = self.client.objects(self.node).rows(self.filter_text)
@@ -115,7 +115,7 @@ class DictionaryPanel(Panel):
 
     def action_go(self) -> None:
         """Ask for a node-ID."""
-        self.query_one(PromptLine).ask("node-ID 1 to 127", "", self._go)
+        self.query_one(PromptLine).prompt("node-ID 1 to 127", "", self._go)
 
     def action_read(self) -> None:
         """Read the chosen object."""
@@ -136,11 +136,11 @@ class DictionaryPanel(Panel):
         if row is not None and self.may_send():
             kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))
             question = f"{write_entry(row.entry)} {row.text.name} ({kind})"
-            self.query_one(PromptLine).ask(question, "", lambda text: self._write(row, text))
+            self.query_one(PromptLine).prompt(question, "", lambda text: self._write(row, text))
 
     def action_filter(self) -> None:
         """Ask for a part of a name, or the begin of an index."""
-        self.query_one(PromptLine).ask("name or index", self.filter_text, self._filter)
+        self.query_one(PromptLine).prompt("name or index", self.filter_text, self._filter)
 
     def _show(self, node: Node) -> None:
         self._wanted_node = node[1]

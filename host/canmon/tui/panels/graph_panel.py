@@ -154,12 +154,12 @@ class GraphPanel(Panel):
 
     def action_add(self) -> None:
         """Ask for a signal."""
-        self.query_one(PromptLine).ask(QUESTION, "", self._add)
+        self.query_one(PromptLine).prompt(QUESTION, "", self._add)
 
     def action_remove(self) -> None:
         """Ask which signal is shown no more."""
         if self._texts:
-            self.query_one(PromptLine).ask("take out", self._texts[-1], self._remove)
+            self.query_one(PromptLine).prompt("take out", self._texts[-1], self._remove)
 
     def action_graph(self, change: str, *arguments: Any) -> None:
         """Change what is seen, as a method of the graph does: `zoom`, `move`, `fit` and others."""
@@ -167,7 +167,7 @@ class GraphPanel(Panel):
 
     def action_write(self) -> None:
         """Ask for a file, and write the picture or the samples."""
-        self.query_one(PromptLine).ask("file: .svg .html .png .csv", "graph.svg", self._write)
+        self.query_one(PromptLine).prompt("file: .svg .html .png .csv", "graph.svg", self._write)
 
     def on_picture_view_pointed(self, event: PictureView.Pointed) -> None:
         """Put the cursor where the mouse is."""

@@ -166,12 +166,12 @@ class SequencePanel(SendingPanel):
 
     def action_open(self) -> None:
         """Ask for a file, and read a sequence from it."""
-        self.query_one(PromptLine).ask("read a sequence from file", "", self._read_file)
+        self.query_one(PromptLine).prompt("read a sequence from file", "", self._read_file)
 
     def action_write(self) -> None:
         """Ask for a file, and write the sequence to it."""
         name = f"{self._called()}.toml"
-        self.query_one(PromptLine).ask("write the sequence to file", name, self._write_file)
+        self.query_one(PromptLine).prompt("write the sequence to file", name, self._write_file)
 
     def _read(self) -> Sequence | None:
         """Return the sequence of the editor; say what is wrong with it, and go there."""

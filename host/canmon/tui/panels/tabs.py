@@ -30,18 +30,18 @@ TABS: Final = ExtensionGroup[type[Panel]](
 """By their sections in a workspace; key 1 shows the first, and so on."""
 
 
-def make_panels(session: Session, tell: Callable[[str], None]) -> list[Panel]:
+def make_panels(session: Session, notify: Callable[[str], None]) -> list[Panel]:
     """Return all tabs; a foreign one that cannot be made is left out.
 
     Args:
         session: what they show.
-        tell: takes a line for people about each that is left out.
+        notify: takes a line for people about each that is left out.
     """
-    return list(_panels(session, tell))
+    return list(_panels(session, notify))
 
 
-def _panels(session: Session, tell: Callable[[str], None]) -> Iterator[Panel]:
-    for name, tab in TABS.load_all(tell).items():
+def _panels(session: Session, notify: Callable[[str], None]) -> Iterator[Panel]:
+    for name, tab in TABS.load_all(notify).items():
         tasks = list(session.tasks)
         try:
             panel = tab(session)
@@ -51,6 +51,6 @@ def _panels(session: Session, tell: Callable[[str], None]) -> Iterator[Panel]:
             if name in TABS.built_in:
                 raise
             session.tasks[:] = tasks
-            tell(f"tab {name!r}: {explain_error(error)}")
+            notify(f"tab {name!r}: {explain_error(error)}")
             continue
         yield panel

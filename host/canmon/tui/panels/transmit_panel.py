@@ -200,13 +200,13 @@ class TransmitPanel(SendingPanel):
 
     def action_add(self) -> None:
         """Write a new row."""
-        self.query_one(PromptLine).ask(QUESTION, "", self._add)
+        self.query_one(PromptLine).prompt(QUESTION, "", self._add)
 
     def action_edit(self) -> None:
         """Write the chosen row anew."""
         number = self.chosen
         if number < len(self.transmit.words):
-            self.query_one(PromptLine).ask(
+            self.query_one(PromptLine).prompt(
                 QUESTION, str(self.transmit.words[number]), lambda text: self._change(number, text)
             )
 

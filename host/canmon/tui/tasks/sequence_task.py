@@ -93,7 +93,7 @@ class SequenceTask(Task):
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
         self.channel = channel
         self.events: deque[SequenceEvent] = deque(maxlen=KEPT)
-        self._pdos, self._heard = PdoFrames(eds), DecodedCondition()
+        self._pdos, self._decoded = PdoFrames(eds), DecodedCondition()
         self._run: SequenceRun | None = None
         self._begin_us: int | None = None
 
@@ -113,7 +113,7 @@ class SequenceTask(Task):
         begin = next((line for line in lines if line and not line.startswith("#")), "")
         if begin.startswith(LINES):
             return parse_lines(text, name)
-        resolve, condition = self._pdos.frame, self._heard.condition
+        resolve, condition = self._pdos.frame, self._decoded.condition
         return TomlSequence(text, name, resolve=resolve, condition=condition).parse()
 
     def start(self, sequence: Steps) -> None:
@@ -130,7 +130,7 @@ class SequenceTask(Task):
             self._begin_us = now_us
         out = list(run.tick(now_us))
         for one, decoded in records:
-            self._heard.take(one, decoded)
+            self._decoded.take(one, decoded)
             out += run.tick(now_us, (one,))
         begin_us = self._begin_us
         self.events += (event._replace(at_us=event.at_us - begin_us) for event in run.events)

@@ -10,10 +10,10 @@ from tickrig.host.monitor.decode.sdo.sdo_steps import (
     Answer,
     Initiate,
     answers,
-    ask_segment,
     begin,
     confirm_segment,
     is_block_segment,
+    request_segment,
     send_segment,
     take_answer,
     take_block_frame,
@@ -130,7 +130,7 @@ class SdoChannel:
             case Abort():
                 return self._abort(at_us, message, by_client=True)
             case UploadSegmentRequest():
-                return ask_segment(self._segmented(at_us, Direction.UPLOAD), message)
+                return request_segment(self._segmented(at_us, Direction.UPLOAD), message)
             case Segment():
                 return send_segment(self._segmented(at_us, Direction.DOWNLOAD), message)
             case _:

@@ -39,7 +39,7 @@ class OpenTransfer:
         size: number of bytes, None if it was not said.
         crc: both sides can do the CRC.
         sent: the segment of a download that has no receipt yet.
-        asked: toggle bit of the segment of an upload that was asked for.
+        requested_toggle: toggle bit of the segment of an upload that was asked for.
         taken: toggle bit of the latest segment that was taken.
         block_last: place of the last segment in its block, once it was heard.
         done: nothing more is expected.
@@ -60,7 +60,7 @@ class OpenTransfer:
     data: bytearray = field(default_factory=bytearray)
     flaws: list[str] = field(default_factory=list)
     sent: Segment | None = None
-    asked: bool | None = None
+    requested_toggle: bool | None = None
     taken: bool | None = None
     block_last: int | None = None
     done: bool = False

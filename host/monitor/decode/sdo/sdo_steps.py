@@ -90,16 +90,16 @@ def unheard(at_us: int, node: int, answer: Answer) -> OpenTransfer:
     return opened
 
 
-def ask_segment(running: OpenTransfer, request: UploadSegmentRequest) -> str:
+def request_segment(running: OpenTransfer, request: UploadSegmentRequest) -> str:
     """Take what a client of an upload asks for."""
-    running.retries += running.asked == request.toggle
-    running.asked = request.toggle
+    running.retries += running.requested_toggle == request.toggle
+    running.requested_toggle = request.toggle
     return f"asks for a segment, {running.progress} so far"
 
 
 def take_segment(running: OpenTransfer, segment: Segment) -> str:
     """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
-    if segment.toggle != running.asked or segment.toggle == running.taken:
+    if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
         return "segment with the wrong toggle bit, or sent again"
     running.taken = segment.toggle
     running.data += segment.data

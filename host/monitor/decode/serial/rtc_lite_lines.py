@@ -41,14 +41,14 @@ class RtcLiteLine:
             True: LiteDecoder(REQUESTS, checksum),
             False: LiteDecoder(REPLIES, checksum),
         }
-        self._heard_us = {True: 0, False: 0}
+        self._received_us = {True: 0, False: 0}
 
     def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
         """Take bytes of one direction; return the frames that are whole now."""
-        decoder, gap_us = self._decoders[to_device], at_us - self._heard_us[to_device]
+        decoder, gap_us = self._decoders[to_device], at_us - self._received_us[to_device]
         if gap_us >= (LOST_GAP_US if decoder.lost else FRAME_GAP_US):
             decoder.clear()
-        self._heard_us[to_device] = at_us
+        self._received_us[to_device] = at_us
         return [self._line(at_us, to_device, found) for found in decoder.push(data)]
 
     def _line(self, at_us: int, to_device: bool, found: LiteFrame | LiteLinkFault) -> LineRecord:

@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
-from tickrig.host.rtc.commands.ask import default_path
+from tickrig.host.rtc.commands.request import default_path
 from tickrig.host.rtc.system.system_toml import parse_toml
 
 EXAMPLE = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
@@ -263,6 +263,6 @@ def test_a_device_takes_part_by_its_proxy_and_is_not_left_active(folder: Path) -
         with run(folder, "lite.toml", "--rate", "50", "--lite", f"Lite={device.link}") as child:
             child.type(42)
             assert child.lines(1) == ["ConsoleOut0 42"]
-            assert hand.ask("get", names=["state"])["values"] == {"state": "Active"}
+            assert hand.request("get", names=["state"])["values"] == {"state": "Active"}
             child.end(signal.SIGTERM)
-        assert hand.ask("get", names=["state"])["values"] == {"state": "Inactive"}
+        assert hand.request("get", names=["state"])["values"] == {"state": "Inactive"}

@@ -75,8 +75,8 @@ def test_a_state_is_waited_for_three_heartbeat_times_at_least_300_ms(
     node.on_state.append(lambda old, new: node.enter(old) if new == 5 else None)
     bench.server.manager.activate("Palette0")
     event = bench.run_until(ServerEventType.NOT_CONFIRMED, 16)
-    (asked_us,) = [at for at, heard in bench.log.heard if str(heard) == "000#0110"]
-    assert wait_ms * 1_000 - 100 <= event.at_us - asked_us <= wait_ms * 1_000
+    (requested_us,) = [at for at, heard in bench.log.heard if str(heard) == "000#0110"]
+    assert wait_ms * 1_000 - 100 <= event.at_us - requested_us <= wait_ms * 1_000
 
 
 def test_deactivation_right_after_activation_reaches_the_device() -> None:

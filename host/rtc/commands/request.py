@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.control import ask
+from tickrig.host.cli.control import request
 from tickrig.host.cli.options import PATH, Decorator
 from tickrig.host.cli.refused import Refused
 from tickrig.host.control.requests import Object
@@ -46,15 +46,15 @@ at: Final[Decorator] = click.option(
 """Add `--at`, which all verbs have."""
 
 
-def ask_system(socket: Path, do: str, /, **fields: object) -> Any:
+def request_system(socket: Path, do: str, /, **fields: object) -> Any:
     """Ask a running system and return its answer; Refused if it gives none, or an error."""
-    return ask(socket, SYSTEM, do, **fields)
+    return request(socket, SYSTEM, do, **fields)
 
 
 def components(socket: Path, *names: str) -> list[Any]:
     """Return the descriptions of components, of all if none is named."""
     fields: Object = {"names": list(names)} if names else {}
-    described: list[Any] = ask_system(socket, "describe", **fields)["components"]
+    described: list[Any] = request_system(socket, "describe", **fields)["components"]
     return described
 
 
@@ -67,7 +67,7 @@ def _completer(names: Callable[[Any], list[str]]) -> Complete:
     def complete(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
         socket = context.params.get("at") or os.environ.get(VARIABLE) or default_path()
         try:
-            known = names(ask_system(Path(socket), "describe"))
+            known = names(request_system(Path(socket), "describe"))
         except Refused:
             return []
         return [name for name in known if name.startswith(begun)]
