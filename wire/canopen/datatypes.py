@@ -65,14 +65,28 @@ class DataType(IntEnum):
         return self in _SIGNED or self in _UNSIGNED
 
     def encode(self, value: Value) -> bytes:
-        """Return the bytes of a value; FieldError if it does not fit."""
+        """Return the bytes of a value, little endian (CiA 301, 7.1.4).
+
+        Args:
+            value: a number of the range of this type, a text, or bytes.
+
+        Raises:
+            FieldError: it does not fit.
+        """
         try:
             return _encode(self, value)
         except (struct.error, OverflowError, TypeError, UnicodeError, AttributeError) as error:
             raise FieldError(f"{value!r} is no {self.name}") from error
 
     def decode(self, data: bytes) -> Value:
-        """Return the value of bytes; FieldError if their number is wrong."""
+        """Return the value of bytes.
+
+        Args:
+            data: as an SDO or a PDO carries it.
+
+        Raises:
+            FieldError: their number is not that of this type.
+        """
         size, decode = _DECODERS[self]
         if size and len(data) != size:
             raise FieldError(f"{len(data)} bytes for {self.name}, which has {size}")

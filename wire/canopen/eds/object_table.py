@@ -26,7 +26,15 @@ class Access(Flag):
 
     @classmethod
     def from_eds(cls, access_type: str, *, mappable: bool = False) -> Access:
-        """Return the access of an EDS: ro, wo, rw, rwr, rww, const; ValueError if unknown."""
+        """Return the access of an entry of an EDS (CiA 306).
+
+        Args:
+            access_type: ro, wo, rw, rwr, rww or const, in any case.
+            mappable: whether PDOs may carry it (PDOMapping).
+
+        Raises:
+            ValueError: no such access.
+        """
         access = _ACCESS_TYPES.get(access_type.lower())
         if access is None:
             raise ValueError(f"access type {access_type!r} is none of {', '.join(_ACCESS_TYPES)}")
@@ -144,7 +152,11 @@ class EntryDescription:
         return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
 
     def power_on_data(self, node_id: int) -> bytes:
-        """Return the default, with the node-ID where it belongs to it."""
+        """Return the bytes of the default, with the node-ID where it belongs to it.
+
+        Args:
+            node_id: 1 to 127.
+        """
         if not self.relative:
             return self.default
         value = int.from_bytes(self.default, "little") + node_id
