@@ -17,7 +17,7 @@ from tickrig.device.twin import Copyable
 Pair = tuple[float, float]
 
 
-class Look(NamedTuple):
+class BaseState(NamedTuple):
     """A base, as the world saw it; pairs are left and right unless said otherwise.
 
     Attributes:
@@ -39,21 +39,21 @@ class Look(NamedTuple):
     frames: tuple[int, int]
 
 
-READ: Final[Mapping[str, Callable[[Look], float]]] = {
-    "x_m": lambda look: look.pose.x_m,
-    "y_m": lambda look: look.pose.y_m,
-    "heading_rad": lambda look: look.pose.heading_rad,
-    "speed_m_s": lambda look: look.speed[0],
-    "turn_rad_s": lambda look: look.speed[1],
-    "angle_left_rad": lambda look: look.travel[0] / COUNTS_PER_RAD,
-    "angle_right_rad": lambda look: look.travel[1] / COUNTS_PER_RAD,
-    "slip_left_m_s": lambda look: look.slip[0],
-    "slip_right_m_s": lambda look: look.slip[1],
-    "torque_left_pm": lambda look: look.torque[0],
-    "torque_right_pm": lambda look: look.torque[1],
-    "status": lambda look: look.status,
-    "served": lambda look: look.frames[0],
-    "garbled": lambda look: look.frames[1],
+READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
+    "x_m": lambda state: state.pose.x_m,
+    "y_m": lambda state: state.pose.y_m,
+    "heading_rad": lambda state: state.pose.heading_rad,
+    "speed_m_s": lambda state: state.speed[0],
+    "turn_rad_s": lambda state: state.speed[1],
+    "angle_left_rad": lambda state: state.travel[0] / COUNTS_PER_RAD,
+    "angle_right_rad": lambda state: state.travel[1] / COUNTS_PER_RAD,
+    "slip_left_m_s": lambda state: state.slip[0],
+    "slip_right_m_s": lambda state: state.slip[1],
+    "torque_left_pm": lambda state: state.torque[0],
+    "torque_right_pm": lambda state: state.torque[1],
+    "status": lambda state: state.status,
+    "served": lambda state: state.frames[0],
+    "garbled": lambda state: state.frames[1],
 }
 """By the names in `terminals.OUTPUTS`."""
 
@@ -94,7 +94,7 @@ class Rh3Base(Copyable):
         self.slave = ModbusSlave(driver.registers, driver.written, self.parameters.address)
         self._on, self._moving, self._unseen, self._now_us = True, False, True, 0
         self._restarted = False
-        self._seen = self._look()
+        self._seen = self._observed()
 
     @property
     def tick_us(self) -> int:
@@ -158,16 +158,16 @@ class Rh3Base(Copyable):
             sent = self.slave.tick(now_us, rx)
         self._step()
         if now_us % LOOK_US == 0:
-            self._seen, self._unseen = self._look(), self._moving
+            self._seen, self._unseen = self._observed(), self._moving
         return sent
 
     def _power_up(self) -> None:
         self._driver.power_up()
         self.slave.reset()
 
-    def _look(self) -> Look:
+    def _observed(self) -> BaseState:
         ground, (left, right) = self.ground, self.sides
-        return Look(
+        return BaseState(
             ground.pose,
             (ground.speed_m_s, ground.turn_rad_s),
             (left.wheel.travel, right.wheel.travel),

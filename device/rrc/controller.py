@@ -13,7 +13,7 @@ BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 """Reverse mode by held buttons, (down, up), when alarm is pressed (RRC manual, last page)."""
 
 
-def look_at_buttons(inputs: InputBank, settings: Settings) -> bool:
+def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
     """Count button edges and do what speed buttons do.
 
     A counter is odd while its button is pressed (RRC manual, SA #7 to #9); so a

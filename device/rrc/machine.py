@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.buzzer import Buzzer
 from tickrig.device.rrc.config import RrcConfig
-from tickrig.device.rrc.controller import chosen_mode, look_at_buttons
+from tickrig.device.rrc.controller import chosen_mode, count_button_edges
 from tickrig.device.rrc.drive import Drive
 from tickrig.device.rrc.load import LoadAccount
 from tickrig.device.rrc.power import PowerSequence
@@ -137,7 +137,7 @@ class Rrc(Copyable):
             self._boot(tick)
         self._sent, self._commands, self._replies = [], 0, 0
         self._receive(rx)
-        self._look(tick)
+        self._read_inputs(tick)
         self._work(tick)
         self._watch(tick)
         self._drive.step(tick, self.state, self._settings, self.inputs)
@@ -156,9 +156,9 @@ class Rrc(Copyable):
         for _ in range(self._buffer.push(rx) if rx else 0):
             self._reply(Refusal(RECEIVE_BUFFER_OVERFLOW))
 
-    def _look(self, tick: int) -> None:
+    def _read_inputs(self, tick: int) -> None:
         """Take notice of buttons, faults and time."""
-        if self.state in POWERED_ON and look_at_buttons(self.inputs, self._settings):
+        if self.state in POWERED_ON and count_button_edges(self.inputs, self._settings):
             self._choose_drive()
         event, move = self._power.step(self.state, tick, self.inputs)
         if event is not None:

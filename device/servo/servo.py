@@ -150,7 +150,7 @@ class Servo(Readings):
             self.counts = floor(plant.position - self._lost_counts + 0.5)
         self.now_us += STEP_US
         if self.now_us - self._heat.since_us >= SLOW_US:
-            self._look()
+            self._update_limit()
         if (
             plant.speed_rad_s == 0.0
             and plant.position == position
@@ -181,7 +181,7 @@ class Servo(Readings):
             return plant.drive(-limit, self._limit_v) or -1
         return plant.drive(current, self._limit_v)
 
-    def _look(self) -> None:
+    def _update_limit(self) -> None:
         """Take heat and overload of the latest steps into account."""
         plant, heat = self._plant, self._heat
         heat.pass_time(self.now_us, plant.losses.square_a2s)
@@ -193,7 +193,7 @@ class Servo(Readings):
 
     def _rest(self) -> None:
         """Rest, unless the current will not stay as it is."""
-        self._look()
+        self._update_limit()
         current, limit = self._plant.current_a, self._limit_a
         by_voltage = self.current_limited and abs(current) != limit  # follows the resistance
         self.resting = not by_voltage and self._heat.bears(current)
@@ -203,4 +203,4 @@ class Servo(Readings):
         plant, rested_us = self._plant, self.now_us - self._heat.since_us
         plant.losses.square_a2s = plant.current_a**2 * rested_us / 1_000_000
         self.resting = False
-        self._look()
+        self._update_limit()

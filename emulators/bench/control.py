@@ -9,7 +9,7 @@ from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.rig.emulated import look_at
+from tickrig.emulators.rig.emulated import read_signal
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -76,7 +76,7 @@ class EmulatorControl(RequestDispatcher):
             ):
                 everything = known([*device.inputs.table, *device.outputs])
                 raise ValueError(f"no input or output {short(name)}; known: {everything}")
-        return {"values": {name: look_at(device, name) for name in names}}
+        return {"values": {name: read_signal(device, name) for name in names}}
 
     def _set(self, request: Object) -> Object:
         name, value = text_of(request, "name"), request.get("value")

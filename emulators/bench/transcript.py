@@ -9,7 +9,7 @@ from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rig.emulated import look_at
+from tickrig.emulators.rig.emulated import read_signal
 from tickrig.host.text.values import Setting, format_time
 
 STATE: Final = "state"
@@ -36,7 +36,7 @@ class Transcript:
         self._sending = False
         emulator.operator.note = lambda text: self.write(emulator.effective_us, "!", text)
         emulator.log.listeners.append(self._hear)
-        emulator.after_step.append(self._look)
+        emulator.after_step.append(self._write_changes)
         if STATE in emulator.device.outputs:
             self.watch(emulator.effective_us, STATE)
 
@@ -48,7 +48,7 @@ class Transcript:
         """Show outputs now and whenever they change."""
         for name in names:
             self._shown.setdefault(name, "")
-        self._look(now_us)
+        self._write_changes(now_us)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
         """Send as the host, and show it at once, line or not."""
@@ -57,9 +57,9 @@ class Transcript:
         self._emulator.send(now_us, data)
         self._sending = False
 
-    def _look(self, now_us: int) -> None:
+    def _write_changes(self, now_us: int) -> None:
         for name, shown in self._shown.items():
-            if (value := look_at(self._emulator.device, name)) != shown:
+            if (value := read_signal(self._emulator.device, name)) != shown:
                 self._shown[name] = value
                 self.write(now_us, "*", f"{name} {value}")
 

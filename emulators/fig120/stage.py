@@ -17,7 +17,7 @@ from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
-from tickrig.emulators.rig.emulated import look_at
+from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused
@@ -88,7 +88,7 @@ class VirtualStage:
 
     def get(self, name: str) -> Setting:
         """Look at a thing of a node."""
-        return look_at(self._nodes, name)
+        return read_signal(self._nodes, name)
 
     def set(self, name: str, value: Setting) -> None:
         """Touch a thing of a node."""

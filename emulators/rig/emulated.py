@@ -76,6 +76,6 @@ class Emulated(Device[W], HasSignals, Protocol[W]):
     """A device on a wire, with signals."""
 
 
-def look_at(device: HasSignals, name: str) -> Setting:
+def read_signal(device: HasSignals, name: str) -> Setting:
     """Return the present value of an input or output; KeyError if there is none."""
     return device.inputs[name] if name in device.inputs.table else device.read(name)

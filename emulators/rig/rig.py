@@ -23,8 +23,8 @@ T = TypeVar("T")
 U = TypeVar("U")
 
 
-class Joint(Protocol):
-    """A joint of a wire with the outside world: `Bridge`, `CanBridge`."""
+class OutsideBridge(Protocol):
+    """A bridge between a wire and the outside world: `Bridge`, `CanBridge`."""
 
     @property
     def due_us(self) -> int:
@@ -108,7 +108,7 @@ class Rig(Copyable):
     def __init__(
         self,
         *stations: Station[Any],
-        bridges: Sequence[Joint] = (),
+        bridges: Sequence[OutsideBridge] = (),
         couplings: Sequence[Coupling] = (),
         clock: Clock | None = None,
         dense: bool = False,
@@ -201,7 +201,7 @@ class Rig(Copyable):
     @property
     def next_us(self) -> int:
         """When there is something to do next: an action, a tick with work, an end on a wire."""
-        self._look()
+        self._enter_due()
         return min(self._planned_us, self._wires_due_us)
 
     def step(self) -> None:
@@ -216,7 +216,7 @@ class Rig(Copyable):
             t_us: the time, since the start of the rig.
             host: where to look for something, if given.
         """
-        self._look()
+        self._enter_due()
         while (next_us := self._go_on(t_us, host)) <= t_us:
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
@@ -242,7 +242,7 @@ class Rig(Copyable):
             False if the time passed first.
         """
         deadline_us = self.now_us + timeout_us
-        self._look()
+        self._enter_due()
         while not done():
             next_us = min(self._planned_us, self._wires_due_us)
             if next_us > deadline_us:
@@ -251,7 +251,7 @@ class Rig(Copyable):
             self._happen(next_us)
         return True
 
-    def _look(self) -> None:
+    def _enter_due(self) -> None:
         """Enter what has come due between steps: inputs set, a dictionary written."""
         for station in self._woken:
             if (due_us := station.device.due_us) < station.at_us:
@@ -313,7 +313,7 @@ class Rig(Copyable):
             self.event_queue.run(now_us)
         finally:
             self.acting_us = None
-        self._look()
+        self._enter_due()
 
     def _pass_to(self, t_us: int) -> None:
         """Let time pass in which no tick has work."""
@@ -370,7 +370,7 @@ class Rig(Copyable):
         for coupling in acting:
             coupling.act(now_us)
         if acting:
-            self._look()
+            self._enter_due()
 
 
 def _ignore(at_us: int) -> None:

@@ -10,9 +10,8 @@ from math import cos, pi
 from typing import Final
 
 from benchmarks.table import rates
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames
@@ -49,17 +48,17 @@ class Master:
         return (SYNC, *(CanFrame(0x300 + number, data) for number in range(1, DRIVES + 1)))
 
 
-def dictionary() -> Dictionary:
-    """Make an EPOS-like drive in mode 8 that talks with SYNC."""
-    made = epos.dictionary()
+def stored() -> Nonvolatile:
+    """Make what a drive has kept: mode 8, PDOs that go with SYNC."""
+    made, kept = epos.dictionary(), Nonvolatile()
     for at, value in (
         ((0x6060, 0), 8),
         ((0x1400, 1), 0x8000_0200),
         ((0x1401, 2), 1),
         ((0x1800, 2), 1),
     ):
-        made[at].default = made[at].data_type.encode(value)
-    return made
+        kept.parameters[made[at].key] = made[at].data_type.encode(value)
+    return kept
 
 
 def run(seconds: float) -> None:
@@ -69,8 +68,7 @@ def run(seconds: float) -> None:
     def turn() -> None:
         wire = CanWire()
         stations = [
-            Station(make_slave(dictionary(), number, application=epos.make_application), wire.end())
-            for number in range(1, DRIVES + 1)
+            Station(epos.make_epos(number, stored()), wire.end()) for number in range(1, DRIVES + 1)
         ]
         rigs.append(stations)
         Rig(Station(Master(), wire.end()), *stations).run_for(SIMULATED_S * 1_000_000)

@@ -76,7 +76,7 @@ def run(seconds: float) -> None:
 
 def measure(emulator: Emulator, seconds: float) -> None:
     """Stream status lines and confirmed commands, 100 of each a second."""
-    emulator.request("press", name="power_button")
+    emulator.ask("press", name="power_button")
     wait_for(emulator.fd, b"EV:PowerOnSuccess")
     cpu_s, start = emulator.cpu_s(), time.monotonic()
     time.sleep(1)
@@ -90,7 +90,7 @@ def measure(emulator: Emulator, seconds: float) -> None:
     percentiles(f"RRC on a pty, {seconds:g} s: status period", gaps, "ms")
     percentiles("command to OK", [1_000 * s for s in latencies], "ms")
     expected = round((arrivals[-1] - arrivals[0]) / PERIOD_S) + 1
-    status = emulator.request("status")
+    status = emulator.ask("status")
     print(f"| status lines lost | {expected - len(arrivals)} | of {expected} |")
     print(f"| commands without OK | {sent - len(latencies)} | of {sent} |")
     print(

@@ -233,7 +233,7 @@ class Ds402(Application):
     def on_execute(self, now_us: int) -> None:
         """Measure, watch, make a step, command the motor, show actual values."""
         self.axis.motor.step_to(now_us)
-        self._look()
+        self._follow_outside()
         for code in self.supervision.step(now_us, powered=self.automaton.powered):
             self.fault(code)
         self.limited = False
@@ -285,7 +285,7 @@ class Ds402(Application):
             self.fault(code)
         return self.stopping.brake(Ramp.QUICK_STOP)
 
-    def _look(self) -> None:
+    def _follow_outside(self) -> None:
         """Follow configuration, physical inputs and the shaft."""
         self._configure()
         self._follow_inputs()

@@ -85,7 +85,7 @@ class Homing(Mode):
     def run(self, now_us: int) -> bool:
         """Search; at the end brake, or go to the home position."""
         if self._search is not None:
-            self._look(self._search)
+            self._watch_switches(self._search)
         if self._search is not None:
             self._steer(self._search, began_us(now_us))
         elif not self._path.kept:
@@ -100,7 +100,7 @@ class Homing(Mode):
         self._stage, self._search = stage, None
         self._path.leave()
 
-    def _look(self, search: HomingSearch) -> None:
+    def _watch_switches(self, search: HomingSearch) -> None:
         """Look at switches and index pulse, and what follows from them."""
         before, self._counts = self._counts, self.axis.motor.counts
         pulse = index_pulse(before, self._counts, self.axis.motor.counts_per_turn)

@@ -39,6 +39,7 @@ class Supervision:
 
     Attributes:
         wired: faults that the electronics see, as their inputs are now.
+        has_supply: the supply is not too low (bit 4 of the statusword).
         waiting: a time-out runs.
         not_following: the following error is larger than 6065h.
     """
@@ -47,12 +48,8 @@ class Supervision:
         self._axis, self.bounds = axis, bounds
         self.wired: tuple[ErrorCode, ...] = ()
         self.waiting = self.not_following = False
+        self.has_supply = True
         self._error_us = self._stall_us = 0
-
-    @property
-    def has_supply(self) -> bool:
-        """Whether the supply is not too low (bit 4 of the statusword)."""
-        return self._axis.motor.supply_mv >= self.bounds.supply_mv[0]
 
     @property
     def warns(self) -> bool:
@@ -62,10 +59,11 @@ class Supervision:
     def present(self, *, powered: bool) -> list[ErrorCode]:
         """Return the faults whose cause is there now; a short circuit needs power to be seen."""
         motor, bounds = self._axis.motor, self.bounds
+        supply_mv, (lowest_mv, highest_mv) = motor.supply_mv, bounds.supply_mv
         found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]
-        if not self.has_supply:
+        if supply_mv < lowest_mv:
             found.append(ErrorCode.UNDER_VOLTAGE)
-        if motor.supply_mv > bounds.supply_mv[1]:
+        if supply_mv > highest_mv:
             found.append(ErrorCode.OVER_VOLTAGE)
         if motor.winding_dc > bounds.winding_dc:
             found.append(ErrorCode.DRIVE_TEMPERATURE)
@@ -78,6 +76,7 @@ class Supervision:
             The faults that are there, and those that a motion with power shows.
         """
         found, self.waiting = self.present(powered=powered), False
+        self.has_supply = ErrorCode.UNDER_VOLTAGE not in found
         if not powered:
             self.not_following = False
             self._error_us = self._stall_us = now_us
