@@ -17,7 +17,7 @@ STATE: Final = "state"
 
 
 class Transcript:
-    """Writes down lines of the wire as the host sees them, touches, and watched outputs.
+    """Writes lines of the wire as the host sees them, actions of the operator, watched outputs.
 
     Args:
         emulator: what is watched.
@@ -69,7 +69,7 @@ class Transcript:
 
 
 class FrameTranscript(Transcript):
-    """Touches, watched outputs and missed expectations, without the frames.
+    """Actions of the operator, watched outputs and missed expectations, without the frames.
 
     Args:
         emulator: what is watched.

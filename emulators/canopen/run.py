@@ -160,7 +160,7 @@ class CanopenRun(EmulatorRun):
         say(
             f"  tickrig ctl {control} describe"
             if control
-            else "Add --control PATH to touch the objects from the inside, -vv to see the frames."
+            else "Add --control PATH to set the objects from the inside, -vv to see the frames."
         )
 
 

@@ -11,7 +11,10 @@ from tickrig.host.cli.options import version_option
 
 HERE: Final = "tickrig.emulators.commands"
 COMMANDS: Final = {
-    "ctl": (f"{HERE}.ctl_cli:ctl", "Touch and watch the emulator whose control socket is SOCKET."),
+    "ctl": (
+        f"{HERE}.ctl_cli:ctl",
+        "Operate and watch the emulator whose control socket is SOCKET.",
+    ),
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
     "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
@@ -29,7 +32,7 @@ def main() -> None:
     """Work with emulated devices.
 
     \b
-    tickrig ctl /tmp/rrc.ctl press power_button   touch a running emulator
+    tickrig ctl /tmp/rrc.ctl press power_button   operate a running emulator
     tickrig emu rrc --link /tmp/rrc               emulate a device
     tickrig replay run.trace                      replay a recorded run
     tickrig demo rrc                              see a device and a host at work

@@ -1,4 +1,4 @@
-"""The command `tickrig ctl`: touch and watch a running emulator."""
+"""The command `tickrig ctl`: operate and watch a running emulator."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ AS_JSON: Final = "Print the answer as JSON."
 @click.argument("socket", type=click.Path())
 @click.pass_context
 def ctl(context: click.Context, /, socket: str) -> None:
-    """Touch and watch the emulator whose control socket is SOCKET.
+    """Operate and watch the emulator whose control socket is SOCKET.
 
     \b
     tickrig ctl /tmp/rrc.ctl describe

@@ -57,7 +57,7 @@ class Stage(Protocol):
         ...
 
     def set(self, name: str, value: Setting, /) -> None:
-        """Touch a thing of a node, as `16/ai1_v`."""
+        """Set a signal of a node, as `16/ai1_v`."""
 
 
 class VirtualStage:
@@ -87,11 +87,11 @@ class VirtualStage:
         self._rig.run_to(at_us)
 
     def get(self, name: str) -> Setting:
-        """Look at a thing of a node."""
+        """Return the value of a signal of a node."""
         return read_signal(self._nodes, name)
 
     def set(self, name: str, value: Setting) -> None:
-        """Touch a thing of a node."""
+        """Set a signal of a node."""
         self._nodes.inputs.set(name, value)
 
 

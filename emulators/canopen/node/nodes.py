@@ -42,7 +42,7 @@ class Part(Protocol):
 
 
 class Nodes:
-    """All nodes of a bus, to be touched and looked at.
+    """All nodes of a bus, with the signals of each.
 
     The things of one node are called as they are, `0x6000:1`, `state`; those of
     several have the node before them, `5/0x6000:1`, `5/state`, those of a body always

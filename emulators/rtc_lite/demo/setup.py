@@ -69,7 +69,7 @@ class VirtualSetup:
         self.manager.tick(self._rig.now_us)
 
     def power(self, name: str, *, on: bool) -> None:
-        """Touch the node."""
+        """Cut or give the power of a node."""
         self._nodes[name].inputs.set(POWER_CUT, 0 if on else 1)
 
 
