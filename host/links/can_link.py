@@ -248,19 +248,43 @@ ECHO_US: Final = 1_000_000
 """An echo that has not come by then was lost."""
 
 
-class EchoFreeLink:
-    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
+class EchoFilter:
+    """Tells the echo of one's own frames from what others sent.
 
     A frame of somebody else that is the same as one whose echo is awaited is taken
     for the echo, and the echo for it.
+    """
+
+    def __init__(self) -> None:
+        self._awaited: deque[tuple[int, CanFrame]] = deque()
+
+    def sent(self, now_us: int, traffic: Frames) -> None:
+        """Await the echo of what is sent now."""
+        self._awaited += [(now_us, frame) for frame in traffic]
+
+    def expire(self, now_us: int) -> None:
+        """Await no more what was sent more than `ECHO_US` ago."""
+        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
+            self._awaited.popleft()
+
+    def take(self, frame: CanFrame) -> bool:
+        """Return whether a frame is an awaited echo, which is then awaited no more."""
+        for place, (_, awaited) in enumerate(self._awaited):
+            if awaited == frame:
+                del self._awaited[place]
+                return True
+        return False
+
+
+class EchoFreeLink:
+    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
 
     Args:
         link: the link behind it.
     """
 
     def __init__(self, link: StampedLink) -> None:
-        self._link = link
-        self._awaited: deque[tuple[int, CanFrame]] = deque()
+        self._link, self._echo = link, EchoFilter()
 
     @property
     def now_us(self) -> int:
@@ -269,7 +293,7 @@ class EchoFreeLink:
 
     def send(self, traffic: Frames, /) -> None:
         """Send, and await the echo."""
-        self._awaited += [(self.now_us, frame) for frame in traffic]
+        self._echo.sent(self.now_us, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> Frames:
@@ -279,19 +303,11 @@ class EchoFreeLink:
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
         """Return a time, and what others sent by then."""
         now_us, received = self._link.receive_stamped(timeout_us)
-        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
-            self._awaited.popleft()
+        self._echo.expire(now_us)
         return now_us, tuple(
-            (at_us, frame) for at_us, frame in received if not self._is_echo(frame)
+            (at_us, frame) for at_us, frame in received if not self._echo.take(frame)
         )
 
     def close(self) -> None:
         """Close the link behind it."""
         self._link.close()
-
-    def _is_echo(self, frame: CanFrame) -> bool:
-        for place, (_, awaited) in enumerate(self._awaited):
-            if awaited == frame:
-                del self._awaited[place]
-                return True
-        return False

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final, Protocol
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.port import Port
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.host.links.can_link import EchoFilter
+from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
 HANDOVER_US: Final = 1_000
@@ -52,10 +52,6 @@ class CanBridge:
             self._outside.send(now_us, frames)
 
 
-ECHO_US: Final = 1_000_000
-"""An echo that has not come by then was lost."""
-
-
 class CountingPort(Port[Frames], Protocol):
     """A bus outside that counts what it could not take."""
 
@@ -68,16 +64,12 @@ class CountingPort(Port[Frames], Protocol):
 class WithoutEcho:
     """A port on the udp_multicast bus of python-can, which hears its own frames.
 
-    A frame from outside that is the same as one whose echo is awaited is taken
-    for the echo, and the echo for it.
-
     Args:
         port: the port behind it.
     """
 
     def __init__(self, port: CountingPort) -> None:
-        self._port = port
-        self._awaited: deque[tuple[int, CanFrame]] = deque()
+        self._port, self._echo = port, EchoFilter()
 
     @property
     def lost(self) -> int:
@@ -91,18 +83,10 @@ class WithoutEcho:
 
     def poll(self, now_us: int, /) -> Frames:
         """Read what others have sent."""
-        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
-            self._awaited.popleft()
-        return tuple(frame for frame in self._port.poll(now_us) if not self._is_echo(frame))
+        self._echo.expire(now_us)
+        return tuple(frame for frame in self._port.poll(now_us) if not self._echo.take(frame))
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
         """Send, and await the echo."""
-        self._awaited += [(now_us, frame) for frame in traffic]
+        self._echo.sent(now_us, traffic)
         self._port.send(now_us, traffic)
-
-    def _is_echo(self, frame: CanFrame) -> bool:
-        for place, (_, awaited) in enumerate(self._awaited):
-            if awaited == frame:
-                del self._awaited[place]
-                return True
-        return False
