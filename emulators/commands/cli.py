@@ -34,6 +34,7 @@ def main() -> None:
     \b
     tickrig ctl /tmp/rrc.ctl press power_button   operate a running emulator
     tickrig emu rrc --link /tmp/rrc               emulate a device
+    tickrig new device lamp                       begin a device of your own
     tickrig replay run.trace                      replay a recorded run
     tickrig demo rrc                              see a device and a host at work
     tickrig rtc run system.toml                   run RT components
