@@ -59,7 +59,7 @@ class DeviceGroup(LazyGroup):
             from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
 
         if cmd_name not in (names := DEVICES.names()):
-            known = ", ".join(dict.fromkeys([*self.commands, *names]))
+            known = ", ".join(dict.fromkeys([*OURS, *names]))
             raise Refused(f"no device {cmd_name!r}; known: {known}")
         try:
             return device_command(DEVICES.load(cmd_name))
