@@ -129,7 +129,6 @@ class NodeObjects:
         if transfer.problem:
             self._problems[entry] = _reason(entry, transfer)
             return
-        self._problems.pop(entry, None)
         self._reads += 1
         self._ages[entry] = self._reads
         before = self._values.get(entry)

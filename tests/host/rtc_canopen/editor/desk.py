@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from unittest.mock import patch
 
 from textual.pilot import Pilot
 from textual.widgets import Input
@@ -14,6 +15,7 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.rtc_canopen.editor import app as editor_app
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.session import AddComponents, EditorSession
 from tickrig.host.rtc_canopen.editor.widgets import CursorView
@@ -95,7 +97,7 @@ def at_desk(
     size: tuple[int, int] = (80, 24),
     furnish: AddComponents = lambda server: None,
 ) -> None:
-    """Let somebody work at a desk where all nodes have booted."""
+    """Let somebody work where all nodes have booted; the screen's own clock stands still."""
 
     async def main() -> None:
         desk = Desk(path, models or CAST, furnish)
@@ -104,4 +106,5 @@ def at_desk(
             await desk.pass_ms(700)
             await act(desk)
 
-    asyncio.run(main())
+    with patch.object(editor_app, "PAINT_S", 3_600):
+        asyncio.run(main())
