@@ -224,6 +224,7 @@ def test_what_is_passed_over_is_told_while_it_comes(tmp_path: Path) -> None:
         session.step()
         assert "1 frames  1/s  lost 0  passed over 2" in status(monitor)
         await pilot.press("3")
+        await pilot.pause()  # now it has a size
         assert shown(monitor)[1] == "lost 0, passed over 2, 1 identifiers by id"
 
     on_monitor(session, act)

@@ -23,6 +23,7 @@ def wire() -> Iterator[Wire]:
 def test_it_is_the_table_of_top_and_its_keys() -> None:
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("3")
+        await pilot.pause()  # now it has a size
         lines = shown(monitor)
         assert lines[0].startswith("can0: 134 frames, load 14.8 kbit/s")
         assert lines[1] == "lost 0, 14 identifiers by id"
@@ -46,6 +47,7 @@ def test_space_holds_it(wire: Wire) -> None:
 
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("3")
+        await pilot.pause()  # now it has a size
         hear(session, wire, "181#01")
         shown(monitor)
         await pilot.press("space")
@@ -63,6 +65,7 @@ def test_space_holds_it(wire: Wire) -> None:
 def test_a_narrow_window_has_fewer_columns() -> None:
     async def act(monitor: Monitor, pilot: Any) -> None:
         await pilot.press("3")
+        await pilot.pause()  # now it has a size
         assert "jitter" in shown(monitor)[2]
         await pilot.resize_terminal(60, 20)
         await pilot.pause()
