@@ -1,3 +1,1 @@
-"""What tests a device of anybody, over any session; what is done to it is drawn by Hypothesis."""
-
-from tickrig.emulators.testing import strategies as strategies
+"""What people test with: the bench, its rig files and reports, the plug-in, tests of devices."""

@@ -39,8 +39,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.check_device import _Bench
-from tickrig.emulators.testing.strategies import Session
+from tickrig.emulators.testing.properties.check_device import _Bench
+from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.testing import check_device, strategies
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import Request, encode_request

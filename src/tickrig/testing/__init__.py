@@ -4,13 +4,13 @@ from tickrig._lazy import lazy
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from tickrig.emulators.testing import strategies as strategies
-    from tickrig.emulators.testing.check_device import check_device as check_device
+    from tickrig.emulators.testing.properties import strategies as strategies
+    from tickrig.emulators.testing.properties.check_device import check_device as check_device
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
-            "tickrig.emulators.testing": ("strategies",),
-            "tickrig.emulators.testing.check_device": ("check_device",),
+            "tickrig.emulators.testing.properties": ("strategies",),
+            "tickrig.emulators.testing.properties.check_device": ("check_device",),
         },
     )

@@ -26,8 +26,8 @@ from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing import strategies
-from tickrig.emulators.testing.strategies import Session
+from tickrig.emulators.testing.properties import strategies
+from tickrig.emulators.testing.properties.strategies import Session
 
 NOTHING: Final[Session] = ()
 

@@ -1,0 +1,1 @@
+"""tickrig run, check, init, record, compare."""

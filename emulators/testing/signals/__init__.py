@@ -1,0 +1,1 @@
+"""Values that change by themselves: ramps, sines, noise, tables, lags, formulas."""
