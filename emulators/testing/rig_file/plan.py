@@ -1,0 +1,272 @@
+"""What a rig file says, as plain values: what is on the bench, and where it is.
+
+Paths of the file are already those of the running program: a relative one in the file begins
+beside the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from tickrig.emulators.bench.fault_spec import FaultSpec
+
+LATE_MS: Final = 50
+STICK_PCT: Final = 10
+
+
+class WireType(Enum):
+    """What a wire is, as the file writes it."""
+
+    SERIAL = "serial"
+    RS485 = "rs485"
+    CAN = "can"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WirePlan:
+    """One wire.
+
+    Attributes:
+        name: what faults, doors and messages call it. A wire that the file leaves out has the
+            name of its device, or is `can`.
+        type: serial line, RS485 or CAN.
+        bit_rate: in bit/s; None for that of its device: `DeviceType.line`, or a DCF's.
+        framing: of a byte on a line: data bits, parity, stop bits.
+        buffer_bytes: room of a receiver on a line; None for that of its device.
+        echo: on RS485, each end hears its own bytes too.
+        bursts: on RS485, a receiver takes what was sent back to back when it has ended.
+        given: whether the file has a table for it; if not, it is of `type` because its device
+            is, and the device makes it.
+    """
+
+    name: str
+    type: WireType = WireType.SERIAL
+    bit_rate: int | None = None
+    framing: str = "8N1"
+    buffer_bytes: int | None = None
+    echo: bool = False
+    bursts: bool = False
+    given: bool = True
+
+    @property
+    def frame_bits(self) -> int:
+        """Bits of a byte on a line, its start bit among them; half a stop bit counts as one.
+
+        >>> WirePlan(name="line", framing="7E2").frame_bits
+        11
+        """
+        data, parity, stop = self.framing[0], self.framing[1], self.framing[2:]
+        return 1 + int(data) + (parity != "N") + (1 if stop == "1" else 2)
+
+
+class DeviceKind(Enum):
+    """What the type of a device names."""
+
+    SERIAL = "device type"
+    MODEL = "CANopen model"
+    EDS = "EDS or DCF file"
+    DEVICE_RTC = "DeviceRTC"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DevicePlan:
+    """One device.
+
+    Attributes:
+        name: what tests and its signals call it.
+        kind: what `type` names.
+        type: name of a device type (`DEVICES`) or of a model (`MODELS`), path of an EDS or DCF,
+            or `FILE.py:Class`.
+        wire: name of its wire, of `RigPlan.wires`.
+        config: of a device type, its options by name, as the file has them.
+        node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
+        profile: of a file: `choices.PROFILES`; None for `auto`.
+        store: file in which a CANopen node keeps what 1010h and LSS store.
+        start: inputs at the start by name, members of groups each for itself: a number, a text
+            or the table of a signal.
+    """
+
+    name: str
+    kind: DeviceKind
+    type: str
+    wire: str
+    config: Mapping[str, object] = field(default_factory=dict)
+    node_id: int | None = None
+    profile: str | None = None
+    store: Path | None = None
+    start: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultPlan:
+    """One fault.
+
+    Attributes:
+        owner: name of the device or wire that has it.
+        spec: which, how often, and when.
+    """
+
+    owner: str
+    spec: FaultSpec
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyPlan:
+    """What drives move.
+
+    Attributes:
+        kind: of `wheeled_body.SIDES`.
+        drives: for each wheel the name of its device.
+        mirrored: wheels whose drive is mounted the other way round.
+        parameters: the other arguments of `BodyParameters` that are given.
+    """
+
+    kind: str
+    drives: Mapping[str, str]
+    mirrored: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BusPlan:
+    """A bus of python-can.
+
+    Attributes:
+        interface: its driver.
+        channel: of the driver.
+        bit_rate: in bit/s, where the driver sets it.
+        options: more for the driver, by name.
+    """
+
+    interface: str
+    channel: str | None = None
+    bit_rate: int | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoorPlan:
+    """Where a host finds a wire in real time.
+
+    Attributes:
+        link: of a line, the symbolic link to make to its pty; None for the pty alone.
+        serve: of a line, the URLs at which it is served too: `rfc2217://`, `socket://`.
+        bus: of a CAN bus, the one outside that it is joined with.
+    """
+
+    link: Path | None = None
+    serve: tuple[str, ...] = ()
+    bus: BusPlan | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RealPlan:
+    """The bench in real time.
+
+    Attributes:
+        control: control socket to serve.
+        doors: by the name of the wire; one that is not there has a pty.
+    """
+
+    control: Path | None = None
+    doors: Mapping[str, DoorPlan] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PortPlan:
+    """Where a line of real hardware is.
+
+    Attributes:
+        port: device path, or URL of pyserial.
+        baud: in bit/s; None for that of the wire.
+    """
+
+    port: str
+    baud: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerPlan:
+    """Commands that switch a device; the operator does it where there is none.
+
+    Attributes:
+        on: command line that switches it on, word by word; no shell reads it.
+        off: command line that switches it off.
+    """
+
+    on: tuple[str, ...]
+    off: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """How exact an operator and a real device are.
+
+    Attributes:
+        stick_pct: how far a stick held by hand may be off.
+        time_us: how far a time may be off.
+        values: further ones by the name of a signal, in its unit.
+    """
+
+    stick_pct: float = STICK_PCT
+    time_us: int = LATE_MS * 1_000
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HardwarePlan:
+    """Where the real devices are.
+
+    Attributes:
+        control: control socket of an emulator that stands in for the operator, by the name of
+            the device; the operator of the others is at the terminal.
+        ports: of lines, by the name of the wire.
+        buses: of CAN buses, by the name of the wire.
+        power: how a device is switched, by its name.
+        tolerance: what is still right.
+    """
+
+    control: Mapping[str, Path] = field(default_factory=dict)
+    ports: Mapping[str, PortPlan] = field(default_factory=dict)
+    buses: Mapping[str, BusPlan] = field(default_factory=dict)
+    power: Mapping[str, PowerPlan] = field(default_factory=dict)
+    tolerance: Tolerances = field(default_factory=Tolerances)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigPlan:
+    """A whole rig file.
+
+    Attributes:
+        seed: of all chance.
+        wires: by name, those that the file leaves out too.
+        devices: by name, in the order of the file.
+        signals: by name, for formulas: a number or the table of a signal.
+        faults: in the order of the file.
+        body: what drives move, None if nothing.
+        real: the bench in real time.
+        hardware: the bench of real devices, None if the file tells none.
+        path: of the file, for messages and relative paths; None if there is none.
+    """
+
+    seed: int = 0
+    wires: Mapping[str, WirePlan] = field(default_factory=dict)
+    devices: Mapping[str, DevicePlan] = field(default_factory=dict)
+    signals: Mapping[str, object] = field(default_factory=dict)
+    faults: tuple[FaultPlan, ...] = ()
+    body: BodyPlan | None = None
+    real: RealPlan = field(default_factory=RealPlan)
+    hardware: HardwarePlan | None = None
+    path: Path | None = None
+
+    def devices_on(self, wire: str) -> tuple[DevicePlan, ...]:
+        """Return the devices on a wire, in the order of the file.
+
+        Args:
+            wire: its name.
+        """
+        return tuple(device for device in self.devices.values() if device.wire == wire)
