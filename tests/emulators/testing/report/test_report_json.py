@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.emulators.testing.report.bench_report import (
+    BenchReport,
+    JournalLine,
+    Outcome,
+    PlannedFault,
+    Requirement,
+    RunEnvironment,
+    SignalSeries,
+    TestRecord,
+    merge_reports,
+)
+from tickrig.emulators.testing.report.report_json import (
+    ReportError,
+    from_data,
+    from_json,
+    to_data,
+    to_json,
+)
+
+RUN = RunEnvironment("2026-11-22 14:00", "virtual", 7, "rig.toml", "[device.rrc]\n")
+TEST = TestRecord(
+    "tests/test_stop.py::test_it_stops[fast]",
+    Outcome.FAILED,
+    mode="virtual",
+    virtual_us=2_000_000,
+    wall_us=3_100,
+    requirements=("SAF-12",),
+    faults=(PlannedFault("cut", 1_000_000), PlannedFault("noise", when="3rd OK")),
+    journal=(JournalLine(10_000, "rrc", "<", "EV:Initialized"),),
+    series=(SignalSeries("v", "m/s", ((0, 0), (1, 0.5), (2, "x"), (3, None)), steps=False),),
+    artefacts=("stop.trace",),
+)
+REPORT = BenchReport("Night", (RUN,), (TEST,), (Requirement("SAF-12", "stops"),))
+
+
+def test_a_report_comes_back_from_its_json() -> None:
+    assert from_json(to_json(REPORT)) == REPORT
+
+
+def test_a_worker_hands_over_what_json_has() -> None:
+    data = to_data(TEST)
+    assert from_data(TestRecord, json.loads(json.dumps(data))) == TEST
+    assert from_data(TestRecord, data) == TEST
+
+
+def test_what_is_left_out_has_its_default() -> None:
+    text = '{"tickrig-report": 1, "runs": [{"date": ""}], "tests": [{"nodeid": "a", "outcome":'
+    assert from_json(f'{text} "blocked"}}]}}').tests == (TestRecord("a", Outcome.BLOCKED),)
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("{", "not JSON: Expecting property name"),
+        ("[" * 100_000, "not JSON: "),
+        ("[]", "no report: there is no key 'tickrig-report'"),
+        ('{"tickrig-report": 2}', "report version 2; this program reads 1"),
+        ('{"tickrig-report": 1, "pages": 1}', ": unknown key 'pages'"),
+        ('{"tickrig-report": 1, "tests": {}}', ".tests: {} is no list of values"),
+        ('{"tickrig-report": 1, "tests": [3]}', ".tests[0]: 3 is no object"),
+        ('{"tickrig-report": 1, "runs": [{}]}', ".runs[0]: no date"),
+        (
+            to_json(REPORT).replace('"failed"', '"lost"'),
+            ".tests[0].outcome: 'lost' is none of failed, error, blocked, passed, skipped",
+        ),
+        (
+            to_json(REPORT).replace("[10000,", "[true,"),
+            ".tests[0].journal[0][0]: True is not a whole number",
+        ),
+        (
+            to_json(REPORT).replace("[1,0.5]", "[1,{}]"),
+            ".tests[0].series[0].points[1][1]: {} is not a number or a text or null",
+        ),
+        (to_json(REPORT).replace("[0,0],", "[0,0,0],"), "points[0]: [0, 0, 0] is no list of 2"),
+        (to_json(REPORT).replace("[0,0],", "[9,0],"), "series[0]: v: 1 us comes after 9 us"),
+        (to_json(REPORT).replace('"run":0', '"run":1'), "test_it_stops[fast]: there is no run 1"),
+    ],
+)
+def test_what_is_no_report_says_where_and_why(text: str, error: str) -> None:
+    with pytest.raises(ReportError) as caught:
+        from_json(text)
+    assert error in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@given(st.data())
+def test_a_report_with_anything_in_it_is_read_or_refused(data: st.DataObject) -> None:
+    changed = json.loads(to_json(REPORT))
+    place = changed
+    while isinstance(place, dict | list) and place:
+        keys = list(place) if isinstance(place, dict) else range(len(place))
+        key = data.draw(st.sampled_from(list(keys)))
+        if not isinstance(place[key], dict | list) or data.draw(st.booleans()):
+            place[key] = data.draw(ANYTHING)
+            break
+        place = place[key]
+    try:
+        report = from_json(json.dumps(changed))
+    except ReportError:
+        return
+    assert from_json(to_json(report)) == report
+
+
+def test_a_value_that_is_no_number_is_unknown() -> None:
+    series = SignalSeries("v", points=((0, float("nan")), (1, float("inf")), (2, 1.5)))
+    assert series.points == ((0, None), (1, None), (2, 1.5))
+    assert "NaN" not in to_json(replace(REPORT, tests=(replace(TEST, series=(series,)),)))
+
+
+def test_reports_of_workers_become_one() -> None:
+    others = replace(TEST, nodeid="other"), replace(TEST, nodeid="real", run=1)
+    real = replace(RUN, mode="real")
+    second = BenchReport("Late", (RUN, real), others, (Requirement("SAF-13"),))
+    third = BenchReport(
+        "", (real,), (replace(TEST, nodeid="again"),), (Requirement("SAF-13", "x"),)
+    )
+    merged = merge_reports([REPORT, second, third])
+    assert merged.title == "Night"
+    assert merged.runs == (RUN, real)
+    assert [(test.nodeid, test.run) for test in merged.tests] == [
+        (TEST.nodeid, 0),
+        ("other", 0),
+        ("real", 1),
+        ("again", 1),
+    ]
+    assert merged.requirements == (Requirement("SAF-12", "stops"), Requirement("SAF-13", "x"))
+    assert merge_reports([]) == BenchReport()
+
+
+def test_an_environment_knows_its_machine() -> None:
+    here = RunEnvironment("today", seed=3).of_this_machine()
+    assert (here.date, here.seed) == ("today", 3)
+    assert all((here.tickrig, here.python, here.platform))
