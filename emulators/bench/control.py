@@ -8,9 +8,9 @@ from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
+from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import read_signal
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
 
 STATE: Final = "state"

@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.record.trace import Config, Header
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.scenario.scenario import Encoder, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.trace import Config, Header
 
 if TYPE_CHECKING:
     import click

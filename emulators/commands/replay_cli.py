@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tickrig.emulators.record.byte_text import escape
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
+from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import format_time
 
 if TYPE_CHECKING:

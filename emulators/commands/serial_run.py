@@ -16,13 +16,13 @@ from tickrig.emulators.bench.transcript import Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
-from tickrig.emulators.record.trace import Header
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.trace import Header
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from tickrig.device.physical import OutputSignal
 from tickrig.device.twin import NonCopyable, itself
-from tickrig.emulators.record.trace import RESET, Header, Mark, Record
 from tickrig.emulators.rig.emulated import Emulated, Inputs
 from tickrig.host.text.log import log_of
+from tickrig.host.text.trace import RESET, Header, Mark, Record
 from tickrig.host.text.values import Setting
 
 _logger = log_of(__name__)

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from tickrig.emulators.record.trace import (
+from tickrig.emulators.rig.emulated import Emulated
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.text.trace import (
     RESET,
     Header,
     Mark,
@@ -16,8 +18,6 @@ from tickrig.emulators.record.trace import (
     parse_header,
     parse_records,
 )
-from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.instant import NEVER
 
 

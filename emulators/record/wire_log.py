@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tickrig.emulators.record.trace import Mark
+from tickrig.host.text.trace import Mark
 from tickrig.wire.lines import LineSplitter
 
 

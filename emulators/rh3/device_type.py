@@ -9,13 +9,13 @@ from typing import Any, Final
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
-from tickrig.emulators.record.trace import Config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rh3.base_options import parameters_of, read_parameters
 from tickrig.emulators.rh3.frame_log import frame_splitter
 from tickrig.emulators.rh3.verbs import verbs
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
+from tickrig.host.text.trace import Config
 
 CYCLE: Final = b"01 17 "
 """What -v leaves out: the traffic of each period."""

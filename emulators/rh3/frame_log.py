@@ -2,8 +2,8 @@ r"""Cut what passes on the line into frames, shown in hex without their CRC: `01
 
 from __future__ import annotations
 
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter
+from tickrig.host.text.trace import Mark
 from tickrig.wire.errors import WireError
 from tickrig.wire.modbus.rtu import MAX_FRAME_BYTES, SHORTEST_SILENCE_US, parse_frame
 

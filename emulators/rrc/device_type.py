@@ -9,9 +9,9 @@ from typing import Any, Final
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
-from tickrig.emulators.record.trace import Config, Mark
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.text.trace import Config, Mark
 from tickrig.wire.rrc.check import check_digit
 
 EVENTS: Final = (b"EV:", b"ER:")

@@ -12,10 +12,10 @@ from textual.containers import Horizontal, Vertical
 from textual.widgets import Static
 
 from tickrig.emulators.bench.inbox import EmulatorEnded
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
 from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter

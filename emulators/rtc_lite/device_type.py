@@ -11,12 +11,12 @@ from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteComponent, LiteE
 from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
-from tickrig.emulators.record.trace import Config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS, verbs
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import refused_at
+from tickrig.host.text.trace import Config
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing

@@ -11,10 +11,10 @@ from typing import Final
 
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, GAP_US, SILENCE_US, LiteReceiver
-from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter
 from tickrig.host.links.link import Link
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
 from tickrig.wire.rtc_lite.decoder import LiteDecoder
 from tickrig.wire.rtc_lite.frame import Framing

@@ -11,10 +11,10 @@ from tickrig.device.chance import Chance, threshold_of
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.emulators.bench.names import known
-from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.rig.faults import FaultType
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
+from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import LiteCommand

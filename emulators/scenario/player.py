@@ -9,8 +9,6 @@ from typing import assert_never
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.bench.transcript import Transcript
-from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.scenario.scenario import (
     Clear,
@@ -22,6 +20,8 @@ from tickrig.emulators.scenario.scenario import (
     Set,
     Watch,
 )
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 
 

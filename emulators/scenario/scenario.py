@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
-from tickrig.emulators.record.byte_text import unescape
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.steps import Condition, Step, StepError, content_lines
 from tickrig.host.text.values import Setting, parse_setting, parse_time_us
 

@@ -7,8 +7,8 @@ from typing import Generic
 
 from tickrig.device.core import W
 from tickrig.device.twin import itself
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.port import ByteEnd, Port
+from tickrig.host.text.trace import Mark
 
 
 class Bridge:

@@ -8,7 +8,6 @@ from typing import Protocol
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter, WireLog
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import Emulated
@@ -18,6 +17,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
 

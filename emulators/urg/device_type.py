@@ -16,12 +16,12 @@ from tickrig.emulators.commands.device_type import (
     by_miniterm,
     check_config,
 )
-from tickrig.emulators.record.trace import Config, Mark
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.cli import USB_BAUD
 from tickrig.host.cli.refused import refused_at
+from tickrig.host.text.trace import Config, Mark
 
 USUAL_BAUD: Final = 115_200
 """What a host sets, which means nothing on USB."""

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.record.replay import Difference, Recording, read_recording, replay
-from tickrig.emulators.record.trace import Header, Mark, Record, TraceError, parse_record
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.host.text.trace import Header, Mark, Record, TraceError, parse_record
 
 HEADER = '# tickrig-trace v1 lamp {"seed": 0}\n'
 HEARD = r"""0.001000 < hi\n

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import WireLog
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.text.trace import Mark
 
 
 def test_a_line_is_heard_when_its_last_byte_has_arrived() -> None:

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 import serial
 
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.serial.bridge import Bridge, Tap
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
 pytestmark = pytest.mark.realtime

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from tickrig.emulators.record.byte_text import escape, unescape
+from tickrig.host.text.byte_text import escape, unescape
 from tickrig.host.text.values import Setting, format_time, parse_setting
 
 VERSION: Final = 1
