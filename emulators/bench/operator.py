@@ -127,10 +127,15 @@ class Operator(Copyable):
         """Press a button and let it go after `duration_us`; ValueError if it is none."""
         self.check_press(name, duration_us)
         self._put(name, 1)
-        seen_us = -(-now_us // self._tick_us) * self._tick_us
+        tick_us = self._tick_us_of(name)
+        seen_us = -(-now_us // tick_us) * tick_us
         self._event_queue.put(
             ("release", name), seen_us + duration_us, partial(_at, partial(self._put, name, 0))
         )
+
+    def _tick_us_of(self, name: str) -> int:
+        """Return the control period of the device that an input belongs to."""
+        return self._tick_us
 
     def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
         """Raise ValueError unless `press` can be done."""

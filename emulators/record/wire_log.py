@@ -19,12 +19,14 @@ class WireLine:
         at_us: when its last byte was heard.
         mark: which way it went.
         data: the line without its line end.
+        source: the wire or device, where there are several.
     """
 
     number: int
     at_us: int
     mark: Mark
     data: bytes
+    source: str = ""
 
 
 Splitter = Callable[[int, bytes], list[bytes]]
@@ -58,11 +60,15 @@ class WireLog:
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
         for line in self._splitters[mark](at_us, data):
-            self._count += 1
-            whole = WireLine(self._count, at_us, mark, line)
-            self._lines.append(whole)
-            for listener in self.listeners:
-                listener(whole)
+            self.add(at_us, mark, line)
+
+    def add(self, at_us: int, mark: Mark, line: bytes, source: str = "") -> None:
+        """Take a whole line."""
+        self._count += 1
+        whole = WireLine(self._count, at_us, mark, line, source)
+        self._lines.append(whole)
+        for listener in self.listeners:
+            listener(whole)
 
     def since(self, number: int) -> tuple[WireLine, ...]:
         """Return the kept lines that came after the one of this number."""

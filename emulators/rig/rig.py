@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Final, Generic, Protocol, TypeVar, overload
 
 from tickrig.device.core import Device, W
-from tickrig.device.twin import Copyable, twin
+from tickrig.device.twin import Copyable, Listeners, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -103,6 +103,7 @@ class Rig(Copyable):
         now_us: time since the start of the rig.
         worst_late_us: by how much the worst step was late.
         late_ticks: how many steps began more than `LATE_US` late.
+        watchers: called with the time after each step, in the order of entering.
     """
 
     def __init__(
@@ -117,6 +118,7 @@ class Rig(Copyable):
         self.now_us = self.worst_late_us = self.late_ticks = 0
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
+        self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
         self._jumps = not dense and isinstance(self._clock, VirtualClock)
@@ -304,6 +306,9 @@ class Rig(Copyable):
             self._act(next_us)
         else:
             self._run(next_us)
+        if self.watchers:
+            for watch in tuple(self.watchers):
+                watch(self.now_us)
 
     def _act(self, now_us: int) -> None:
         """Do what is due at `now_us`, before the tick of that time."""

@@ -1,0 +1,138 @@
+"""The bench: devices, the hands at them, and time that passes in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
+from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
+from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
+from tickrig.emulators.testing.bench.journal import text_of
+from tickrig.emulators.testing.bench.mode import BenchMode
+from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
+
+
+class Bench(BenchDevice):
+    """Devices on a bench, for a test: in virtual time, in real time, or real ones.
+
+    Time passes in one place: links, serial objects, buses, networks, `run_for` and `wait_until`
+    all step the same rig, and none steps past a button that is to be let go or a fault that is
+    to come.
+
+    Args:
+        device: the only device: itself, or its type by name.
+        seed: of all chance.
+        line: what the serial lines are like, if the type of the device does not say it.
+        devices: several, by name; CANopen slaves share a bus.
+
+    Raises:
+        ValueError: no device, or a name that is no device.
+
+    >>> from tickrig.device.rrc.machine import Rrc
+    >>> with Bench(Rrc(), seed=1) as bench:
+    ...     bench.run_for("1s")
+    ...     bench.press("power_button", for_="100ms")
+    ...     bench.wait_until(lambda: bench.get("state") == "Standby", within="2s")
+    True
+    """
+
+    def __init__(
+        self,
+        device: BenchedDevice | None = None,
+        /,
+        *,
+        seed: int = 0,
+        line: LineSettings | None = None,
+        **devices: BenchedDevice,
+    ) -> None:
+        named = {**({} if device is None else {name_of(device): device}), **devices}
+        if not named:
+            raise ValueError("a bench has at least one device")
+        rig = BenchRig("bench", RigState(mounts_of(named, seed, line)))
+        self._start(VirtualMode(rig))
+
+    def _start(self, mode: BenchMode) -> None:
+        super().__init__(mode)
+        self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
+
+    @classmethod
+    def of_mode(cls, mode: BenchMode) -> Self:
+        """Return the bench of a mode."""
+        bench = cls.__new__(cls)
+        bench._start(mode)
+        return bench
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def __getitem__(self, name: str) -> BenchDevice:
+        """Return a device; KeyError if there is none of this name."""
+        if name not in self._devices:
+            raise KeyError(f"no device {name!r}; known: {', '.join(self._devices)}")
+        return self._devices[name]
+
+    @property
+    def mode(self) -> str:
+        """`virtual`, `real` or `hardware`."""
+        return self._mode.name
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        return tuple(self._devices)
+
+    @property
+    def now_us(self) -> int:
+        """The time since the bench was opened."""
+        return self._mode.now_us
+
+    def run_for(self, duration: Duration) -> None:
+        """Let time pass.
+
+        Args:
+            duration: microseconds, or a text as `"100ms"`.
+        """
+        self._mode.run_for(us_of(duration))
+
+    def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
+        """Let time pass until something is so.
+
+        Args:
+            done: says whether it is; it only looks.
+            within: for how long at most.
+
+        Returns:
+            False if the time was over first.
+        """
+        return self._mode.wait_until(done, us_of(within))
+
+    def transcript(self) -> str:
+        """Return the latest lines and frames, and what was done: time, where, direction, text."""
+        return text_of(self._mode.journal())
+
+    def fork(self) -> Bench:
+        """Return a twin of the bench that goes on from here by itself, in virtual time.
+
+        It has the devices, wires, faults and pending events, but no hosts and no triggers.
+
+        Raises:
+            NotOnThisBench: not in virtual time.
+        """
+        return Bench.of_mode(self._mode.fork())
+
+    def close(self) -> None:
+        """Give everything back."""
+        self._mode.close()

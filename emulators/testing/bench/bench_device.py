@@ -1,0 +1,197 @@
+"""What a test does to one device of a bench, and where its host connects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.mode import BenchMode
+from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger, when
+from tickrig.host.text.values import Setting, parse_time_us
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+Duration = int | str
+"""Microseconds, or a text as `"100ms"`."""
+
+PRESS: Final = "100ms"
+
+
+def us_of(duration: Duration) -> int:
+    """Return a duration in microseconds; ValueError if it is none.
+
+    >>> us_of("1.5s"), us_of(250)
+    (1500000, 250)
+    """
+    duration_us = parse_time_us(duration) if isinstance(duration, str) else duration
+    if duration_us < 0:
+        raise ValueError(f"a duration is not negative, got {duration_us} us")
+    return duration_us
+
+
+class BenchDevice:
+    """A device of a bench: hands at it, eyes on it, and the doors for its host.
+
+    Inputs, outputs, buttons and faults have the names that `tickrig ctl SOCKET describe` shows.
+
+    Args:
+        mode: of the bench.
+        name: of the device; empty for all of them, whose signals are `NAME/signal` then.
+
+    Attributes:
+        name: of the device.
+    """
+
+    def __init__(self, mode: BenchMode, name: str = "") -> None:
+        self._mode, self.name = mode, name
+
+    def set(self, name: str, *values: Setting) -> None:
+        """Set an input, or all inputs of a group.
+
+        Args:
+            name: of the input or group, as `stick`.
+            values: one, or one for each input of the group.
+
+        Raises:
+            ValueError: there is none, or it does not take the values.
+            NotOnThisBench: nobody can do that here.
+        """
+        self._mode.request("set", name=self._full(name), value=list(values))
+
+    def get(self, name: str) -> Setting:
+        """Return the present value of an input or output.
+
+        Args:
+            name: of the input or output, as `state`.
+
+        Raises:
+            ValueError: there is none.
+        """
+        full = self._full(name)
+        values = self._mode.request("get", names=[full])["values"]
+        assert isinstance(values, dict)
+        value: Setting = values[full]
+        return value
+
+    def press(self, name: str, for_: Duration = PRESS) -> None:
+        """Press a button and let it go after a time, whoever makes time pass meanwhile.
+
+        Args:
+            name: of the button.
+            for_: how long it stays pressed, from the tick that sees it.
+        """
+        self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
+
+    def fault(
+        self, spec: str, *, when: Condition | None = None, for_: Duration | None = None
+    ) -> None:
+        """Let a fault come: now, at a time, or as soon as something is so.
+
+        Args:
+            spec: as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of its wire.
+            when: waits for this, such as `on_line("OK:output", nth=3)`; no time in `spec` then.
+            for_: how long it stays, from the moment at which it begins; for ever unless given.
+
+        Raises:
+            ValueError: there is no such fault, or it cannot be like this.
+            NotOnThisBench: it cannot be made here.
+        """
+        wanted = parse_fault_spec(spec)
+        wanted = FaultSpec(self._fault(wanted.name), wanted.rate, wanted.from_us, wanted.to_us)
+        self._mode.act(lambda rig: _arm(rig, wanted, when, None if for_ is None else us_of(for_)))
+
+    def clear(self, name: str) -> None:
+        """Let a fault go, and its future too.
+
+        Args:
+            name: of the fault.
+
+        Raises:
+            ValueError: there is none.
+        """
+        self._mode.request("clear", name=self._fault(name))
+
+    def on_line(self, pattern: str, nth: int = 1) -> LineTrigger:
+        """Return what is true as soon as a line, or a frame in candump's notation, has passed.
+
+        Args:
+            pattern: the whole line without its end, as `OK:output` or `701#05`; `*` stands for
+                anything.
+            nth: the how manieth from now on, from 1.
+        """
+        source = self._mode.wire_of(self.name) if self.name else ""
+        trigger = LineTrigger(pattern, nth, source)
+        self._mode.act(lambda rig: rig.journal.listeners.append(trigger.hear))
+        return trigger
+
+    @property
+    def link(self) -> Link[Any]:
+        """A new link for a client: bytes on a serial line, frames on a CAN bus."""
+        return self._mode.link(self._wire())
+
+    def serial(self, **options: Any) -> serial.SerialBase:
+        """Open the serial line as a pyserial object.
+
+        Args:
+            options: as `serial.Serial` takes them; `timeout` passes in the time of the bench.
+        """
+        return self._mode.serial(self._wire(), options)
+
+    def can_bus(self, **options: Any) -> can.BusABC:
+        """Open the CAN bus as a python-can bus.
+
+        Args:
+            options: as `can.Bus` takes them.
+        """
+        return self._mode.can_bus(self._wire(), options)
+
+    def canopen_network(self) -> canopen.Network:
+        """Connect the canopen library to the CAN bus, as a master."""
+        return self._mode.canopen_network(self._wire())
+
+    def _wire(self) -> str:
+        """Return the wire of this device, or the only one there is."""
+        if self.name:
+            return self._mode.wire_of(self.name)
+        wires = {self._mode.wire_of(name) for name in self._mode.devices}
+        if len(wires) > 1:
+            known = ", ".join(self._mode.devices)
+            raise ValueError(f"this bench has several wires: take that of a device; known: {known}")
+        return wires.pop()
+
+    def _full(self, name: str) -> str:
+        alone = not self.name or len(self._mode.devices) == 1
+        return name if alone else f"{self.name}/{name}"
+
+    def _fault(self, name: str) -> str:
+        """Return the full name of a fault of this device, or of its wire."""
+        return self._full(name) if self.name == "" else self._mode.act(self._fault_of(name))
+
+    def _fault_of(self, name: str) -> Any:
+        def find(rig: BenchRig) -> str:
+            known = rig.operator.faults
+            named = (self._full(name), f"{self._mode.wire_of(self.name)}/{name}", name)
+            return next((full for full in named if full in known), named[0])
+
+        return find
+
+
+def _arm(rig: BenchRig, spec: FaultSpec, condition: Condition | None, for_us: int | None) -> None:
+    """Let a fault come, or note that it shall."""
+
+    def begin() -> None:
+        now_us = rig.effective_us
+        end_us = spec.to_us if for_us is None else max(now_us, spec.from_us) + for_us
+        rig.operator.fault(now_us, FaultSpec(spec.name, spec.rate, spec.from_us, end_us))
+
+    rig.operator.check_fault(spec)
+    if condition is None:
+        begin()
+    else:
+        when(rig, condition, begin)

@@ -1,0 +1,124 @@
+"""All devices of a bench on one rig, with the hands at them and a journal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tickrig.device.twin import Copyable
+from tickrig.emulators.bench.operator import Operator
+from tickrig.emulators.bench.running_emulator import RunningEmulator
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.coupling import Coupling
+from tickrig.emulators.rig.rig import OutsideBridge, Rig
+from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
+from tickrig.emulators.testing.bench.journal import Journal
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.wire.instant import NEVER
+
+
+class BenchOperator(Operator):
+    """The hands at several devices."""
+
+    _assembly: Assembly
+
+    @classmethod
+    def at(cls, assembly: Assembly, rig: Rig, faults: AssemblyFaults) -> BenchOperator:
+        """Return the hands at the devices of a rig."""
+        hands = cls(assembly.inputs, assembly.tick_us, rig.event_queue, faults)
+        hands._assembly = assembly
+        return hands
+
+    def _tick_us_of(self, name: str) -> int:
+        return self._assembly.tick_us_of(name)
+
+
+class RigState(Copyable):
+    """What a bench consists of in virtual and in real time, and what its twin has too.
+
+    Args:
+        mounts: the devices on their wires.
+        couplings: what joins them beside their wires.
+        bridges: joints with the outside world.
+        clock: a `VirtualClock` unless given.
+    """
+
+    def __init__(
+        self,
+        mounts: Sequence[Mount],
+        couplings: Sequence[Coupling] = (),
+        bridges: Sequence[OutsideBridge] = (),
+        clock: Clock | None = None,
+    ) -> None:
+        self.mounts = {mount.name: mount for mount in mounts}
+        stations = [station for mount in mounts for station in mount.stations]
+        self.rig = Rig(*stations, bridges=bridges, couplings=couplings, clock=clock)
+        for mount in mounts:
+            if isinstance(mount, BusMount):
+                self.rig.move_on(mount.wire)
+        self.assembly = Assembly({k: v for mount in mounts for k, v in mount.parts.items()})
+        self.faults = AssemblyFaults({mount.name: mount.faults for mount in mounts})
+        self.operator = BenchOperator.at(self.assembly, self.rig, self.faults)
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on; ValueError if there is none."""
+        for mount in self.mounts.values():
+            if device in mount.parts:
+                return mount.name
+        raise ValueError(f"no device {device!r}; known: {', '.join(self.assembly.parts)}")
+
+
+class BenchRig(RunningEmulator):
+    """A rig with all devices of a bench; `EmulatorControl` answers requests about it.
+
+    Args:
+        name: of the bench.
+        state: what it consists of.
+        link: where hosts find it, for people.
+
+    Attributes:
+        state: what it consists of.
+        journal: what happens.
+    """
+
+    def __init__(self, name: str, state: RigState, link: str = "") -> None:
+        super().__init__(name, state.assembly, state.faults, link, None)
+        self.state, self.rig, self.operator = state, state.rig, state.operator
+        self.event_queue = state.rig.event_queue
+        self.log = self.journal = Journal()
+        self.operator.note = self._note
+        for mount in state.mounts.values():
+            if isinstance(mount, LineMount):
+                hear = self.journal.of_line(mount.name, mount.settings.splitter)
+                mount.tap.listeners.append(hear)
+            else:
+                mount.wire.observers.append(self.journal.of_bus(mount.name))
+
+    def _note(self, text: str) -> None:
+        """Note what was done; the signals and faults of what is alone have no prefix."""
+        source, slash, what = text.partition("/")
+        if not slash:
+            name = text.partition("=")[0]
+            places = (
+                self.state.mounts if name in self.wire.fault_types else self.state.assembly.parts
+            )
+            source, what = next(iter(places)), text
+        self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
+
+    @property
+    def _host_due_us(self) -> int:
+        return NEVER
+
+    def _listen(self, now_us: int) -> None:
+        """Hosts of a bench look for themselves."""
+
+    def send(self, now_us: int, data: bytes) -> None:
+        """Put bytes on the line of the only serial device, as the host would."""
+        lines = [mount for mount in self.state.mounts.values() if isinstance(mount, LineMount)]
+        (mount,) = lines
+        mount.line.b.send(now_us, data)
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """What found a buffer full, by wire."""
+        return {f"lost_{name}": mount.lost for name, mount in self.state.mounts.items()}

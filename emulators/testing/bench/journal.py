@@ -1,0 +1,49 @@
+"""What happened on a bench: lines and frames of all wires, and what was done to the devices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from tickrig.emulators.record.byte_text import escape
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
+from tickrig.host.text.values import format_time
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+KEPT: Final = 10_000
+"""So many lines are kept; of those before it is known that there were some."""
+
+
+class Journal(WireLog):
+    """The latest lines and frames of all wires, and what was done, in the order of happening.
+
+    A line counts as passed when the device takes its end, or sends it.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(KEPT)
+
+    def of_line(
+        self, source: str, splitter: Callable[[Mark], Splitter] | None
+    ) -> Callable[[int, Mark, bytes], None]:
+        """Return what takes the bytes of a serial line, cut anywhere."""
+        log = WireLog(0) if splitter is None else WireLog(0, splitter)
+        log.listeners.append(lambda line: self.add(line.at_us, line.mark, line.data, source))
+        return log.hear
+
+    def of_bus(self, source: str) -> Callable[[int, CanFrame | ErrorFrame], None]:
+        """Return an observer of a CAN bus."""
+        return lambda at_us, frame: self.add(at_us, Mark.FROM_DEVICE, str(frame).encode(), source)
+
+    def lines(self) -> tuple[WireLine, ...]:
+        """Return what is kept."""
+        return self.since(0)
+
+
+def text_of(lines: Iterable[WireLine]) -> str:
+    """Write lines for people: time in seconds, which wire or device, direction, text."""
+    return "\n".join(
+        f"{format_time(line.at_us)} {line.source} {line.mark} {escape(line.data)}" for line in lines
+    )

@@ -1,0 +1,91 @@
+"""What virtual time, real time and real hardware have in common for a test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.host.control.requests import Object
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+T = TypeVar("T")
+
+
+class BenchMode(Protocol):
+    """Where the devices are, and how time passes.
+
+    What a mode cannot do raises `NotOnThisBench`.
+    """
+
+    @property
+    def name(self) -> str:
+        """`virtual`, `real` or `hardware`."""
+        ...
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        ...
+
+    @property
+    def now_us(self) -> int:
+        """The time since the bench was opened."""
+        ...
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on."""
+        ...
+
+    def request(self, do: str, **fields: object) -> Object:
+        """Ask as the control socket is asked; ValueError if it is refused."""
+        ...
+
+    def act(self, action: Callable[[BenchRig], T]) -> T:
+        """Do something to the rig between two ticks."""
+        ...
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time."""
+        ...
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        ...
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        ...
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        ...
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        ...
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return the latest lines and frames, and what was done."""
+        ...
+
+    def too_slow(self) -> str:
+        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+        ...
+
+    def fork(self) -> BenchMode:
+        """Return a twin that goes on by itself from here."""
+        ...
+
+    def close(self) -> None:
+        """Give everything back."""

@@ -1,0 +1,181 @@
+"""Devices on their wires, as a rig has them: those on a serial line, and nodes on a CAN bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, Generic
+from zlib import crc32
+
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.core import W
+from tickrig.device.twin import Copyable, Listeners
+from tickrig.emulators.bench.operator import WireFaults
+from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.record.trace import Mark
+from tickrig.emulators.rig.emulated import Emulated, HasSignals
+from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.port import ByteLine, Port
+from tickrig.emulators.rig.rig import Station
+from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.wire.can import Frames
+
+BIT_RATE: Final = 1_000_000
+
+
+class DeviceTap(Copyable, Generic[W]):
+    """A device's end of a wire, with listeners.
+
+    Args:
+        port: the end.
+
+    Attributes:
+        listeners: called with the time, the direction and the traffic.
+    """
+
+    def __init__(self, port: Port[W]) -> None:
+        self._port = port
+        self.listeners: Listeners[Callable[[int, Mark, W], None]] = Listeners()
+
+    @property
+    def due_us(self) -> int:
+        """When the next traffic will have arrived."""
+        return self._port.due_us
+
+    def poll(self, now_us: int, /) -> W:
+        """Take what the host sent."""
+        if traffic := self._port.poll(now_us):
+            self._hear(now_us, Mark.TO_DEVICE, traffic)
+        return traffic
+
+    def send(self, now_us: int, traffic: W, /) -> None:
+        """Send what the device says."""
+        if traffic:
+            self._hear(now_us, Mark.FROM_DEVICE, traffic)
+        self._port.send(now_us, traffic)
+
+    def _hear(self, now_us: int, mark: Mark, traffic: W) -> None:
+        for hear in self.listeners:
+            hear(now_us, mark, traffic)
+
+
+class LineMount(Copyable):
+    """Devices on a serial line; several share one only on RS485.
+
+    Args:
+        name: of the line.
+        settings: what the line is like.
+        line: the line, if it is not to be made by `settings`; its ends are of the devices, but
+            for `line.b`, which is the host's.
+
+    Attributes:
+        line: the line.
+        devices: by name.
+        tap: what passes the first device's end, faults of the line included.
+    """
+
+    def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:
+        self.name, self.settings = name, settings
+        self.line = line or settings.wire(settings.baud)
+        self._free = [self.line.a, *getattr(self.line, "ends", ())[2:]]
+        self.tap = DeviceTap(self._free[0])
+        self.devices: dict[str, Emulated[bytes]] = {}
+        self.stations: list[Station[bytes]] = []
+        self._ports: list[FaultyPort[bytes]] = []
+
+    def add(self, name: str, device: Emulated[bytes], seed: int = 0) -> None:
+        """Put a device on the line.
+
+        Args:
+            name: of the device.
+            device: the device.
+            seed: of the chance in the faults of its end.
+
+        Raises:
+            ValueError: the line has no end for it.
+        """
+        if not self._free:
+            raise ValueError(f"{self.name} has no end for {name}: it is for {len(self.devices)}")
+        end = self._free.pop(0)
+        port = FaultyPort(end if self.devices else self.tap, self.settings.faults, seed)
+        self.devices[name] = device
+        self.stations.append(Station(device, port))
+        self._ports.append(port)
+
+    @property
+    def faults(self) -> WireFaults:
+        """Where faults are armed: those of the first device's end."""
+        return self._ports[0]
+
+    @property
+    def parts(self) -> Mapping[str, HasSignals]:
+        """The physical side of each device."""
+        return self.devices
+
+    @property
+    def lost(self) -> int:
+        """Bytes that found a buffer full."""
+        return self.line.a.lost + self.line.b.lost
+
+
+class BusMount(Copyable):
+    """Nodes on a CAN bus.
+
+    One more end of the bus acknowledges what is sent, so that a node is never alone,
+    whether a host is there or not.
+
+    Args:
+        name: of the bus.
+        bit_rate: in bit/s.
+        seed: of the chance in its faults.
+
+    Attributes:
+        wire: the bus.
+        nodes: by name.
+    """
+
+    def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
+        self.name, self.wire = name, CanWire(bit_rate, seed)
+        self.nodes: dict[str, Node] = {}
+        self.open_end(frozenset())
+
+    def add(self, name: str, slave: CanopenSlave) -> Node:
+        """Put a slave on the bus."""
+        node = self.nodes[name] = Node(name, slave, self.wire)
+        return node
+
+    def open_end(self, accepts: frozenset[int] | None = None) -> CanEnd:
+        """Connect an end for a host; it comes back from bus-off at once."""
+        end = self.wire.end(accepts)
+        end.auto_recovery = True
+        return end
+
+    @property
+    def faults(self) -> WireFaults:
+        """Where faults of the bus are armed."""
+        return self.wire.faults
+
+    @property
+    def parts(self) -> Mapping[str, HasSignals]:
+        """The physical side of each node."""
+        return {name: Nodes([node]) for name, node in self.nodes.items()}
+
+    @property
+    def stations(self) -> Sequence[Station[Frames]]:
+        """The nodes on the bus."""
+        return [Station(node, node.port) for node in self.nodes.values()]
+
+    @property
+    def lost(self) -> int:
+        """Frames that found a queue full."""
+        return sum(node.port.lost for node in self.nodes.values())
+
+
+Mount = LineMount | BusMount
+
+
+def seed_of(seed: int, name: str, *, alone: bool) -> int:
+    """Return the seed of a wire: chance on one wire has nothing to do with that on another."""
+    return seed if alone else seed ^ crc32(name.encode())

@@ -1,0 +1,59 @@
+"""What something may wait for: a line or frame that passes, or any question about the bench."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.emulators.record.byte_text import escape
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+
+Condition = Callable[[], bool]
+"""Says whether something is so; it only looks."""
+
+ANY: Final = ""
+
+
+class LineTrigger:
+    """True from the moment at which a line or frame has passed so often.
+
+    Args:
+        pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
+        nth: the how manieth from now on, from 1.
+        source: the wire or device; any if empty.
+
+    Attributes:
+        count: how many have passed.
+
+    Raises:
+        ValueError: `nth` is less than 1.
+    """
+
+    def __init__(self, pattern: str, nth: int = 1, source: str = ANY) -> None:
+        if nth < 1:
+            raise ValueError(f"nth counts from 1, got {nth}")
+        self._pattern = re.compile(".*".join(map(re.escape, pattern.split("*"))), re.DOTALL)
+        self._nth, self._source, self.count = nth, source, 0
+
+    def __call__(self) -> bool:
+        """Say whether it has passed so often."""
+        return self.count >= self._nth
+
+    def hear(self, line: WireLine) -> None:
+        """Take a line of the journal."""
+        if self._source in (ANY, line.source) and line.mark in "<>":
+            self.count += self._pattern.fullmatch(escape(line.data)) is not None
+
+
+def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
+    """Act once, between two ticks, as soon as something is so: now, or after a later step."""
+
+    def watch(now_us: int) -> None:
+        if condition():
+            rig.rig.watchers.remove(watch)
+            act()
+
+    rig.rig.watchers.append(watch)
+    watch(rig.rig.now_us)

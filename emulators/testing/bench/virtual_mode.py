@@ -1,0 +1,127 @@
+"""A bench in virtual time: waiting is free, and nothing passes unless somebody waits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tickrig.device.twin import twin
+from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
+from tickrig.host.control.requests import VERSION, Object
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+T = TypeVar("T")
+
+
+class VirtualMode:
+    """A `BenchMode` whose time is that of its rig, stepped by whoever waits.
+
+    Args:
+        rig: the rig.
+    """
+
+    name = "virtual"
+
+    def __init__(self, rig: BenchRig) -> None:
+        self._rig, self._control = rig, EmulatorControl(rig)
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        return tuple(self._rig.state.assembly.parts)
+
+    @property
+    def now_us(self) -> int:
+        """The rig's time."""
+        return self._rig.rig.now_us
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on."""
+        return self._rig.state.wire_of(device)
+
+    def request(self, do: str, **fields: object) -> Object:
+        """Ask as the control socket is asked; ValueError if it is refused."""
+        return answer_of(self._control.answer({"v": VERSION, "do": do, **fields}))
+
+    def act(self, action: Callable[[BenchRig], T]) -> T:
+        """Do something to the rig between two ticks."""
+        return action(self._rig)
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+        self._rig.rig.run_for(duration_us)
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time."""
+        return self._rig.rig.run_until(done, within_us)
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        mount = self._rig.state.mounts[wire]
+        if isinstance(mount, BusMount):
+            return CanHost(self._rig.rig, mount.open_end())
+        return SimLink(self._rig.rig, mount.line.b)
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        raise NotImplementedError
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        from tickrig.emulators.can.outside.interface import (  # noqa: PLC0415 - python-can is slow
+            CHANNELS,
+            TickrigBus,
+        )
+
+        name = f"bench-{id(self._rig)}-{wire}"
+        with CHANNELS.offer(name, self._rig.rig, bus_of(self._rig, wire).wire):
+            return TickrigBus(name, **options)
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        from tickrig.emulators.can.outside.sim_network import (  # noqa: PLC0415 - canopen is slow
+            SimNetwork,
+        )
+
+        return SimNetwork(self._rig.rig, bus_of(self._rig, wire).open_end())
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return the latest lines and frames, and what was done."""
+        return self._rig.journal.lines()
+
+    def too_slow(self) -> str:
+        """Say nothing: virtual time is always kept."""
+        return ""
+
+    def fork(self) -> VirtualMode:
+        """Return a twin that goes on by itself from here; it has no hosts, no triggers."""
+        return VirtualMode(BenchRig(self._rig.name, twin(self._rig.state)))
+
+    def close(self) -> None:
+        """Give everything back."""
+
+
+def answer_of(answer: Object) -> Object:
+    """Return an answer; ValueError with its text if it is a refusal."""
+    if not answer["ok"]:
+        raise ValueError(str(answer["error"]))
+    return answer
+
+
+def bus_of(rig: BenchRig, wire: str) -> BusMount:
+    """Return a CAN bus; ValueError if it is a serial line."""
+    mount = rig.state.mounts[wire]
+    if isinstance(mount, LineMount):
+        raise ValueError(f"{wire} is a serial line, not a CAN bus")
+    return mount

@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import pytest
+
+from tickrig import Bench
+from tickrig.device import Rrc, make_epos, make_f_palette
+from tickrig.host import RrcClient
+
+
+def test_a_host_and_hands_share_one_time() -> None:
+    with Bench(Rrc(), seed=1) as bench, RrcClient(bench.link) as client:
+        client.start()
+        bench.press("power_button")
+        assert bench.wait_until(lambda: bench.get("state") == "Standby", within="2s")
+        client.output(30, 0, confirm=True)
+        assert (bench.get("out_v_pct"), bench.now_us) == (30, client.now_us)
+
+
+def test_waiting_in_vain_takes_exactly_the_time() -> None:
+    with Bench(Rrc()) as bench:
+        assert not bench.wait_until(lambda: False, within="123ms")
+        assert bench.now_us == 123_000
+
+
+def test_a_button_is_let_go_whoever_makes_time_pass() -> None:
+    with Bench(Rrc()) as bench:
+        bench.run_for("1s")
+        bench.press("power_button", for_="50ms")
+        link = bench.link
+        while link.receive(100_000):
+            pass
+        assert bench.get("power_button") == 0
+        assert "1.060000 rrc ! power_button=0" in bench.transcript()
+
+
+def test_a_group_is_set_at_once() -> None:
+    with Bench(Rrc()) as bench:
+        bench.set("stick", 100, -20)
+        assert (bench.get("stick_v_pct"), bench.get("stick_w_pct")) == (100, -20)
+
+
+@pytest.mark.parametrize(
+    ("act", "text"),
+    [
+        (lambda bench: bench.set("stik", 1), "no input 'stik'; known: .*stick"),
+        (lambda bench: bench.get("nothing"), "no input or output .*nothing.*; known: .*state"),
+        (lambda bench: bench.press("state"), "no button 'state'; known: .*power_button"),
+        (lambda bench: bench.fault("smoke"), "no fault 'smoke'; known: .*cut"),
+        (lambda bench: bench.run_for("soon"), "'soon' is not a time"),
+        (lambda bench: bench.run_for(-1), "a duration is not negative, got -1 us"),
+        (lambda bench: bench.on_line("OK", nth=0), "nth counts from 1, got 0"),
+        (lambda bench: bench.can_bus(), "rrc is a serial line, not a CAN bus"),
+    ],
+)
+def test_what_cannot_be_is_told(act, text: str) -> None:  # type: ignore[no-untyped-def]
+    with Bench(Rrc()) as bench, pytest.raises(ValueError, match=text):
+        act(bench)
+
+
+def test_a_fault_comes_with_a_line() -> None:
+    with Bench(Rrc()) as bench, RrcClient(bench.link) as client:
+        client.start()
+        bench.press("power_button")
+        bench.wait_until(lambda: bench.get("state") == "Standby", within="2s")
+        bench.fault("bus_unplugged", when=bench.on_line("OK:output", nth=2), for_="5ms")
+        client.output(30, 0, confirm=True)
+        assert bench.get("bus_unplugged") == 0
+        client.output(30, 0, confirm=True)
+        assert bench.get("bus_unplugged") == 1
+        bench.run_for("20ms")
+        assert bench.get("bus_unplugged") == 0
+
+
+def test_a_fault_comes_with_a_state() -> None:
+    with Bench(Rrc()) as bench:
+        bench.fault("vr2_fault", when=lambda: bench.get("state") == "Standby")
+        bench.run_for("1s")
+        bench.press("power_button")
+        assert bench.wait_until(lambda: bench.get("vr2_fault") == 1, within="2s")
+        assert bench.get("state") == "Standby"
+
+
+def test_a_fault_of_the_line_is_on_the_line() -> None:
+    with Bench(Rrc()) as bench:
+        bench.fault("cut@0s-2s")
+        link = bench.link
+        assert link.receive(1_000_000) == b""
+        bench.run_for("1s")
+        link.send(b"hello\n")
+        assert link.receive(100_000).startswith(b"ER:")
+
+
+def test_a_twin_goes_on_by_itself() -> None:
+    with Bench(Rrc()) as bench:
+        bench.run_for("1s")
+        bench.press("power_button", for_="500ms")
+        twin = bench.fork()
+        twin.run_for("1s")
+        assert (twin.get("power_button"), twin.now_us) == (0, 2_000_000)
+        assert (bench.get("power_button"), bench.now_us) == (1, 1_000_000)
+        bench.run_for("1s")
+        assert bench.transcript().endswith(twin.transcript())
+
+
+def test_several_devices_have_names() -> None:
+    with Bench(left=make_epos(1), right=make_epos(2), panel=Rrc()) as bench:
+        bench.run_for("100ms")
+        bench["left"].fault("power_off")
+        bench.run_for("10ms")
+        assert (bench["left"].get("state"), bench.get("right/state")) == ("Off", "Pre-operational")
+        assert bench["panel"].link.receive(0) == b"EV:Initialized\n"
+        with pytest.raises(KeyError, match="no device 'middle'; known: left, right, panel"):
+            bench["middle"]
+        with pytest.raises(ValueError, match="several wires"):
+            _ = bench.link
+
+
+def test_a_fault_of_a_bus_is_had_from_each_of_its_nodes() -> None:
+    with Bench(left=make_epos(1), panel=Rrc()) as bench:
+        bench["left"].fault("short")
+        bench["panel"].fault("cut")
+        bench.run_for("100ms")
+        assert "can ! short" in bench.transcript()
+        assert "701#00" not in bench.transcript()
+
+
+def test_masters_meet_a_node() -> None:
+    with Bench(make_f_palette(5)) as bench:
+        bus = bench.can_bus()
+        boot_up = bus.recv(1.0)
+        assert boot_up is not None
+        assert (boot_up.arbitration_id, bytes(boot_up.data)) == (0x705, b"\0")
+        network = bench.canopen_network()
+        network.nmt.state = "OPERATIONAL"
+        assert bench.wait_until(lambda: bench.get("state") == "Operational", within="10ms")
+        bus.shutdown()
+        network.disconnect()
+
+
+def test_a_type_is_known_by_its_name() -> None:
+    with Bench("rtc-lite") as bench:
+        bench.run_for("1s")
+        assert bench.devices == ("rtc_lite",)
