@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.rig import OutsideBridge, Rig
 from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
 from tickrig.emulators.testing.bench.journal import Journal
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from tickrig.emulators.record.byte_text import escape
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame

@@ -14,12 +14,12 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Station
 from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
 BIT_RATE: Final = 1_000_000

@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.emulators.record.byte_text import escape
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.host.text.byte_text import escape
 
 Condition = Callable[[], bool]
 """Says whether something is so; it only looks."""
