@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.emulators.commands.device_type import DEVICES, DeviceType
+from tickrig.emulators.commands.device_config import configure
+from tickrig.emulators.commands.device_type import DeviceType
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of
@@ -46,7 +47,8 @@ def _of_type(
 ) -> tuple[LineSettings, Emulated[bytes]]:
     """Return a device and what its line is like."""
     if isinstance(device, str):
-        device = DEVICES.load(device)
+        made = configure(device, {}, seed)
+        return made.type.line, made.device
     if isinstance(device, DeviceType):
         return device.line, device.build({})
     return LineSettings(), device
