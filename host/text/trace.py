@@ -46,6 +46,7 @@ class Mark(StrEnum):
     FROM_DEVICE = "<"
     PHYSICAL = "!"
     END = "."
+    WIRE = "~"  # in version 2: see `bench_record`
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.physical import OutputSignal
+from tickrig.device.physical import OutputSignal, QuantityBank
 from tickrig.device.twin import Copyable
 from tickrig.emulators.can.end import Accepted
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node.noted_signal import NotedSignal, OnSet
 from tickrig.emulators.canopen.node.signals import (
     Emergency,
     ObjectSignal,
@@ -71,7 +72,10 @@ class Node(Copyable):
         physical: what the world does to it, by name.
         groups: names of several of these that are set together.
         outputs: what the world sees of it, by name.
+        on_set: called with each input or object that was set by name, and its value.
     """
+
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None}
 
     def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
         self.name, self.slave, self.application = name, slave, Application.of(slave)
@@ -80,6 +84,7 @@ class Node(Copyable):
         self._wire, self._on, self._ticked = wire, True, False
         self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
+        self.on_set: OnSet | None = None
         bank = self.application.inputs
         self.physical: Mapping[str, Signal] = {
             "power_off": Switch("power_off", "its supply is cut", self._switch),
@@ -97,6 +102,11 @@ class Node(Copyable):
     def tick_us(self) -> int:
         """The control period."""
         return self.slave.tick_us
+
+    @property
+    def inputs(self) -> QuantityBank:
+        """The physical inputs of its application, whoever sets them."""
+        return self.application.inputs
 
     @property
     def due_us(self) -> int:
@@ -142,8 +152,10 @@ class Node(Copyable):
 
     def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
-        if (physical := self.physical.get(name)) is not None:
-            return physical
+        signal = self.physical.get(name) or self._object(name)
+        return NotedSignal(signal, self.on_set) if signal and self.on_set else signal
+
+    def _object(self, name: str) -> Signal | None:
         entry = find_object(self.slave.dictionary, name)
         if entry is None:
             return None

@@ -1,0 +1,180 @@
+"""The first line of a trace of version 2: what is on the bench, and how it is built again."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Final
+
+from tickrig.host.text.trace import Config, TraceError
+
+VERSION: Final = 2
+PREFIX: Final = f"# tickrig-trace v{VERSION} "
+
+NAME: Final = re.compile(r"\w[\w./:-]{0,99}", re.ASCII)
+"""What devices and wires may be called in a trace."""
+
+
+class WireType(StrEnum):
+    """What passes on a wire."""
+
+    SERIAL = "serial"
+    CAN = "can"
+
+
+class Place(StrEnum):
+    """Where it was recorded: at the devices, tick by tick, or at the host's port."""
+
+    DEVICE = "device"
+    PORT = "port"
+
+
+@dataclass(frozen=True, slots=True)
+class WireEntry:
+    """A wire of a bench.
+
+    Attributes:
+        type: what passes.
+        config: its settings, as the bit rate.
+    """
+
+    type: WireType
+    config: Config = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceEntry:
+    """What a replay needs to build a device of a bench again.
+
+    Attributes:
+        wire: name of its wire.
+        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if it was
+            made by somebody's program, and cannot be built again.
+        config: its settings.
+        node_id: of a CANopen node.
+        sha256: of the file that its type names.
+        stored: what it had in its non-volatile memory.
+    """
+
+    wire: str
+    type: str = ""
+    config: Config = field(default_factory=dict)
+    node_id: int | None = None
+    sha256: str = ""
+    stored: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class BenchHeader:
+    """The first line: what is on the bench.
+
+    Attributes:
+        devices: by name.
+        wires: by name.
+        seed: of all chance.
+        place: where it was recorded.
+
+    Raises:
+        ValueError: a name that cannot stand in a line, or a wire that is not there.
+    """
+
+    devices: Mapping[str, DeviceEntry]
+    wires: Mapping[str, WireEntry]
+    seed: int = 0
+    place: Place = Place.DEVICE
+
+    def __post_init__(self) -> None:
+        """Check the names."""
+        for name in (*self.devices, *self.wires):
+            if not NAME.fullmatch(name):
+                raise ValueError(f"{name!r:.60} cannot stand in a trace: letters, digits and _./:-")
+        for name, device in self.devices.items():
+            if device.wire not in self.wires:
+                raise ValueError(
+                    f"device {name} is on wire {device.wire!r:.60}, which is not there"
+                )
+
+    def on_can(self, name: str) -> bool:
+        """Say whether a device hears frames, not bytes."""
+        return self.wires[self.devices[name].wire].type is WireType.CAN
+
+    def encode(self) -> str:
+        """Write the first line, without LF."""
+        header: dict[str, object] = {"seed": self.seed}
+        if self.place is not Place.DEVICE:
+            header["place"] = self.place
+        header["wires"] = {
+            name: {"type": wire.type, **wire.config} for name, wire in self.wires.items()
+        }
+        header["devices"] = {name: _written(device) for name, device in self.devices.items()}
+        return PREFIX + json.dumps(header)
+
+
+def _written(device: DeviceEntry) -> dict[str, object]:
+    """Return what is written of a device: what it has."""
+    fields = ("wire", "type", "config", "node_id", "sha256", "stored")
+    found = {name: getattr(device, name) for name in fields}
+    return {name: value for name, value in found.items() if value not in ("", None, {})}
+
+
+def parse_bench_header(line: str) -> BenchHeader:
+    """Read the first line; TraceError if it is none of ours."""
+    if not line.startswith(PREFIX):
+        raise TraceError(f"line 1 is not '{PREFIX}{{HEADER}}': {line!r:.60}")
+    try:
+        header = json.loads(line.removeprefix(PREFIX))
+        found = _Reader(header, "the header")
+        wires = found.table("wires")
+        return BenchHeader(
+            {name: _device(name, table) for name, table in found.table("devices").items()},
+            {name: _wire(name, table) for name, table in wires.items()},
+            found.take("seed", int, 0),
+            Place(found.take("place", str, Place.DEVICE)),
+        )
+    except (ValueError, RecursionError) as error:
+        raise TraceError(f"line 1: {error}") from None
+
+
+def _device(name: str, table: object) -> DeviceEntry:
+    found = _Reader(table, f"device {name!r:.60}")
+    config = found.table("config", {})
+    for key, value in config.items():
+        if not isinstance(value, str | int | float | None):
+            raise ValueError(f"device {name!r:.60}: {key!r:.60} is {value!r:.60}")
+    return DeviceEntry(
+        found.take("wire", str),
+        found.take("type", str, ""),
+        config,
+        found.take("node_id", int, None),
+        found.take("sha256", str, ""),
+        found.table("stored", {}),
+    )
+
+
+def _wire(name: str, table: object) -> WireEntry:
+    found = _Reader(table, f"wire {name!r:.60}")
+    config = {key: value for key, value in found.values.items() if key != "type"}
+    return WireEntry(WireType(found.take("type", str)), config)
+
+
+class _Reader:
+    """Takes values of a JSON object, which anybody may have written."""
+
+    def __init__(self, values: object, owner: str) -> None:
+        if not isinstance(values, dict):
+            raise ValueError(f"{owner} is no JSON object: {values!r:.60}")
+        self.values, self._owner = values, owner
+
+    def take(self, name: str, expected: type, *default: Any) -> Any:
+        """Return a value of a type, or the default; ValueError if there is neither."""
+        value = self.values.get(name, *default)
+        if type(value) is not expected and not (default and value == default[0]):
+            raise ValueError(f"{self._owner} has no {name}, or a bad one: {value!r:.60}")
+        return value
+
+    def table(self, name: str, *default: Any) -> dict[str, Any]:
+        """Return a JSON object."""
+        return dict(self.take(name, dict, *default))

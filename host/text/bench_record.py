@@ -1,0 +1,156 @@
+r"""The text form of what happened on a bench: version 2 of traces.
+
+    # tickrig-trace v2 {"seed": 0, "wires": {"bus": {"type": "can", "bit_rate": 500000}}, "devices": {"left": {"wire": "bus", "type": "epos", "node_id": 5}}}
+    0.000000 left < 705#00
+    0.310000 left > 605#2B40600006000000
+    0.310000 left < 585#6040600000000000
+    0.400000 left ! load_nm=1.5
+    0.500000 bus ~ drop=0.1
+    0.512000 left ! bus_state error-passive
+    2.000000 .
+
+Times are in seconds; the name says which device, or wire. `>` went to the device, `<` came
+from it: bytes are written by `byte_text.escape`, frames one a line as candump does. `!` was
+done to the device before that tick: an input or an object set, `reset`, or what its CAN
+controller told it. `~` is a fault of a wire that began, or ended (`=0`); `.` says how long
+the run lasted.
+"""  # noqa: E501 - a line of the file
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from math import isfinite
+from typing import Final, NamedTuple
+
+from tickrig.host.text.bench_header import BenchHeader
+from tickrig.host.text.byte_text import escape, unescape
+from tickrig.host.text.trace import RESET, Mark, TraceError
+from tickrig.host.text.values import Setting, format_time
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorState
+from tickrig.wire.errors import WireError
+
+_LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) (?:(\w[\w./:-]*) ([<>!~]) (.*)|\.)", re.ASCII)
+_CHANGE: Final = re.compile(r"([\w./:-]{1,200})=(.{1,9999})", re.ASCII)
+_FAULT: Final = re.compile(r"\w{1,99}(?:=[0-9.e+-]{1,30})?", re.ASCII)
+
+BUS_STATE: Final = {
+    f"bus_state {name}": state
+    for name, state in (
+        ("error-active", ErrorState.ACTIVE),
+        ("error-passive", ErrorState.PASSIVE),
+        ("bus-off", ErrorState.BUS_OFF),
+    )
+}
+"""What a CAN controller can tell its device, as it stands in a line."""
+
+
+class BenchRecord(NamedTuple):
+    """One line of a trace.
+
+    Attributes:
+        at_us: the tick, or the time at the host's port.
+        name: of the device, for `~` of the wire.
+        mark: what the line tells.
+        traffic: for `>` and `<`.
+        text: for `!` and `~`.
+        line: number of the line in its file, from 1.
+    """
+
+    at_us: int
+    name: str
+    mark: Mark
+    traffic: bytes | CanFrame = b""
+    text: str = ""
+    line: int = 0
+
+    def encode(self) -> str:
+        """Write the line, without LF."""
+        if self.mark is Mark.END:
+            return f"{format_time(self.at_us)} ."
+        traffic = self.traffic
+        text = self.text or (escape(traffic) if isinstance(traffic, bytes) else str(traffic))
+        return f"{format_time(self.at_us)} {self.name} {self.mark} {text}"
+
+    @property
+    def change(self) -> tuple[str, Setting] | None:
+        """Which input changed to what, for `!`; None for a reset, and what a controller told."""
+        name, equals, value = self.text.partition("=")
+        return (name, json.loads(value)) if equals else None
+
+
+def change_text(name: str, value: Setting) -> str:
+    """Write that an input was set, as `!` has it.
+
+    >>> change_text("0x1008", "a b"), change_text("load_nm", 0.5)
+    ('0x1008="a b"', 'load_nm=0.5')
+    """
+    return f"{name}={json.dumps(value) if isinstance(value, str) else value + 0}"
+
+
+class BenchParser:
+    """Reads the lines below a header.
+
+    Args:
+        header: what names and wires there are.
+    """
+
+    def __init__(self, header: BenchHeader) -> None:
+        self._header = header
+        self._on_can = {name: header.on_can(name) for name in header.devices}
+
+    def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
+        """Read line by line; time must not run backwards, and nothing follows the end.
+
+        Raises:
+            TraceError: a line is damaged.
+        """
+        before = BenchRecord(0, "", Mark.PHYSICAL)
+        for number, line in enumerate(lines, 2):
+            try:
+                record = self._record(line, number)
+            except (ValueError, WireError, RecursionError) as error:
+                raise TraceError(f"line {number}: {error}") from None
+            if record.at_us < before.at_us or before.mark is Mark.END:
+                raise TraceError(
+                    f"line {number} is earlier than the line above it, or behind the end"
+                )
+            yield record
+            before = record
+
+    def _record(self, line: str, number: int) -> BenchRecord:
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise ValueError(f"not 'SECONDS NAME MARK TEXT': {line!r:.60}")
+        seconds, micros, name, mark, text = match.groups()
+        at_us = int(seconds) * 1_000_000 + int(micros)
+        if name is None:
+            return BenchRecord(at_us, "", Mark.END, line=number)
+        if mark == Mark.WIRE:
+            _check_fault(text, name in self._header.wires)
+            return BenchRecord(at_us, name, Mark.WIRE, text=text, line=number)
+        if name not in self._on_can:
+            raise ValueError(f"no device {name:.60} in the header")
+        if mark == Mark.PHYSICAL:
+            _check_change(text)
+            return BenchRecord(at_us, name, Mark.PHYSICAL, text=text, line=number)
+        traffic = CanFrame.parse(text) if self._on_can[name] else unescape(text)
+        return BenchRecord(at_us, name, Mark(mark), traffic, line=number)
+
+
+def _check_fault(text: str, known: bool) -> None:
+    if not known or not _FAULT.fullmatch(text):
+        raise ValueError(f"no such wire in the header, or {text!r:.60} is no fault")
+
+
+def _check_change(text: str) -> None:
+    if text == RESET or text in BUS_STATE:
+        return
+    match = _CHANGE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r:.60} is not NAME=VALUE")
+    value = json.loads(match[2])
+    if type(value) not in (int, float, str) or (type(value) is float and not isfinite(value)):
+        raise ValueError(f"{text!r:.60} is no number and no string")
