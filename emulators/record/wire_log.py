@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tickrig.host.text.trace import Mark
-from tickrig.wire.lines import LineSplitter
+from tickrig.wire.serial.lines import LineSplitter
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.serial.lines import LineSplitter
 
 Echo = Callable[[str], None]
 

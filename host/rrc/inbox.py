@@ -10,8 +10,8 @@ from typing import Final, Generic, TypeVar
 
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
-from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.replies import Event, Ok, Refusal, Reply, StatusA, Text, parse_reply
+from tickrig.wire.serial.lines import LineSplitter
 
 EVENTS_KEPT: Final = 1_000
 STATUSES_KEPT: Final = 1_000  # 10 s

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
-    from tickrig.wire.lines import LineSplitter as LineSplitter
+    from tickrig.wire.serial.lines import LineSplitter as LineSplitter
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -47,6 +47,6 @@ else:
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),
-            "tickrig.wire.lines": ("LineSplitter",),
+            "tickrig.wire.serial.lines": ("LineSplitter",),
         },
     )

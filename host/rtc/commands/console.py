@@ -10,8 +10,8 @@ from typing import Final
 
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.serial.lines import LineSplitter
 
 READ_BYTES: Final = 4_096
 LOW: Final = -(2**31)

@@ -8,10 +8,10 @@ from typing import Final
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.frames.record import LineRecord
 from tickrig.wire.errors import WireError
-from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.check import strip_check
 from tickrig.wire.rrc.commands import Command, parse_command
 from tickrig.wire.rrc.replies import Event, Ok, Refusal, StatusA, Text, parse_reply
+from tickrig.wire.serial.lines import LineSplitter
 
 KIND: Final = "rrc"
 
