@@ -32,6 +32,10 @@ class Chance:
         z = ((z ^ (z >> 27)) * 0x94D0_49BB_1331_11EB) & _MASK
         return z ^ (z >> 31)
 
+    def skip(self, draws: int) -> None:
+        """Go on as after so many draws, at once."""
+        self._state = (self._state + draws * _GOLDEN_GAMMA) & _MASK
+
     def hit(self, threshold: int) -> bool:
         """Draw once: True with the probability that `threshold_of` was given."""
         return self.draw() < threshold

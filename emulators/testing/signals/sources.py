@@ -1,0 +1,235 @@
+"""Values that depend on time alone: pure functions, the same whoever asks how often.
+
+>>> Ramp(12.0, 9.5, over_us=10_000_000).value(4_000_000)
+11.0
+>>> Wave("square", 0, 1, period_us=1_000_000).next_us(0)
+500000
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi, sin
+from typing import Final, Protocol
+
+from tickrig.device.chance import Chance
+from tickrig.device.twin import Immutable
+from tickrig.host.text.values import Setting
+from tickrig.wire.instant import NEVER
+
+
+class Source(Protocol):
+    """A value as a function of time in microseconds."""
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Values that it reaches and does not leave; none where nobody can say."""
+        ...
+
+    def value(self, t_us: int, /) -> Setting:
+        """Return the value at a time of 0 or later."""
+        ...
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return the earliest time after `t_us` with another value; `NEVER` if it stays."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Immutable):
+    """A value that stays: a number, or the words of a text.
+
+    Attributes:
+        setting: the value.
+    """
+
+    setting: Setting
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The number."""
+        return () if isinstance(self.setting, str) else (self.setting,)
+
+    def value(self, t_us: int, /) -> Setting:
+        """Return the value."""
+        return self.setting
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return `NEVER`."""
+        return NEVER
+
+
+@dataclass(frozen=True, slots=True)
+class Ramp(Immutable):
+    """A straight line from one value to another.
+
+    Attributes:
+        first: the value at 0,
+        last: and at the end.
+        over_us: how long it takes.
+        repeat: whether it jumps back and begins again, as a saw-tooth; else it stays.
+    """
+
+    first: float
+    last: float
+    over_us: int
+    repeat: bool = False
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Both ends."""
+        return self.first, self.last
+
+    def value(self, t_us: int, /) -> float:
+        """Return the value at a time."""
+        at_us = t_us % self.over_us if self.repeat else t_us
+        if at_us >= self.over_us:
+            return self.last
+        return self.first + (self.last - self.first) * (at_us / self.over_us)
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return the time at which it is another."""
+        ended = not self.repeat and t_us >= self.over_us
+        return NEVER if ended or self.first == self.last else t_us + 1
+
+
+SHAPES: Final[dict[str, Callable[[float], float]]] = {
+    "sine": lambda part: 0.5 + 0.5 * sin(2 * pi * part),
+    "triangle": lambda part: 1 - abs(1 - 2 * part),
+    "square": lambda part: float(part >= 0),
+}
+"""How far it is on the way from the first value to the second, by the part of a period."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wave(Immutable):
+    """A value that goes to and fro between two.
+
+    Attributes:
+        shape: `sine` begins in the middle and goes to the second; `triangle` and `square`
+            begin at the first.
+        first: one end,
+        second: the other.
+        period_us: how long one to and fro takes.
+        phase_us: by how much of a period it is ahead.
+        duty: which part of a period a square has the second value.
+    """
+
+    shape: str
+    first: float
+    second: float
+    period_us: int
+    phase_us: int = 0
+    duty: float = 0.5
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Both ends."""
+        return self.first, self.second
+
+    def value(self, t_us: int, /) -> float:
+        """Return the value at a time."""
+        at_us = (t_us + self.phase_us) % self.period_us
+        if self.shape == "square":
+            at_us -= self._edge_us
+        way = SHAPES[self.shape](at_us / self.period_us)
+        return self.first * (1 - way) + self.second * way
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return the time at which it is another."""
+        if self.shape != "square":
+            return t_us + 1
+        at_us = (t_us + self.phase_us) % self.period_us
+        return t_us - at_us + (self._edge_us if at_us < self._edge_us else self.period_us)
+
+    @property
+    def _edge_us(self) -> int:
+        return self.period_us - round(self.duty * self.period_us)
+
+
+@dataclass(frozen=True, slots=True)
+class Noise(Immutable):
+    """Chance, drawn anew each `every_us`: the draw of a time is always the same.
+
+    Attributes:
+        first: the mean of gaussian noise; the least of uniform noise.
+        second: its standard deviation; the greatest.
+        uniform: all between two values as likely; else gaussian.
+        every_us: how long a draw stays.
+        seed: of the draws; None takes that of the bench.
+        stream: what noise this is; other streams of a seed are independent.
+    """
+
+    first: float
+    second: float
+    uniform: bool
+    every_us: int
+    seed: int | None = None
+    stream: str = ""
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The ends of uniform noise; gaussian noise has none."""
+        return (self.first, self.second) if self.uniform else ()
+
+    def value(self, t_us: int, /) -> float:
+        """Return the draw that holds at a time."""
+        chance = Chance(self.seed or 0, self.stream)
+        chance.skip(t_us // self.every_us)
+        part = ((chance.draw() >> 12) + 0.5) / 2**52  # above 0, below 1
+        if self.uniform:
+            return self.first * (1 - part) + self.second * part
+        from statistics import NormalDist  # noqa: PLC0415 - slow to import
+
+        return self.first + self.second * NormalDist().inv_cdf(part)
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return the time of the next draw."""
+        return t_us - t_us % self.every_us + self.every_us
+
+
+@dataclass(frozen=True, slots=True)
+class Table(Immutable):
+    """Values at times: the first holds before its time, the last behind its own.
+
+    Attributes:
+        times_us: when, none earlier than the one before it; two at one time are a jump.
+        values: as many.
+        linear: a straight line from one to the next; else each holds until the next.
+        repeat: whether it begins again at the time of the last.
+    """
+
+    times_us: tuple[int, ...]
+    values: tuple[float, ...] = field(repr=False)
+    linear: bool = True
+    repeat: bool = False
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The least and the greatest."""
+        return min(self.values), max(self.values)
+
+    def value(self, t_us: int, /) -> float:
+        """Return the value at a time."""
+        at_us = self._at_us(t_us)
+        right = bisect_right(self.times_us, at_us)
+        if right in (0, len(self.values)) or not self.linear:
+            return self.values[max(0, right - 1)]
+        left_us, right_us = self.times_us[right - 1 : right + 1]
+        way = (at_us - left_us) / (right_us - left_us)
+        return self.values[right - 1] * (1 - way) + self.values[right] * way
+
+    def next_us(self, t_us: int, /) -> int:
+        """Return the time at which it may be another."""
+        at_us = self._at_us(t_us)
+        right = bisect_right(self.times_us, at_us)
+        if right == len(self.values):
+            return NEVER
+        flat = not right or self.values[right - 1] == self.values[right]
+        return t_us + (1 if self.linear and not flat else self.times_us[right] - at_us)
+
+    def _at_us(self, t_us: int) -> int:
+        last_us = self.times_us[-1]
+        return t_us % last_us if self.repeat and last_us else t_us

@@ -1,0 +1,203 @@
+"""Signals as TOML gives them: a number, a text, or a table as `{ramp = [12.0, 9.5], over = "10s"}`.
+
+>>> read_signal_spec({"ramp": [12.0, 9.5], "over": "10s"}).source.value(5_000_000)
+10.75
+>>> for mistake in read_signal_spec({"ramp": [12.0], "ower": "10s"}, ("supply_v",)):
+...     print(mistake)
+supply_v.ramp: it takes two numbers, as [0, 5], not [12.0]
+supply_v.ower: not a key of ramp; known: over, repeat, from, every, min, max, step
+supply_v.over: it is missing
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.emulators.testing.signals.fields import (
+    flag,
+    formula,
+    number,
+    pair,
+    part,
+    seed,
+    some_time,
+    spread,
+    step,
+    time,
+    word,
+)
+from tickrig.emulators.testing.signals.mistake import Keys, Mistake
+from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
+from tickrig.emulators.testing.signals.sources import SHAPES, Constant, Noise, Ramp, Wave
+from tickrig.emulators.testing.signals.table import read_table
+
+EVERY_US: Final = 10_000
+"""How often noise is drawn, and lags and integrals move on, unless told otherwise."""
+
+Fields = Mapping[str, Any]
+"""The values of a table's keys, each as its reader has left it."""
+
+Reader = Callable[[object], object]
+"""Takes what TOML gives, and returns a field; ValueError with what was allowed."""
+
+COMMON: Final[Mapping[str, Reader]] = {
+    "every": some_time,
+    "min": number,
+    "max": number,
+    "step": step,
+}
+FROM: Final[Mapping[str, Reader]] = {"from": time, **COMMON}
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A table that a signal can be.
+
+    Attributes:
+        keys: those that it can have, the one that names it first.
+        build: makes the source of its fields; ValueError if they do not fit each other.
+        needed: those that it must have.
+        every_us: how long a value is held unless `every` says so.
+    """
+
+    keys: Mapping[str, Reader]
+    build: Callable[[Path, Fields], Any]
+    needed: tuple[str, ...] = ()
+    every_us: int = 0
+
+
+def _ramp(folder: Path, fields: Fields) -> Ramp:
+    first, last = fields["ramp"]
+    return Ramp(first, last, fields["over"], fields.get("repeat", False))
+
+
+def _wave(shape: str, folder: Path, fields: Fields) -> Wave:
+    (first, second), period_us = fields[shape], fields["period"]
+    phase_us = round(fields.get("phase_deg", 0) / 360 * period_us)
+    return Wave(shape, first, second, period_us, phase_us, fields.get("duty", 0.5))
+
+
+def _noise(folder: Path, fields: Fields) -> Noise:
+    given, mean = fields["noise"], fields.get("mean")
+    if uniform := isinstance(given, tuple):
+        if mean is not None:
+            raise ValueError("mean belongs to gaussian noise, as {noise = 0.1, mean = 12.0}")
+        first, second = given
+    else:
+        first, second = mean or 0.0, given
+    return Noise(first, second, uniform, fields.get("every", EVERY_US), fields.get("seed"))
+
+
+def _formula(folder: Path, fields: Fields) -> object:
+    return fields["formula"]
+
+
+def _lag(folder: Path, fields: Fields) -> Lag:
+    return Lag(fields["lag"], fields["tau"], fields.get("start"))
+
+
+def _integral(folder: Path, fields: Fields) -> Integral:
+    return Integral(fields["integral"], fields.get("start", 0.0))
+
+
+FORMS: Final[Mapping[str, Form]] = {
+    "ramp": Form({"ramp": pair, "over": some_time, "repeat": flag, **FROM}, _ramp, ("over",)),
+    **{
+        shape: Form(
+            {shape: pair, "period": some_time, "phase_deg": number}
+            | ({"duty": part} if shape == "square" else {})
+            | dict(FROM),
+            partial(_wave, shape),
+            ("period",),
+        )
+        for shape in SHAPES
+    },
+    "noise": Form(
+        {"noise": spread, "mean": number, "seed": seed, **FROM}, _noise, every_us=EVERY_US
+    ),
+    "table": Form(
+        {"table": lambda value: value, "column": word, "interpolation": word, "repeat": flag}
+        | dict(FROM),
+        read_table,
+    ),
+    "formula": Form({"formula": formula, **COMMON}, _formula),
+    "lag": Form(
+        {"lag": formula, "tau": some_time, "start": number, **COMMON}, _lag, ("tau",), EVERY_US
+    ),
+    "integral": Form(
+        {"integral": formula, "start": number, **COMMON}, _integral, every_us=EVERY_US
+    ),
+}
+"""What a signal can be, by the key that names it."""
+
+
+def read_signal_spec(
+    value: object, keys: Keys = (), folder: Path | None = None
+) -> SignalSpec | list[Mistake]:
+    """Read what TOML gives for a value that may change by itself.
+
+    Whether the signals that a formula names are there is judged by `check_signals`.
+
+    Args:
+        value: a number, true or false, a text, or a table (docs/signals.md).
+        keys: where it stands, for mistakes.
+        folder: where files of tables are looked for; unless given, the working directory.
+
+    Returns:
+        The signal, or all mistakes in it.
+    """
+    if isinstance(value, bool | int | float | str):
+        try:
+            return SignalSpec(Constant(value if isinstance(value, str) else number(value)))
+        except ValueError as error:
+            return [Mistake(keys, str(error))]
+    names = [name for name in FORMS if isinstance(value, dict) and name in value]
+    if not isinstance(value, dict) or len(names) != 1:
+        came = " and ".join(names) if names else f"{value!r:.60}"
+        wanted = f"a number, a text, or a table with one of {', '.join(FORMS)}"
+        return [Mistake(keys, f"it is {wanted}; not {came}")]
+    return _read(names[0], value, keys, folder or Path())
+
+
+def _read(name: str, table: Fields, keys: Keys, folder: Path) -> SignalSpec | list[Mistake]:
+    form, fields = FORMS[name], dict[str, Any]()
+    mistakes = [*_read_fields(name, table, keys, fields)]
+    mistakes += [Mistake((*keys, key), "it is missing") for key in form.needed if key not in table]
+    if not mistakes:
+        try:
+            return SignalSpec(
+                form.build(folder, fields),
+                fields.get("from", 0),
+                fields.get("every", form.every_us),
+                **_limits(fields),
+            )
+        except ValueError as error:
+            mistakes.append(Mistake((*keys, name), str(error)))
+    return mistakes
+
+
+def _read_fields(name: str, table: Fields, keys: Keys, fields: dict[str, Any]) -> Iterator[Mistake]:
+    """Enter the fields; yield the mistakes in them."""
+    known = FORMS[name].keys
+    for key, value in table.items():
+        if key not in known:
+            others = ", ".join(other for other in known if other != name)
+            yield Mistake((*keys, key), f"not a key of {name}; known: {others}")
+            continue
+        try:
+            fields[key] = known[key](value)
+        except ValueError as error:
+            yield Mistake((*keys, key), str(error))
+
+
+def _limits(fields: Fields) -> dict[str, float]:
+    """Return the limits and the quantisation; ValueError if nothing is between the limits."""
+    named = {"min": "low", "max": "high", "step": "step"}
+    limits = {named[key]: float(fields[key]) for key in named if key in fields}
+    if limits.get("low", 0) > limits.get("high", limits.get("low", 0)):
+        raise ValueError(f"min {limits['low']:g} is above max {limits['high']:g}")
+    return limits
