@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.host.text.toml_place import line_of
+from tickrig.host.text.toml_reader import read_toml
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -100,7 +100,7 @@ class Workspace:
     def wrong(self, error: SettingError, section: str = "") -> WorkspaceError:
         """Return the error of a setting with the line it stands on."""
         path = (section, *error.path) if section else error.path
-        place = line_of(self._text, path)
+        place = read_toml(self._text).line_of(path)
         name = f"{section}.{error}" if section else str(error)
         return WorkspaceError(f"{self.path}, line {place}: {name}")
 

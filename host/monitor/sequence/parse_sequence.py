@@ -16,7 +16,7 @@ from tickrig.host.monitor.sequence.sequence_run import (
 )
 from tickrig.host.monitor.sequence.variables import fill_in
 from tickrig.host.text.steps import FOREVER, Place, StepError, content_lines
-from tickrig.host.text.toml_place import line_of
+from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
@@ -144,7 +144,7 @@ class TomlSequence:
         return Sequence(steps, self._locate)
 
     def _locate(self, place: Place) -> str:
-        return f"{self._file}:{line_of(self._text, place)}"
+        return f"{self._file}:{read_toml(self._text).line_of(place)}"
 
     def _syntax(self, text: str) -> str:
         reason, _, place = text.rpartition(" (at ")

@@ -1,0 +1,300 @@
+r"""Read a TOML text to its end whatever is wrong with it, with the line of each value.
+
+The parser of the standard library stops at the first mistake and tells no lines of what it
+has read. This one goes statement by statement, and leaves scalars to that parser.
+
+>>> document = read_toml("a = 1\n[[step]]\nsend = [\n  {x = 1},\n  {y = },\n]\n[b\n")
+>>> document.values["a"], document.line_of(("step", 0, "send", 0, "x"))
+(1, 4)
+>>> [f"{line}: {reason}" for line, reason in document.mistakes]
+["5: a value is missing before '},'", "7: ']' is missing behind b"]
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from bisect import bisect_right
+from typing import Any, Final
+
+from tickrig.host.text.toml_document import (
+    BROKEN,
+    Array,
+    Leaf,
+    Mistake,
+    Node,
+    Table,
+    TakenError,
+    TomlDocument,
+    document_of,
+)
+
+MOST_DEEP: Final = 50
+"""How deep arrays and inline tables may nest, and how many parts a key may have."""
+
+ONE_LINE: Final = "an inline table stands on one line; [a.table] has lines of its own"
+
+_BLANK: Final = re.compile(r"[ \t]*")
+_BETWEEN: Final = re.compile(r"(?:[ \t\n]+|#[^\n]*)*")
+_COMMENT: Final = re.compile(r"[ \t]*(?:#[^\n]*)?")
+_CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]+")
+_QUOTED: Final = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"|\'[^\'\n]*\'')
+_LONG: Final = {
+    '"""': re.compile(r'"""(?:[^\\]|\\.)*?""""{0,2}', re.DOTALL),
+    "'''": re.compile(r"'''.*?''''{0,2}", re.DOTALL),
+}
+_PLAIN: Final = re.compile(r"[^\s,\[\]{}#\"']+(?: [0-9][^\s,\[\]{}#\"']*)?")
+_WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,17}")
+_STATEMENT: Final = re.compile(
+    r"[ \t]*(?:\[\[?[ \t]*(?!(?:true|false|inf|nan)\b)[A-Za-z_][^\]\n]*\]\]?[ \t]*(?:#|\n|$)"
+    r"|[\w.\"' \t-]+=)"
+)
+"""What most likely begins a statement, where an array has not ended."""
+
+
+def read_toml(text: str) -> TomlDocument:
+    """Read a text.
+
+    Args:
+        text: the whole.
+    """
+    return _Reader(text.replace("\r\n", "\n")).read()
+
+
+class _WrongError(Exception):
+    """The statement cannot be read further."""
+
+    def __init__(self, at: int, reason: str) -> None:
+        super().__init__(reason)
+        self.at = at
+
+
+class _Reader:
+    """Reads one text."""
+
+    def __init__(self, text: str) -> None:
+        self._text, self._at, self._whole = text, 0, True
+        self._starts = [0, *(match.end() for match in re.finditer("\n", text))]
+        self._top = self._section = Table(1)
+        self._dotted: list[Table] = []  # by keys of this section
+        self._mistakes: list[Mistake] = []
+
+    def read(self) -> TomlDocument:
+        while self._skip(_BETWEEN) < len(self._text):
+            start = self._at
+            try:
+                self._statement()
+            except _WrongError as error:
+                self._report(error.at, str(error))
+                self._go_on_behind(start, error.at)
+        return document_of(self._top, self._mistakes, whole=self._whole)
+
+    def _report(self, at: int, reason: str) -> None:
+        self._mistakes.append(Mistake(self._line(at), reason))
+
+    def _line(self, at: int) -> int:
+        return bisect_right(self._starts, min(at, len(self._text)))
+
+    def _go_on_behind(self, start: int, at: int) -> None:
+        """Go to the line of the mistake if the statement began before it, else to the next."""
+        line = self._line(at)
+        if at < len(self._text) and line > self._line(start):
+            self._at = self._starts[line - 1]
+        else:
+            end = self._text.find("\n", at)
+            self._at = len(self._text) if end < 0 else end
+
+    def _skip(self, pattern: re.Pattern[str]) -> int:
+        """Go behind blanks, and comments that the pattern takes."""
+        match = pattern.match(self._text, self._at)
+        if match is not None:
+            for line in re.finditer(r"#[^\n]*", match[0]) if "#" in match[0] else ():
+                if wrong := _CONTROL.search(line[0]):
+                    self._report(match.start() + line.start(), f"a comment holds {wrong[0]!r}")
+            self._at = match.end()
+        return self._at
+
+    def _is(self, signs: str) -> bool:
+        return self._text.startswith(signs, self._at)
+
+    def _rest(self) -> str:
+        """Return the beginning of what stands here, for people."""
+        rest = self._text[self._at : self._at + 30].partition("\n")[0].strip()
+        return repr(rest) if rest else "the end of the line"
+
+    def _take(self, sign: str, behind: str) -> None:
+        self._skip(_BLANK)
+        if not self._is(sign):
+            raise _WrongError(self._at, f"{sign!r} is missing behind {behind}")
+        self._at += len(sign)
+
+    # Statements
+
+    def _statement(self) -> None:
+        if self._is("["):
+            for table in self._dotted:
+                table.closed = True
+            self._dotted.clear()
+            try:
+                self._section = self._header()
+            except _WrongError:
+                self._section, self._whole = Table(0), False
+                raise
+        else:
+            self._key_value(self._section, self._dotted, 0)
+        self._skip(_COMMENT)
+        if self._at < len(self._text) and not self._is("\n"):
+            raise _WrongError(self._at, f"{self._rest()} is too much here")
+
+    def _header(self) -> Table:
+        line, many = self._line(self._at), self._is("[[")
+        start, self._at = self._at, self._at + 1 + many
+        self._skip(_BLANK)
+        *above, last = keys = self._key()
+        self._take("]]" if many else "]", ".".join(keys))
+        table = self._top
+        try:
+            for key in above:
+                table = table.below(line, key)
+            return table.add(line, last) if many else table.open(line, last)
+        except TakenError as error:
+            raise _WrongError(start, str(error)) from None
+
+    def _key_value(self, table: Table, dotted: list[Table], depth: int) -> None:
+        start, line = self._at, self._line(self._at)
+        *above, last = keys = self._key()
+        try:
+            for key in above:
+                table = table.dotted(line, key)
+                dotted.append(table)
+            taken = TakenError(last, table.entries[last].line) if last in table.entries else None
+        except TakenError as error:
+            table, taken = Table(0), error
+        if not taken:
+            table.entries[last] = Leaf(line, BROKEN)  # until it is read
+        self._take("=", ".".join(keys))
+        if taken:
+            self._report(start, str(taken))
+        self._skip(_BLANK)
+        value = self._value(depth)
+        value.line = line
+        if not taken:
+            table.entries[last] = value
+
+    def _key(self) -> list[str]:
+        start, keys = self._at, [self._simple_key()]
+        while self._skip(_BLANK) < len(self._text) and self._is("."):
+            self._at += 1
+            self._skip(_BLANK)
+            keys.append(self._simple_key())
+        if len(keys) > MOST_DEEP:
+            raise _WrongError(start, f"a key of more than {MOST_DEEP} parts")
+        return keys
+
+    def _simple_key(self) -> str:
+        match = _BARE.match(self._text, self._at)
+        if match is None and (match := _QUOTED.match(self._text, self._at)) is None:
+            raise _WrongError(self._at, f"a key is expected, not {self._rest()}")
+        key = match[0] if match[0][0] not in "\"'" else self._scalar(match[0])
+        self._at = match.end()
+        return str(key)
+
+    # Values
+
+    def _value(self, depth: int) -> Node:
+        start = self._at
+        if self._is("[") or self._is("{"):
+            if depth == MOST_DEEP:
+                raise _WrongError(start, f"nested deeper than {MOST_DEEP}")
+            self._at += 1
+            return (self._array if self._text[start] == "[" else self._inline)(start, depth + 1)
+        if self._is('"') or self._is("'"):
+            pattern = _LONG.get(self._text[start : start + 3], _QUOTED)
+            match = pattern.match(self._text, start)
+            if match is None:
+                raise _WrongError(start, f"the text {self._rest()} does not end")
+        elif (match := _PLAIN.match(self._text, start)) is None:
+            return self._missing(start, depth)
+        value = self._scalar(match[0])
+        self._at = match.end()
+        return Leaf(self._line(start), value)
+
+    def _missing(self, start: int, depth: int) -> Leaf:
+        reason = f"a value is missing before {self._rest()}"
+        if depth == 0 or self._text[start : start + 1] not in (",", "}"):
+            raise _WrongError(start, reason)
+        self._report(start, reason)
+        return Leaf(self._line(start), BROKEN)
+
+    def _scalar(self, token: str) -> Any:
+        """Return the value of a token; tell what is wrong with it, and return BROKEN."""
+        if _WHOLE.fullmatch(token):
+            return int(token)
+        try:
+            return tomllib.loads(f"v={token}")["v"]
+        except (ValueError, RecursionError) as error:
+            shown = repr(token if len(token) < 40 else f"{token[:36]}...")
+            reason = re.sub(r" \(at .*\)$", "", str(error))
+            if token[0] not in "\"'":
+                reason = "a text stands in quotes" if token[0].isalpha() else "it is no number"
+            self._report(self._at, f"{shown} is no value: {reason}")
+            return BROKEN
+
+    def _array(self, start: int, depth: int) -> Array:
+        array = Array(self._line(start))
+        while self._skip(_BETWEEN) < len(self._text) and not self._is("]"):
+            self._check_unclosed(start)
+            if self._is("}"):
+                raise _WrongError(self._at, f"{self._rest()} is too much in the array")
+            array.items.append(self._value(depth))
+            self._skip(_BETWEEN)
+            if self._is(","):
+                self._at += 1
+            elif self._at < len(self._text) and self._text[self._at] not in "]}":
+                self._check_unclosed(start)
+                self._report(self._at, f"',' is missing before {self._rest()}")
+        self._close(start, "]", "array")
+        return array
+
+    def _check_unclosed(self, start: int) -> None:
+        """Stop where a statement most likely begins, on a line after that of the array."""
+        line = self._line(self._at)
+        first = self._starts[line - 1]
+        is_first = not self._text[first : self._at].strip(" \t")
+        if is_first and line > self._line(start) and _STATEMENT.match(self._text, first):
+            self._close(start, "]", "array")
+
+    def _inline(self, start: int, depth: int) -> Table:
+        table, dotted = Table(self._line(start), frozen=True), list[Table]()
+        broken = self._skip_in_inline(known=False)
+        while not self._is("}"):
+            self._key_value(table, dotted, depth)
+            self._skip(_BLANK)
+            if not self._is(","):
+                break
+            self._at += 1
+            broken = self._skip_in_inline(known=broken)
+            if self._is("}") and not broken:
+                self._report(self._at, "',' is too much at the end of an inline table")
+        for inner in dotted:
+            inner.frozen = True
+        self._close(start, "}", "inline table")
+        return table
+
+    def _skip_in_inline(self, *, known: bool) -> bool:
+        """Go behind blanks; return whether there was a new line, which is a mistake known once."""
+        self._skip(_BLANK)
+        if not (self._is("\n") or self._is("#")):
+            return known
+        if not known:
+            self._report(self._at, ONE_LINE)
+        self._skip(_BETWEEN)
+        return True
+
+    def _close(self, start: int, sign: str, what: str) -> None:
+        if not self._is(sign):
+            begun = self._line(start)
+            where = "" if begun == self._line(self._at) else f" of line {begun}"
+            raise _WrongError(self._at, f"{sign!r} of the {what}{where} is missing")
+        self._at += 1
