@@ -83,7 +83,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
-        description = _describe(cache, spec.device, spec.profile or profile)
+        description = describe(cache, spec.device, spec.profile or profile)
         node_id = spec.node_id if spec.node_id is not None else description.node_id
         if node_id is None:
             raise Refused(
@@ -127,7 +127,14 @@ def make_nodes(
     return nodes
 
 
-def _describe(cache: EdsCache, device: Path | str, profile: str) -> DeviceDescription:
+def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> DeviceDescription:
+    """Describe the node that a file, a model or a user's class stands for; Refused if none can be.
+
+    Args:
+        cache: of files.
+        device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
+        profile: of `choices.PROFILES`, for a file.
+    """
     if isinstance(device, str):
         return describe_device(device)
     description = _read(cache, device)

@@ -45,16 +45,17 @@ class Nodes:
     """All nodes of a bus, with the signals of each.
 
     The things of one node are called as they are, `0x6000:1`, `state`; those of
-    several have the node before them, `5/0x6000:1`, `5/state`, those of a body always
-    have it, `body/x_m`.
+    several have the node before them, `5/0x6000:1`, `5/state`, those of a body too,
+    `body/x_m`, unless it is all there is.
 
     Args:
-        nodes: at least one.
-        bodies: what is joined to them.
+        nodes: some, or none.
+        bodies: what is joined to them, or is seen by itself.
     """
 
     def __init__(self, nodes: Sequence[Node], bodies: Sequence[Part] = ()) -> None:
         self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
+        self._alone = self.parts[0] if len(nodes) == 1 or len(self.parts) == 1 else None
         self._by_name: Mapping[str, Part] = {part.name: part for part in self.parts}
         self.inputs = NodeInputs(self)
         self.outputs: Mapping[str, OutputSignal] = {
@@ -77,15 +78,14 @@ class Nodes:
 
     def full_name(self, part: Part, name: str) -> str:
         """Return what a thing of a part is called."""
-        alone = len(self.nodes) == 1 and part is self.nodes[0]
-        return name if alone else f"{part.name}/{name}"
+        return name if part is self._alone else f"{part.name}/{name}"
 
     def find(self, name: str) -> tuple[Part | None, str]:
         """Return the part that a name belongs to, and the rest of the name."""
         prefix, slash, rest = name.partition("/")
         if slash:
             return self._by_name.get(prefix), rest
-        return (self.nodes[0] if len(self.nodes) == 1 else None), name
+        return self._alone, name
 
     @property
     def lost(self) -> int:

@@ -6,13 +6,16 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from tickrig.emulators.canopen.build import store_keeper
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.mode import BenchMode
+from tickrig.emulators.testing.bench.plan_parts import begin, parts_of
 from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
+from tickrig.emulators.testing.rig_file.plan import RigPlan
 
 
 class Bench(BenchDevice):
@@ -57,6 +60,25 @@ class Bench(BenchDevice):
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
+
+    @classmethod
+    def of_plan(cls, plan: RigPlan) -> Self:
+        """Return the bench of a rig file, in virtual time.
+
+        Args:
+            plan: what the file says.
+
+        Raises:
+            Refused: a device cannot be made.
+            ValueError: an option, input or fault that there is not.
+        """
+        parts = parts_of(plan)
+        state = RigState(parts.mounts, parts.bodies)
+        rig = BenchRig("bench", state)
+        begin(plan, state)
+        for store in parts.stores:
+            state.rig.watchers.append(store_keeper(store))
+        return cls.of_mode(VirtualMode(rig))
 
     @classmethod
     def of_mode(cls, mode: BenchMode) -> Self:

@@ -159,11 +159,10 @@ class BenchDevice:
         """Return the wire of this device, or the only one there is."""
         if self.name:
             return self._mode.wire_of(self.name)
-        wires = {self._mode.wire_of(name) for name in self._mode.devices}
-        if len(wires) > 1:
+        if len(self._mode.wires) > 1:
             known = ", ".join(self._mode.devices)
             raise ValueError(f"this bench has several wires: take that of a device; known: {known}")
-        return wires.pop()
+        return self._mode.wires[0]
 
     def _full(self, name: str) -> str:
         alone = not self.name or len(self._mode.devices) == 1
@@ -171,15 +170,9 @@ class BenchDevice:
 
     def _fault(self, name: str) -> str:
         """Return the full name of a fault of this device, or of its wire."""
-        return self._full(name) if self.name == "" else self._mode.act(self._fault_of(name))
-
-    def _fault_of(self, name: str) -> Any:
-        def find(rig: BenchRig) -> str:
-            known = rig.operator.faults
-            named = (self._full(name), f"{self._mode.wire_of(self.name)}/{name}", name)
-            return next((full for full in named if full in known), named[0])
-
-        return find
+        if not self.name:
+            return name
+        return self._mode.act(lambda rig: rig.state.fault_name(self.name, name))
 
 
 def _arm(rig: BenchRig, spec: FaultSpec, condition: Condition | None, for_us: int | None) -> None:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
+from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives
+from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.rig.clock import Clock
-from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.rig import OutsideBridge, Rig
 from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
 from tickrig.emulators.testing.bench.journal import Journal
@@ -38,7 +39,7 @@ class RigState(Copyable):
 
     Args:
         mounts: the devices on their wires.
-        couplings: what joins them beside their wires.
+        bodies: what drives move, seen as devices `body` too.
         bridges: joints with the outside world.
         clock: a `VirtualClock` unless given.
     """
@@ -46,19 +47,29 @@ class RigState(Copyable):
     def __init__(
         self,
         mounts: Sequence[Mount],
-        couplings: Sequence[Coupling] = (),
+        bodies: Sequence[BodyOnDrives] = (),
         bridges: Sequence[OutsideBridge] = (),
         clock: Clock | None = None,
     ) -> None:
         self.mounts = {mount.name: mount for mount in mounts}
         stations = [station for mount in mounts for station in mount.stations]
-        self.rig = Rig(*stations, bridges=bridges, couplings=couplings, clock=clock)
+        self.rig = Rig(*stations, bridges=bridges, couplings=bodies, clock=clock)
         for mount in mounts:
             if isinstance(mount, BusMount):
                 self.rig.move_on(mount.wire)
-        self.assembly = Assembly({k: v for mount in mounts for k, v in mount.parts.items()})
+        parts = {name: part for mount in mounts for name, part in mount.parts.items()}
+        self.assembly = Assembly({**parts, **{body.name: Nodes([], [body]) for body in bodies}})
         self.faults = AssemblyFaults({mount.name: mount.faults for mount in mounts})
         self.operator = BenchOperator.at(self.assembly, self.rig, self.faults)
+
+    def fault_name(self, owner: str, fault: str) -> str:
+        """Return the full name of a fault of a device, or of its wire, or of a wire.
+
+        Where there is none, it is what it would be called.
+        """
+        wire = owner if owner in self.mounts else self.wire_of(owner)
+        full = self.assembly.full_name(owner, fault), f"{wire}/{fault}", fault
+        return next((name for name in full if name in self.operator.faults), full[0])
 
     def wire_of(self, device: str) -> str:
         """Return the name of the wire that a device is on; ValueError if there is none."""

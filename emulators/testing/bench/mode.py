@@ -36,6 +36,11 @@ class BenchMode(Protocol):
         ...
 
     @property
+    def wires(self) -> tuple[str, ...]:
+        """The names of all wires."""
+        ...
+
+    @property
     def now_us(self) -> int:
         """The time since the bench was opened."""
         ...

@@ -42,6 +42,11 @@ class VirtualMode:
         return tuple(self._rig.state.assembly.parts)
 
     @property
+    def wires(self) -> tuple[str, ...]:
+        """The names of all wires."""
+        return tuple(self._rig.state.mounts)
+
+    @property
     def now_us(self) -> int:
         """The rig's time."""
         return self._rig.rig.now_us

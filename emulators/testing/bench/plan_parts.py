@@ -1,0 +1,163 @@
+"""Make what a rig file says: devices on their wires, what they move, what they begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+
+from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
+from tickrig.emulators.canopen.build import describe
+from tickrig.emulators.canopen.choices import AUTO
+from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.store_file import StoreFile
+from tickrig.emulators.commands.device_config import configure
+from tickrig.emulators.commands.device_type import ConfiguredDevice
+from tickrig.emulators.rig.port import ByteLine
+from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.emulators.serial.rs485_line import Rs485Line
+from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.testing.bench.bench_rig import RigState
+from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
+from tickrig.emulators.testing.rig_file.plan import (
+    BodyPlan,
+    DeviceKind,
+    DevicePlan,
+    RigPlan,
+    WirePlan,
+    WireType,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a bench is put together of.
+
+    Attributes:
+        mounts: the devices on their wires.
+        bodies: what drives move.
+        stores: files in which nodes keep what they store, to be saved while time passes.
+    """
+
+    mounts: Sequence[Mount]
+    bodies: Sequence[BodyOnDrives] = ()
+    stores: Sequence[StoreFile] = ()
+
+
+@cache
+def eds_cache() -> EdsCache:
+    """Return the descriptions that this process has read: benches come and go."""
+    return EdsCache()
+
+
+def parts_of(plan: RigPlan) -> Parts:
+    """Make the devices of a rig file and put them on their wires.
+
+    Raises:
+        Refused: a device cannot be made, such as of an EDS that cannot be read.
+        ValueError: options that its type does not take.
+    """
+    alone = len(plan.wires) == 1
+    stores: dict[Path, StoreFile] = {}
+    mounts: list[Mount] = []
+    for wire in plan.wires.values():
+        devices, seed = plan.devices_on(wire.name), seed_of(plan.seed, wire.name, alone=alone)
+        if wire.type is WireType.CAN:
+            mounts.append(_bus(wire, devices, seed, stores))
+        elif devices:
+            mounts.append(_line(wire, devices, seed))
+    bodies = [_body(plan.body, mounts)] if plan.body else []
+    return Parts(mounts, bodies, tuple(stores.values()))
+
+
+def begin(plan: RigPlan, state: RigState) -> None:
+    """Set the inputs of the start, and let the faults come in their time.
+
+    Raises:
+        ValueError: no such input or fault, or not like this.
+    """
+    full = state.assembly.full_name
+    for device in plan.devices.values():
+        for name, value in device.start.items():
+            if isinstance(value, int | float | str):
+                state.operator.set(full(device.name, name), value)
+    for fault in plan.faults:
+        name = state.fault_name(fault.owner, fault.spec.name)
+        spec = fault.spec
+        state.operator.fault(0, FaultSpec(name, spec.rate, spec.from_us, spec.to_us))
+
+
+def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount:
+    made = [configure(device.type, device.config, seed) for device in devices]
+    mount = LineMount(wire.name, *_settings(wire, made))
+    for device, configured in zip(devices, made, strict=True):
+        mount.add(device.name, configured.device, seed)
+    return mount
+
+
+def _settings(
+    wire: WirePlan, made: Sequence[ConfiguredDevice]
+) -> tuple[LineSettings, ByteLine | None]:
+    """Return what a line is like, and the line if its device does not make it."""
+    settings = made[0].type.line
+    settings = replace(settings, baud=wire.bit_rate or settings.baud)
+    if not wire.given:
+        return settings, None
+    buffer = {} if wire.buffer_bytes is None else {"buffer_bytes": wire.buffer_bytes}
+    if wire.type is WireType.SERIAL:
+        make = partial(settings.wire, **buffer) if buffer else settings.wire
+        if wire.framing != "8N1":
+            make = partial(SerialLine, frame_bits=wire.frame_bits, **buffer)
+        return replace(settings, wire=make), None
+    shared = Rs485Line(
+        settings.baud,
+        wire.frame_bits,
+        ends=len(made) + 1,
+        echo=wire.echo,
+        bursts=wire.bursts,
+        **buffer,
+    )
+    return settings, shared
+
+
+def _bus(
+    wire: WirePlan, devices: Iterable[DevicePlan], seed: int, stores: dict[Path, StoreFile]
+) -> BusMount:
+    mount = BusMount(wire.name, wire.bit_rate or BIT_RATE, seed)
+    for device in devices:
+        mount.add(device.name, _slave(device, stores))
+    return mount
+
+
+def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> CanopenSlave:
+    kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
+    description = describe(eds_cache(), kind, device.profile or AUTO)
+    node_id = description.node_id if device.node_id is None else device.node_id
+    if node_id is None:
+        raise ValueError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
+    dictionary, memory = description.make_dictionary(), None
+    if device.store:
+        if device.store not in stores:
+            stores[device.store] = StoreFile(device.store)
+        memory = stores[device.store].nonvolatile(device.name, dictionary)
+    return make_slave(dictionary, node_id, memory, description.application)
+
+
+def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:
+    nodes: Mapping[str, Node] = {
+        name: node
+        for mount in mounts
+        if isinstance(mount, BusMount)
+        for name, node in mount.nodes.items()
+    }
+    wheels = [
+        Wheel(wheel, nodes[drive], -1 if wheel in plan.mirrored else 1)
+        for wheel, drive in plan.drives.items()
+    ]
+    return BodyOnDrives(WheeledBody(BodyParameters(kind=plan.kind, **plan.parameters)), wheels)
