@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.record.replay import read_recording
-from tickrig.emulators.record.trace import Mark
 from tickrig.emulators.testing.signals.fields import number
+from tickrig.host.text.trace import Mark
 
 Points = Sequence[tuple[int, float]]
 """Times in microseconds, and values."""
