@@ -24,6 +24,7 @@ REAL32_MAX: Final = 3.4028234663852886e38
 REAL64_MAX: Final = 1.7976931348623157e308
 
 _NAME: Final = re.compile(r"0x([0-9A-Fa-f]{4})(?::([0-9]{1,3}|0x[0-9A-Fa-f]{1,2}))?")
+FRACTIONS: Final = (DataType.REAL32, DataType.REAL64)
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 
 
@@ -98,6 +99,7 @@ class ObjectSignal:
             low,
             high,
             data_type.name,
+            real=data_type in FRACTIONS,
         )
 
     def read(self) -> Setting:
@@ -146,7 +148,7 @@ class ObjectSignal:
 
 
 def _is_number(data_type: DataType) -> bool:
-    return data_type.is_integer or data_type in (DataType.REAL32, DataType.REAL64)
+    return data_type.is_integer or data_type in FRACTIONS
 
 
 def _access(entry: Entry) -> str:
