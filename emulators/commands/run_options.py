@@ -61,9 +61,20 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
 
     return add_options(
         click.option("--link", type=PATH, help="Symbolic link to make to the terminal."),
+        click.option(
+            "--serve",
+            multiple=True,
+            metavar="URL",
+            shell_complete=_complete_serve,
+            help="rfc2217://[HOST:]PORT or socket://[HOST:]PORT to serve; may be repeated.",
+        ),
         click.option("--trace", type=PATH, help="File to record the run in, for 'tickrig replay'."),
         run_options(wire_faults, device_faults),
     )
+
+
+def _complete_serve(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
+    return [url for url in ("rfc2217://", "socket://") if url.startswith(begun)]
 
 
 def run_named(name: str, options: Mapping[str, Any]) -> int:

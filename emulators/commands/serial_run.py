@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,10 +19,15 @@ from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator
-from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.emulators.serial.network.network_port import NetworkPort
+from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
+from tickrig.emulators.serial.serial_hub import SerialHub
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.text.trace import Header
+
+if TYPE_CHECKING:
+    from tickrig.emulators.serial.pty_port import PtyPort
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,12 +35,13 @@ class Options(RunOptions):
     """What the command lines of all serial emulators share (`line_options`)."""
 
     link: Path | None = None
+    serve: tuple[str, ...] = ()
     panel: bool = False
 
     @property
     def in_real_time(self) -> bool:
         """A scenario alone runs in virtual time."""
-        return not self.scenario or bool(self.link or self.control or self.panel)
+        return not self.scenario or bool(self.link or self.serve or self.control or self.panel)
 
 
 def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
@@ -69,6 +75,9 @@ class SerialRun(EmulatorRun):
         self._type, self._device = configured.type, configured.device
         self._config = configured.config
         self._options = options
+        with refused_at("--serve"):
+            self._urls = [parse_serve_url(url) for url in options.serve]
+        self._places: list[str] = []
 
     def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
         if self._options.panel:
@@ -93,27 +102,52 @@ class SerialRun(EmulatorRun):
         return not self._options.panel
 
     def _open(self, stack: ExitStack) -> Emulator:
-        options = self._options
-        pty = self._open_pty(stack) if options.in_real_time else None
+        ports = self._open_ports(stack) if self._options.in_real_time else []
+        for port in ports:
+            port.watch_setting(self._type.line.baud, self._show_setting)
         return Emulator(
             self._type.name,
             self._device,
-            outside=pty,
-            clock=self._clock if pty else None,
-            seed=options.seed,
+            outside=SerialHub(ports) if len(ports) > 1 else next(iter(ports), None),
+            clock=self._clock if ports else None,
+            seed=self._options.seed,
             trace=self._open_trace(),
-            link=str(options.link or pty.path) if pty else "",
+            link=next(iter(self._places), ""),
             line=self._type.line,
         )
 
+    def _open_ports(self, stack: ExitStack) -> list[PtyPort | NetworkPort]:
+        """Open where hosts come in: a pty if one is named or there is nothing else."""
+        ports: list[PtyPort | NetworkPort] = []
+        if self._options.link or not self._urls:
+            ports.append(self._open_pty(stack))
+        ports += [self._serve(stack, url) for url in self._urls]
+        return ports
+
     def _open_pty(self, stack: ExitStack) -> PtyPort:
+        from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
+
         try:
             pty = PtyPort(self._options.link)
         except OSError as error:
             refuse_path("link", error)
         stack.callback(pty.close)
-        pty.watch_setting(self._type.line.baud, self._show_setting)
+        self._places.append(str(self._options.link or pty.path))
         return pty
+
+    def _serve(self, stack: ExitStack, url: ServeUrl) -> NetworkPort:
+        try:
+            port = NetworkPort(url)
+        except OSError as error:
+            raise Refused(f"--serve {url}: {error.strerror or error}") from error
+        stack.callback(port.close)
+        self._places.append(port.url)
+        if port.is_open_to_others:
+            say(
+                f"Whoever reaches port {port.port} of {port.address} can drive this device: there"
+                " is no password. Leave out the host to serve this machine alone."
+            )
+        return port
 
     def _show_setting(self, setting: str) -> None:
         if not self._options.panel:
@@ -150,11 +184,11 @@ class SerialRun(EmulatorRun):
     def _greet(self, bench: RunningEmulator) -> None:
         if self._options.panel:
             return
-        click.echo(bench.link)
+        click.echo("\n".join(self._places))
         control = self._options.control
         shown, baud = self._type, self._type.line.baud
         talk = shown.talk(bench.link, baud)
-        say(f"{shown.title} at {bench.link}, {baud} 8N1. Ctrl-C ends.{talk}")
+        say(f"{shown.title} at {', '.join(self._places)}, {baud} 8N1. Ctrl-C ends.{talk}")
         way = "--control PATH or --panel" if shown.panel else "--control PATH"
         say(
             f"  tickrig ctl {control} describe"

@@ -22,9 +22,12 @@ from tickrig.wire.instant import NEVER
 
 
 class Outside(Port[bytes], Protocol):
-    """Where the host is: a pty."""
+    """Where the host is: a pty, a network port, or several of these."""
 
-    lost: int
+    @property
+    def lost(self) -> int:
+        """Bytes dropped because the host did not read."""
+        ...
 
     @property
     def host_setting(self) -> str:

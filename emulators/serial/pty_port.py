@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.twin import NonCopyable
+from tickrig.emulators.serial.host_setting import HostSetting
 from tickrig.emulators.serial.pty_link import PtyLink
 from tickrig.wire.instant import NEVER
-
-LOOK_US: Final = 500_000
 
 BAUDS: Final = {
     code: int(name[1:])
@@ -23,48 +22,12 @@ BAUDS: Final = {
 """Bit rates by their number in a termios; others have none."""
 
 
-class HostSetting:
-    """Tells, once each, the settings in which a device would not understand its host.
+def setting_of(terminal: int) -> str:
+    """Return rate, bits, parity and stop bits, as `115200 8N1`.
 
     Linux keeps the bit rate, the stop bits and whether parity is odd. A pseudo-terminal always
     has 8 bits, and even parity cannot be told from none.
-
-    Args:
-        terminal: either side, open.
-        baud: the device's rate, with 8N1. It is set, so that a host which sets nothing has it.
-        notify: called with a setting as `9600 8N1` that is not the device's.
-
-    Attributes:
-        differing: the present setting, if it is not the device's.
     """
-
-    def __init__(self, terminal: int, baud: int, notify: Callable[[str], None]) -> None:
-        self._terminal, self._notify = terminal, notify
-        self._notified: set[str] = set()
-        self._next_us = 0
-        self.differing = ""
-        codes = [code for code, rate in BAUDS.items() if rate == baud]
-        self._known = bool(codes)
-        if codes:
-            attributes = termios.tcgetattr(terminal)
-            attributes[4:6] = codes[0], codes[0]
-            termios.tcsetattr(terminal, termios.TCSANOW, attributes)
-        self._wanted = setting_of(terminal)
-
-    def look(self, now_us: int) -> None:
-        """Look whether it differs, every now and then."""
-        if not self._known or now_us < self._next_us:
-            return
-        self._next_us = now_us + LOOK_US
-        setting = setting_of(self._terminal)
-        self.differing = "" if setting == self._wanted else setting
-        if self.differing and setting not in self._notified:
-            self._notified.add(setting)
-            self._notify(setting)
-
-
-def setting_of(terminal: int) -> str:
-    """Return rate, bits, parity and stop bits, as `115200 8N1`."""
     _, _, flags, _, _, speed, _ = termios.tcgetattr(terminal)
     bits = {termios.CS5: 5, termios.CS6: 6, termios.CS7: 7}.get(flags & termios.CSIZE, 8)
     parity = "O" if flags & termios.PARODD else "E" if flags & termios.PARENB else "N"
@@ -125,8 +88,19 @@ class PtyPort(NonCopyable):
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`."""
-        self._setting = HostSetting(self._slave, baud, notify)
+        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`.
+
+        Args:
+            baud: the device's rate in bit/s, with 8N1; one without a name is not watched.
+            notify: called with a setting as `9600 8N1` that is not the device's.
+        """
+        codes = [code for code, rate in BAUDS.items() if rate == baud]
+        if not codes:
+            return
+        slave, attributes = self._slave, termios.tcgetattr(self._slave)
+        attributes[4:6] = codes[0], codes[0]
+        termios.tcsetattr(slave, termios.TCSANOW, attributes)
+        self._setting = HostSetting(lambda: setting_of(slave), setting_of(slave), notify)
 
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""

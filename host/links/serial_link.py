@@ -7,6 +7,7 @@ import os
 import stat
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,11 @@ NEGOTIATED: Final = ("rfc2217:",)
 """URLs under which each change of a port setting is a dialogue of 100 ms with the other end."""
 
 NEGOTIATED_WAIT_S: Final = 0.002
+
+UNCOUNTED: Final = ("socket:",)
+"""URLs under which pyserial only knows whether bytes are waiting, not how many."""
+
+READ_BYTES: Final = 4_096
 
 
 class SerialLink:
@@ -35,7 +41,8 @@ class SerialLink:
     """
 
     def __init__(self, url: str, baud: int = 115_200, *, exclusive: bool = True) -> None:
-        self._url, self._negotiated = url, url.startswith(NEGOTIATED)
+        self._url = url
+        self._negotiated, self._uncounted = url.startswith(NEGOTIATED), url.startswith(UNCOUNTED)
         wait_s = NEGOTIATED_WAIT_S if self._negotiated else 0
         write_timeout_s = None if self._negotiated else 1  # pyserial has none there
         try:
@@ -82,7 +89,7 @@ class SerialLink:
         """
         try:
             first = self._wait_for_byte(timeout_us)
-            return first + self._port.read(self._port.in_waiting) if first else b""
+            return first + self._take_rest() if first else b""
         except (serial.SerialException, OSError, TypeError) as error:
             raise LinkClosed(f"cannot read from {self._url!r}: {error}") from error
 
@@ -98,6 +105,14 @@ class SerialLink:
         while not (first := self._port.read(1)) and self.now_us < until_us:
             continue
         return first
+
+    def _take_rest(self) -> bytes:
+        if not self._uncounted:
+            return self._port.read(self._port.in_waiting)
+        self._port.timeout = 0
+        with suppress(serial.SerialException):  # the end of it, which the next look finds too
+            return self._port.read(READ_BYTES)
+        return b""
 
 
 LOCKS: Final = Path("/proc/locks")

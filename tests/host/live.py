@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-import serial
-from serial.rfc2217 import PortManager
-
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.serial.emulator import Emulator, Outside
+from tickrig.emulators.serial.network.network_port import NetworkPort
+from tickrig.emulators.serial.network.serve_url import ServeUrl
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.control.clock import RealClock
 from tickrig.host.control.requests import VERSION, Object
-from tickrig.wire.instant import NEVER
 
 JOIN_S = 5.0
 T = TypeVar("T")
@@ -112,57 +109,8 @@ def pty() -> Iterator[PtyPort]:
         port.close()
 
 
-class TcpPort:
-    """A `Port[bytes]` that takes one connection on the loopback interface."""
-
-    due_us = NEVER
-    lost, host_setting = 0, ""
-
-    def __init__(self) -> None:
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self._listener.setblocking(False)
-        self._connection: socket.socket | None = None
-        self.number: int = self._listener.getsockname()[1]
-
-    def poll(self, now_us: int, /) -> bytes:
-        with contextlib.suppress(BlockingIOError):
-            if self._connection is None:
-                self._connection, _ = self._listener.accept()
-                self._connection.setblocking(False)
-                self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            return self._connection.recv(4_096)
-        return b""
-
-    def send(self, now_us: int, traffic: bytes, /) -> None:
-        if self._connection is not None:
-            with contextlib.suppress(ConnectionError):  # the host hung up
-                self._connection.sendall(traffic)
-
-    def close(self) -> None:
-        self._listener.close()
-        if self._connection is not None:
-            self._connection.close()
-
-
-class Rfc2217Port(TcpPort):
-    """The same behind telnet with the serial options of RFC 2217, as a serial server has it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._settings = serial.serial_for_url("loop://", baudrate=115_200)
-        # typeshed wants two pyserial ports; the manager wants one port and a writer (pyserial docs)
-        self._manager = PortManager(self._settings, self)  # type: ignore[arg-type]
-
-    def write(self, data: bytes) -> None:
-        """Send what the port manager answers to a negotiation."""
-        super().send(0, data)
-
-    def poll(self, now_us: int, /) -> bytes:
-        return b"".join(self._manager.filter(super().poll(now_us)))
-
-    def send(self, now_us: int, traffic: bytes, /) -> None:
-        super().send(now_us, b"".join(self._manager.escape(traffic)))
-
-    def close(self) -> None:
-        self._settings.close()
-        super().close()
+@contextlib.contextmanager
+def served(scheme: str) -> Iterator[NetworkPort]:
+    """Serve a line to this machine, as `rfc2217` or `socket`, and give the port back."""
+    with contextlib.closing(NetworkPort(ServeUrl(scheme))) as port:
+        yield port

@@ -4,6 +4,7 @@ import contextlib
 import gc
 import grp
 import os
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.host.live import LiveRrc, Rfc2217Port, TcpPort, live_rrc, pty
+from tests.host.live import LiveRrc, live_rrc, pty, served
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
@@ -103,15 +104,30 @@ def test_the_client_works_on_a_socket() -> None:
 @pytest.mark.filterwarnings("ignore:set:DeprecationWarning")  # of pyserial's own thread
 def test_the_client_works_on_a_serial_server_of_rfc_2217() -> None:
     with (
-        contextlib.closing(Rfc2217Port()) as port,
+        served("rfc2217") as port,
         live_rrc(port) as rrc,
-        RrcClient.open(f"rfc2217://127.0.0.1:{port.number}") as client,
+        RrcClient.open(port.url) as client,
     ):
         drive_forward(client, rrc)
         assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
         start_us = client.now_us
         client.run_for(100_000)
         assert client.now_us - start_us < 1_000_000
+
+
+@pytest.mark.realtime
+def test_a_socket_gives_all_that_is_there_at_once() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        link = SerialLink("socket://{}:{}".format(*server.getsockname()))
+        connection, _ = server.accept()
+        with contextlib.closing(link):
+            connection.sendall(bytes(100))
+            assert len(link.receive(5_000_000)) == 100
+            connection.sendall(b"x")
+            connection.close()
+            assert link.receive(5_000_000) == b"x"
+            with pytest.raises(LinkClosed, match="cannot read from 'socket:"):
+                link.receive(5_000_000)
 
 
 @pytest.mark.realtime
@@ -128,9 +144,9 @@ def test_status_lines_are_whole_on_a_socket() -> None:
 def socket_client() -> Iterator[tuple[RrcClient, LiveRrc]]:
     """A client on a TCP socket, and the emulator at the other end."""
     with contextlib.ExitStack() as stack:
-        port = stack.enter_context(contextlib.closing(TcpPort()))
+        port = stack.enter_context(served("socket"))
         rrc = stack.enter_context(live_rrc(port))
-        client = RrcClient.open(f"socket://127.0.0.1:{port.number}")
+        client = RrcClient.open(port.url)
         yield stack.enter_context(client), rrc
 
 
@@ -153,9 +169,9 @@ def lost_client(request: pytest.FixtureRequest) -> Iterator[RrcClient]:
             url = port.path
             emulator.enter_context(live_rrc(port))
         else:
-            tcp = emulator.enter_context(contextlib.closing(TcpPort()))
-            url = f"socket://127.0.0.1:{tcp.number}"
-            emulator.enter_context(live_rrc(tcp))
+            network = emulator.enter_context(served("socket"))
+            url = network.url
+            emulator.enter_context(live_rrc(network))
         client = RrcClient.open(url)
     with client:
         yield client

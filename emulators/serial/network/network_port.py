@@ -1,0 +1,187 @@
+"""The host's end of a serial line, served over TCP."""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import logging
+import os
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import Final
+
+from tickrig.device.twin import NonCopyable
+from tickrig.emulators.serial.host_setting import HostSetting
+from tickrig.emulators.serial.network.host_connection import HostConnection
+from tickrig.emulators.serial.network.serve_url import LOOPBACK, ServeUrl
+from tickrig.wire.instant import NEVER
+
+RECEIVE_BUFFER_BYTES: Final = 4_096
+"""Of the kernel: a host that writes faster than the line is held up soon, as at a real port."""
+
+MAX_BAUD: Final = 4_000_000
+"""Above it no adapter goes: the device is on USB, and its host may set what it likes."""
+
+_log = logging.getLogger(__name__)
+
+
+class NetworkPort(NonCopyable):
+    """A `Port[bytes]` that a host reaches over TCP; hosts may come and go, one at a time.
+
+    A second host is told so in a line of text and is left, unless the present one sends no
+    more, or has not read for 30 s. While there is no host, what the device sends is gone, as
+    on a line without one. Nothing here ever waits, and what is kept for a host is bounded.
+
+    Args:
+        url: where to listen.
+        buffer_bytes: bytes kept for a host that does not read.
+
+    Attributes:
+        url: where hosts of this machine connect, as pyserial opens it, with its port.
+        address: the address that it listens at.
+        port: its TCP port.
+
+    Raises:
+        OSError: the port is taken, or the host is no address of this machine.
+    """
+
+    why_not_copied = "it is a TCP port of this machine"
+
+    def __init__(self, url: ServeUrl, buffer_bytes: int = 4_096) -> None:
+        self._listener = _listen(url)
+        self._buffer_bytes, self._baud = buffer_bytes, 115_200
+        self._host: HostConnection | None = None
+        self._lost, self._peer, self._has_refused = 0, "", False
+        self._setting: HostSetting | None = None
+        self.address, self.port = self._listener.getsockname()[:2]
+        self.url = str(replace(url, host=_reachable(self.address), port=self.port))
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the host."""
+        return NEVER
+
+    @property
+    def is_open_to_others(self) -> bool:
+        """Whether other machines can connect."""
+        return not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback
+
+    @property
+    def lost(self) -> int:
+        """Bytes dropped because a host did not read."""
+        return self._lost + (self._host.lost if self._host else 0)
+
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        return self._setting.differing if self._setting else ""
+
+    def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
+        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`.
+
+        Args:
+            baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not watched.
+            notify: called with a setting as `9600 8N1` that is not the device's.
+        """
+        self._baud = baud
+        if baud <= MAX_BAUD:
+            own = f"{baud} 8N1"
+            self._setting = HostSetting(lambda: self._present_setting or own, own, notify)
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Take some of what the host sent; let hosts come and go."""
+        data = self._host.poll(now_us) if self._host else b""
+        if self._host and self._host.mistake:
+            self._hang_up(self._host.mistake)
+        elif self._host and self._host.over:
+            self._hang_up()
+        if self._host is None or self._host.is_idle or self._host.has_ended(now_us):
+            self._accept(now_us)
+        if self._setting is not None:
+            self._setting.look(now_us)
+        return data
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Send to the host, if there is one, as much as fits; keep the rest for later."""
+        if self._host is not None:
+            self._host.send(now_us, traffic)
+
+    def close(self) -> None:
+        """Hang up, and listen no more."""
+        self._hang_up()
+        self._listener.close()
+        self._setting = None
+
+    @property
+    def _present_setting(self) -> str:
+        return self._host.setting if self._host else ""
+
+    def _accept(self, now_us: int) -> None:
+        try:
+            connection, address = self._listener.accept()
+        except OSError:  # nobody, or gone again, or no descriptor is left
+            return
+        peer = "{}:{}".format(*address[:2])
+        if self._host is not None and not self._host.has_ended(now_us):
+            self._refuse(connection, peer)
+            return
+        self._hang_up()
+        self._host, self._peer = self._connected(connection), peer
+        _log.info("%s: host %s", self.url, peer)
+
+    def _connected(self, connection: socket.socket) -> HostConnection:
+        if self.url.startswith("socket:"):
+            return HostConnection(connection, self._buffer_bytes)
+        # slow to load, and only wanted here
+        from tickrig.emulators.serial.network.rfc2217_connection import (  # noqa: PLC0415
+            Rfc2217Connection,
+        )
+
+        return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
+
+    def _refuse(self, connection: socket.socket, peer: str) -> None:
+        """Send a second host away; people are told of the first such."""
+        reason = f"{self.url} has a host already: {self._peer}"
+        HostConnection(connection, 0).leave(reason)
+        if not self._has_refused:
+            _log.warning("%s; %s was refused", reason, peer)
+        self._has_refused = True
+
+    def _hang_up(self, mistake: str = "") -> None:
+        if self._host is None:
+            return
+        if mistake:
+            _log.warning("%s: host %s was left: %s", self.url, self._peer, mistake)
+        self._host.leave(mistake)
+        self._lost += self._host.lost
+        self._host, self._has_refused = None, False
+
+
+def _listen(url: ServeUrl) -> socket.socket:
+    """Return a listening socket, non-blocking."""
+    try:
+        found = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)
+    except ValueError as error:  # what IDNA cannot take, as a..b
+        raise OSError(errno.EINVAL, f"{url.host!r} is no name of a host") from error
+    family, kind, protocol, _, address = found[0]
+    listener = socket.socket(family, kind, protocol)
+    try:
+        if os.name == "posix":  # else somebody could take the same port
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with suppress(OSError):
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        listener.bind(address)
+        listener.listen()
+    except OSError:
+        listener.close()
+        raise
+    listener.setblocking(False)
+    return listener
+
+
+def _reachable(address: str) -> str:
+    """Return the address at which this machine reaches itself."""
+    every = {"0.0.0.0": LOOPBACK, "::": "::1"}
+    return every.get(address, address)
