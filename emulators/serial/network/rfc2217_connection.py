@@ -70,15 +70,15 @@ class SafePortManager(PortManager):
             if command in (rfc2217.SET_LINESTATE_MASK, rfc2217.SET_MODEMSTATE_MASK):
                 self.rfc2217_send_subnegotiation(rfc2217.RFC2217_ANSWER_MAP[command], value[:1])
 
-    def _control_state(self, asked: int) -> int:
+    def _control_state(self, request: int) -> int:
         """Return what is answered to SET-CONTROL where pyserial has no answer, else 0."""
         port = self.serial
         for query, is_on in ((4, port.break_condition), (7, port.dtr), (10, port.rts)):
-            if asked == query:
+            if request == query:
                 return query + 1 if is_on else query + 2
-        if asked in range(13, 17):
+        if request in range(13, 17):
             return NO_FLOW_CONTROL_IN
-        return NO_FLOW_CONTROL if asked in range(17, 20) else 0
+        return NO_FLOW_CONTROL if request in range(17, 20) else 0
 
 
 class Rfc2217Connection(HostConnection):
