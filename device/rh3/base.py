@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 from tickrig.device.body.pose import Pose
 from tickrig.device.modbus.slave import ModbusSlave
@@ -79,11 +79,14 @@ class Rh3Base(Copyable):
         parameters: what it is like.
 
     Attributes:
+        type_name: what its device type is called, for traces.
         inputs: what the world does to it, see `terminals.INPUTS`.
         ground: where it is; its pose may be set.
         sides: left and right wheel with their loops.
         slave: its end of the line.
     """
+
+    type_name: ClassVar[str] = "rh3-base"
 
     def __init__(self, parameters: BaseParameters | None = None) -> None:
         self.parameters: BaseParameters = parameters or BaseParameters()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.buzzer import Buzzer
@@ -44,11 +44,13 @@ class Rrc(Copyable):
     serial driver.
 
     Attributes:
+        type_name: what its device type is called, for traces.
         config: durations, names and sizes.
         inputs: what the world does to it, see `terminals.INPUTS`.
         state: where it is in the manual's state diagram.
     """
 
+    type_name: ClassVar[str] = "rrc"
     config: RrcConfig = field(default_factory=RrcConfig)
     inputs: InputBank = field(default_factory=new_inputs)
     state: RrcState = field(default=RrcState.OFF, init=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rtc_lite.component import LiteComponent
@@ -44,12 +44,14 @@ class RtcLiteNode(Copyable):
         config: framing, execution context, rates.
 
     Attributes:
+        type_name: what its device type is called, for traces.
         inputs: what the world does to it, see `terminals.INPUTS`.
 
     Raises:
         ValueError: a component that a PIC has no room for.
     """
 
+    type_name: ClassVar[str] = "rtc-lite"
     make: Callable[[], LiteComponent]
     config: LiteConfig = field(default_factory=LiteConfig)
     inputs: InputBank = field(init=False)

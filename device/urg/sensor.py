@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.body.pose import Pose
 from tickrig.device.physical import OutputSignal, QuantityBank
@@ -33,9 +33,12 @@ class Urg(Copyable):
         world: what is around it.
 
     Attributes:
+        type_name: what its device type is called, for traces.
         inputs: what the world does to it, see `terminals.INPUTS`.
         world: it may be changed; the next scan sees it.
     """
+
+    type_name: ClassVar[str] = "urg"
 
     def __init__(self, parameters: UrgParameters | None = None, world: World | None = None) -> None:
         self.parameters, self.world = parameters or UrgParameters(), world or World()

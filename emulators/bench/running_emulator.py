@@ -8,6 +8,7 @@ from collections.abc import Callable
 from tickrig.emulators.bench.operator import Operator, WireFaults
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.record.recorder import TraceFile
+from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.record.wire_log import WireLog
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -42,7 +43,7 @@ class RunningEmulator(ABC):
         device: HasSignals,
         wire: WireFaults,
         link: str,
-        trace: TraceFile | CandumpFile | None,
+        trace: TraceFile | CandumpFile | TraceRecorder | None,
     ) -> None:
         self.name, self.wire, self.link, self.running = name, wire, link, True
         self._device, self._trace = device, trace

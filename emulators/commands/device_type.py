@@ -43,6 +43,8 @@ class DeviceType:
         is_event: which lines -v shows.
         panel: runs the operator panel until it is left.
         talk: says how to talk to it at a path and a baud rate.
+        config_of: the configuration of a device that a program has made itself, None if it cannot
+            be made again of one.
         user_code: `FILE.py:Class` whose mistakes are told in a line, if it runs such.
     """
 
@@ -58,6 +60,7 @@ class DeviceType:
     is_event: Callable[[WireLine], bool] = lambda line: True
     panel: Callable[[Emulator], None] | None = None
     talk: Callable[[str, int], str] = by_miniterm
+    config_of: Callable[[Any], Config | None] = lambda device: None
     user_code: str = ""
 
     def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:

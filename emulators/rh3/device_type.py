@@ -65,6 +65,7 @@ RH3_BASE: Final = DeviceType(
     title="RH3 base",
     build=build_rh3,
     configure=_configure,
+    config_of=lambda base: config_to_trace(base.parameters),
     line=LineSettings(splitter=frame_splitter, wire=Rs485Line),
     is_event=_is_event,
 )

@@ -59,6 +59,7 @@ RRC: Final = DeviceType(
     title="RRC",
     build=build_rrc,
     configure=_configure,
+    config_of=lambda rrc: config_to_trace(rrc.config),
     encoders={"check": _with_check},
     is_event=_is_event,
     panel=_panel,

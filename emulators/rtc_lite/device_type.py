@@ -118,6 +118,11 @@ def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
     return ConfiguredDevice(lite, device, config_to_trace(node, config))
 
 
+def _config_of(lite: RtcLiteNode) -> Config | None:
+    names = [name for name, kind in COMPONENTS.items() if kind is lite.make]
+    return config_to_trace(names[0], lite.config) if names else None
+
+
 def _talk(link: str, baud: int) -> str:
     return f" Its proxy opens this path:\n  tickrig rtc run SYSTEM.toml --lite NAME={link}@{baud}"
 
@@ -131,6 +136,7 @@ RTC_LITE: Final = DeviceType(
     title="RTC-Lite node",
     build=build_rtc_lite,
     configure=_configure,
+    config_of=_config_of,
     is_event=_is_event,
     talk=_talk,
 )

@@ -132,6 +132,7 @@ URG: Final = DeviceType(
     title="URG-04LX",
     build=build_urg,
     configure=_configure,
+    config_of=lambda urg: config_to_trace(urg.parameters, urg.world),
     line=LineSettings(wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES)),
     is_event=_is_event,
 )

@@ -68,6 +68,7 @@ class CanopenSlave(Copyable):
         on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
         sync_handlers: the same as `on_sync`, for what belongs to the slave: RPDOs, TPDOs, then
             the application.
+        model: the ready-made model that it is, empty if it is none; for traces.
         boots: returns at the end of Initialising whether the node boots or stays there.
         admits: returns before each NMT command whether it is carried out.
         entered: called as `on_state`, before it; what belongs to the slave.
@@ -93,7 +94,7 @@ class CanopenSlave(Copyable):
         self.admits: Callable[[NmtCommand], bool] = _admits
         self.entered: Callable[[NmtState, NmtState], None] | None = None
         self.time_of_day: TimeOfDay | None = None
-        self.silent_until_us = 0
+        self.silent_until_us, self.model = 0, ""
         self._powered = False
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler]

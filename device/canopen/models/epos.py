@@ -115,7 +115,9 @@ def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) ->
     Raises:
         ValueError: an impossible node-ID.
     """
-    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave.model = "epos"
+    return slave
 
 
 def dictionary() -> Dictionary:

@@ -64,7 +64,9 @@ def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = Non
     Raises:
         ValueError: an impossible node-ID.
     """
-    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave.model = "f-palette"
+    return slave
 
 
 def dictionary() -> Dictionary:

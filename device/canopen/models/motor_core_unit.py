@@ -68,7 +68,9 @@ def make_motor_core_unit(
     Raises:
         ValueError: an impossible node-ID.
     """
-    return make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
+    slave.model = "motor-core-unit"
+    return slave
 
 
 def dictionary() -> Dictionary:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -54,7 +55,7 @@ class Bench(BenchDevice):
         named = {**({} if device is None else {name_of(device): device}), **devices}
         if not named:
             raise ValueError("a bench has at least one device")
-        rig = BenchRig("bench", RigState(mounts_of(named, seed, line)))
+        rig = BenchRig("bench", RigState(mounts_of(named, seed, line), seed=seed))
         self._start(VirtualMode(rig))
 
     def _start(self, mode: BenchMode) -> None:
@@ -73,7 +74,7 @@ class Bench(BenchDevice):
             ValueError: an option, input or fault that there is not.
         """
         parts = parts_of(plan)
-        state = RigState(parts.mounts, parts.bodies)
+        state = RigState(parts.mounts, parts.bodies, seed=plan.seed)
         rig = BenchRig("bench", state)
         begin(plan, state)
         for store in parts.stores:
@@ -144,6 +145,18 @@ class Bench(BenchDevice):
     def transcript(self) -> str:
         """Return the latest lines and frames, and what was done: time, where, direction, text."""
         return text_of(self._mode.journal())
+
+    def save_trace(self, path: Path | str) -> None:
+        """Save what all devices received, sent and suffered, for `tickrig replay`.
+
+        Args:
+            path: the file; one that exists is replaced.
+
+        Raises:
+            NotOnThisBench: real devices; what passes their ports can be recorded.
+            OSError: the file cannot be written.
+        """
+        self._mode.act(lambda rig: rig.save_trace(Path(path)))
 
     def fork(self) -> Bench:
         """Return a twin of the bench that goes on from here by itself, in virtual time.

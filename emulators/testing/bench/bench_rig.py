@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives
 from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.rig import OutsideBridge, Rig
 from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import Journal
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
@@ -42,17 +46,33 @@ class RigState(Copyable):
         bodies: what drives move, seen as devices `body` too.
         bridges: joints with the outside world.
         clock: a `VirtualClock` unless given.
+        seed: of all chance, for the trace.
+        trace: the file in which the run is recorded; without it it is kept in memory, if `keeps`.
+        keeps: whether the run is recorded at all without a file.
+
+    Raises:
+        OSError: the file cannot be opened.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - options, by keyword
         self,
         mounts: Sequence[Mount],
         bodies: Sequence[BodyOnDrives] = (),
         bridges: Sequence[OutsideBridge] = (),
         clock: Clock | None = None,
+        *,
+        seed: int = 0,
+        trace: Path | None = None,
+        keeps: bool = True,
     ) -> None:
         self.mounts = {mount.name: mount for mount in mounts}
-        stations = [station for mount in mounts for station in mount.stations]
+        header = BenchHeader(
+            {name: entry for mount in mounts for name, entry in mount.entries.items()},
+            {mount.name: mount.wire_entry for mount in mounts},
+            seed,
+        )
+        self.recorder = TraceRecorder(trace, header) if trace or keeps else None
+        stations = [station for mount in mounts for station in mount.stations(self.recorder)]
         self.rig = Rig(*stations, bridges=bridges, couplings=bodies, clock=clock)
         for mount in mounts:
             if isinstance(mount, BusMount):
@@ -93,7 +113,7 @@ class BenchRig(RunningEmulator):
     """
 
     def __init__(self, name: str, state: RigState, link: str = "") -> None:
-        super().__init__(name, state.assembly, state.faults, link, None)
+        super().__init__(name, state.assembly, state.faults, link, state.recorder)
         self.state, self.rig, self.operator = state, state.rig, state.operator
         self.event_queue = state.rig.event_queue
         self.log = self.journal = Journal()
@@ -108,13 +128,19 @@ class BenchRig(RunningEmulator):
     def _note(self, text: str) -> None:
         """Note what was done; the signals and faults of what is alone have no prefix."""
         source, slash, what = text.partition("/")
+        of_wire = text.partition("=")[0] in self.wire.fault_types
         if not slash:
-            name = text.partition("=")[0]
-            places = (
-                self.state.mounts if name in self.wire.fault_types else self.state.assembly.parts
-            )
+            places = self.state.mounts if of_wire else self.state.assembly.parts
             source, what = next(iter(places)), text
+        if of_wire and self.state.recorder:
+            self.state.recorder.wire_fault(self.effective_us, source, what)
         self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
+
+    def save_trace(self, path: Path) -> None:
+        """Write what was recorded in memory; OSError if it cannot be."""
+        if self.state.recorder is None:
+            raise NotOnThisBench("nothing was recorded on this bench")
+        self.state.recorder.save(path, self.rig.now_us)
 
     @property
     def _host_due_us(self) -> int:

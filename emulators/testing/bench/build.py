@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.emulators.commands.device_config import configure
-from tickrig.emulators.commands.device_type import DeviceType
+from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of
+from tickrig.host.text.bench_header import DeviceEntry
+from tickrig.host.text.trace import Config
 
 BUS: Final = "can"
 """The bus that nodes share where nobody says otherwise."""
@@ -34,24 +37,39 @@ def mounts_of(
         if isinstance(device, CanopenSlave):
             mount = mounts.setdefault(BUS, BusMount(BUS, seed=seed))
             assert isinstance(mount, BusMount)
-            mount.add(name, device)
+            mount.add(name, device, DeviceEntry(BUS, device.model, {}, device.configured_id))
             continue
-        settings, made = _of_type(device, seed)
-        mounts[name] = lone = LineMount(name, line or settings)
-        lone.add(name, made, seed_of(seed, name, alone=len(devices) == 1))
+        made = _of_type(device, seed)
+        mounts[name] = lone = LineMount(name, line or made.line)
+        entry = DeviceEntry(name, made.type, made.config)
+        lone.add(name, made.device, entry, seed_of(seed, name, alone=len(devices) == 1))
     return list(mounts.values())
 
 
-def _of_type(
-    device: Emulated[bytes] | DeviceType | str, seed: int
-) -> tuple[LineSettings, Emulated[bytes]]:
-    """Return a device and what its line is like."""
+class _Made(NamedTuple):
+    """A device, what its line is like, and what a trace says of it."""
+
+    device: Emulated[bytes]
+    line: LineSettings
+    type: str = ""
+    config: Config = MappingProxyType({})
+
+
+def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:
+    """Return a device that is given, or that its type makes."""
     if isinstance(device, str):
         made = configure(device, {}, seed)
-        return made.type.line, made.device
+        return _Made(made.device, made.type.line, made.type.name, made.config)
     if isinstance(device, DeviceType):
-        return device.line, device.build({})
-    return LineSettings(), device
+        return _Made(device.build({}), device.line, device.name)
+    name = getattr(device, "type_name", "")
+    if not name:
+        return _Made(device, LineSettings())
+    device_type = DEVICES.load(name)
+    config = device_type.config_of(device)
+    if config is None:
+        return _Made(device, device_type.line)
+    return _Made(device, device_type.line, name, config)
 
 
 def name_of(device: BenchedDevice) -> str:

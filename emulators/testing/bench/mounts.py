@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final, Generic
 from zlib import crc32
 
@@ -14,11 +14,13 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Station
 from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.host.text.bench_header import DeviceEntry, WireEntry, WireType
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
@@ -73,6 +75,7 @@ class LineMount(Copyable):
     Attributes:
         line: the line.
         devices: by name.
+        entries: what a trace says of each.
         tap: what passes the first device's end, faults of the line included.
     """
 
@@ -82,15 +85,18 @@ class LineMount(Copyable):
         self._free = [self.line.a, *getattr(self.line, "ends", ())[2:]]
         self.tap = DeviceTap(self._free[0])
         self.devices: dict[str, Emulated[bytes]] = {}
-        self.stations: list[Station[bytes]] = []
+        self.entries: dict[str, DeviceEntry] = {}
         self._ports: list[FaultyPort[bytes]] = []
 
-    def add(self, name: str, device: Emulated[bytes], seed: int = 0) -> None:
+    def add(
+        self, name: str, device: Emulated[bytes], entry: DeviceEntry | None = None, seed: int = 0
+    ) -> None:
         """Put a device on the line.
 
         Args:
             name: of the device.
             device: the device.
+            entry: what a trace says of it, if it can be built again.
             seed: of the chance in the faults of its end.
 
         Raises:
@@ -100,8 +106,7 @@ class LineMount(Copyable):
             raise ValueError(f"{self.name} has no end for {name}: it is for {len(self.devices)}")
         end = self._free.pop(0)
         port = FaultyPort(end if self.devices else self.tap, self.settings.faults, seed)
-        self.devices[name] = device
-        self.stations.append(Station(device, port))
+        self.devices[name], self.entries[name] = device, entry or DeviceEntry(self.name)
         self._ports.append(port)
 
     @property
@@ -113,6 +118,16 @@ class LineMount(Copyable):
     def parts(self) -> Mapping[str, HasSignals]:
         """The physical side of each device."""
         return self.devices
+
+    @property
+    def wire_entry(self) -> WireEntry:
+        """What a trace says of the line."""
+        return WireEntry(WireType.SERIAL, {"baud": self.settings.baud})
+
+    def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[bytes]]:
+        """Return the devices on the line, recorded if that is wanted."""
+        for (name, device), port in zip(self.devices.items(), self._ports, strict=True):
+            yield Station(recorder.device(name, device) if recorder else device, port)
 
     @property
     def lost(self) -> int:
@@ -134,17 +149,25 @@ class BusMount(Copyable):
     Attributes:
         wire: the bus.
         nodes: by name.
+        entries: what a trace says of each.
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
         self.name, self.wire = name, CanWire(bit_rate, seed)
         self.nodes: dict[str, Node] = {}
+        self.entries: dict[str, DeviceEntry] = {}
         self.open_end(frozenset())
 
-    def add(self, name: str, slave: CanopenSlave) -> Node:
-        """Put a slave on the bus."""
-        node = self.nodes[name] = Node(name, slave, self.wire)
-        return node
+    def add(self, name: str, slave: CanopenSlave, entry: DeviceEntry | None = None) -> None:
+        """Put a slave on the bus.
+
+        Args:
+            name: of the node.
+            slave: the slave.
+            entry: what a trace says of it, if it can be built again.
+        """
+        self.nodes[name] = Node(name, slave, self.wire)
+        self.entries[name] = entry or DeviceEntry(self.name)
 
     def open_end(self, accepts: frozenset[int] | None = None) -> CanEnd:
         """Connect an end for a host; it comes back from bus-off at once."""
@@ -163,9 +186,14 @@ class BusMount(Copyable):
         return {name: Nodes([node]) for name, node in self.nodes.items()}
 
     @property
-    def stations(self) -> Sequence[Station[Frames]]:
-        """The nodes on the bus."""
-        return [Station(node, node.port) for node in self.nodes.values()]
+    def wire_entry(self) -> WireEntry:
+        """What a trace says of the bus."""
+        return WireEntry(WireType.CAN, {"bit_rate": self.wire.bit_rate})
+
+    def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[Frames]]:
+        """Return the nodes on the bus, recorded if that is wanted."""
+        for name, node in self.nodes.items():
+            yield Station(recorder.device(name, node) if recorder else node, node.port)
 
     @property
     def lost(self) -> int:

@@ -33,6 +33,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     WirePlan,
     WireType,
 )
+from tickrig.host.text.bench_header import DeviceEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,8 @@ def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount
     made = [configure(device.type, device.config, seed) for device in devices]
     mount = LineMount(wire.name, *_settings(wire, made))
     for device, configured in zip(devices, made, strict=True):
-        mount.add(device.name, configured.device, seed)
+        entry = DeviceEntry(wire.name, device.type, configured.config)
+        mount.add(device.name, configured.device, entry, seed)
     return mount
 
 
@@ -131,11 +133,12 @@ def _bus(
 ) -> BusMount:
     mount = BusMount(wire.name, wire.bit_rate or BIT_RATE, seed)
     for device in devices:
-        mount.add(device.name, _slave(device, stores))
+        mount.add(device.name, *_slave(device, stores))
     return mount
 
 
-def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> CanopenSlave:
+def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[CanopenSlave, DeviceEntry]:
+    """Return a slave, and what a trace says of it."""
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = describe(eds_cache(), kind, device.profile or AUTO)
     node_id = description.node_id if device.node_id is None else device.node_id
@@ -146,7 +149,8 @@ def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> CanopenSlave:
         if device.store not in stores:
             stores[device.store] = StoreFile(device.store)
         memory = stores[device.store].nonvolatile(device.name, dictionary)
-    return make_slave(dictionary, node_id, memory, description.application)
+    slave = make_slave(dictionary, node_id, memory, description.application)
+    return slave, DeviceEntry(device.wire, device.type, {}, node_id)
 
 
 def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tickrig import Bench
-from tickrig.device import Rrc, make_epos, make_f_palette
+from tickrig.device import Rrc, RrcConfig, make_epos, make_f_palette
 from tickrig.host import RrcClient
 
 
@@ -141,3 +143,19 @@ def test_a_type_is_known_by_its_name() -> None:
     with Bench("rtc-lite") as bench:
         bench.run_for("1s")
         assert bench.devices == ("rtc_lite",)
+
+
+def test_a_run_is_saved(tmp_path: Path) -> None:
+    trace = tmp_path / "run.trace"
+    with Bench(Rrc(RrcConfig(power_on_ticks=5)), left=make_epos(1), seed=3) as bench:
+        bench["rrc"].press("power_button")
+        bench["rrc"].fault("flip=0.01@1s-2s")
+        bench["rrc"].link.send(b"status\n")
+        bench["left"].fault("power_off", when=lambda: bench.now_us > 1_500_000)
+        bench.canopen_network().nmt.state = "OPERATIONAL"
+        bench.run_for("3s")
+        bench.save_trace(trace)
+    text = trace.read_text("ascii")
+    assert '"power_on_ticks": 5' in text
+    assert " left ! power_off=1" in text
+    assert " rrc ~ flip=0.01" in text
