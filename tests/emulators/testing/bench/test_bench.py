@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from tickrig import Bench
-from tickrig.device import Rrc, RrcConfig, make_epos, make_f_palette
+from tickrig.device import Rrc, make_epos, make_f_palette
+from tickrig.device.rrc.config import RrcConfig
 from tickrig.host import RrcClient
 
 
