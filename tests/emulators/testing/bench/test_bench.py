@@ -153,7 +153,7 @@ def test_a_run_is_saved(tmp_path: Path) -> None:
         bench["rrc"].fault("flip=0.01@1s-2s")
         bench["rrc"].link.send(b"status\n")
         bench["left"].fault("power_off", when=lambda: bench.now_us > 1_500_000)
-        bench.canopen_network().nmt.state = "OPERATIONAL"
+        bench["left"].canopen_network().nmt.state = "OPERATIONAL"
         bench.run_for("3s")
         bench.save_trace(trace)
     text = trace.read_text("ascii")
