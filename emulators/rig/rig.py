@@ -309,6 +309,7 @@ class Rig(Copyable):
         if self.watchers:
             for watch in tuple(self.watchers):
                 watch(self.now_us)
+            self._enter_due()
 
     def _act(self, now_us: int) -> None:
         """Do what is due at `now_us`, before the tick of that time."""
