@@ -10,11 +10,11 @@ from typing import Self
 from tickrig.emulators.canopen.build import store_keeper
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
-from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
+from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.mode import BenchMode
-from tickrig.emulators.testing.bench.plan_parts import begin, parts_of
+from tickrig.emulators.testing.bench.plan_parts import begin_faults, parts_of
 from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 
@@ -55,7 +55,7 @@ class Bench(BenchDevice):
         named = {**({} if device is None else {name_of(device): device}), **devices}
         if not named:
             raise ValueError("a bench has at least one device")
-        rig = BenchRig("bench", RigState(mounts_of(named, seed, line), seed=seed))
+        rig = BenchRig("bench", RigState(Parts(mounts=mounts_of(named, seed, line), seed=seed)))
         self._start(VirtualMode(rig))
 
     def _start(self, mode: BenchMode) -> None:
@@ -74,9 +74,9 @@ class Bench(BenchDevice):
             ValueError: an option, input or fault that there is not.
         """
         parts = parts_of(plan)
-        state = RigState(parts.mounts, parts.bodies, seed=plan.seed)
+        state = RigState(parts)
         rig = BenchRig("bench", state)
-        begin(plan, state)
+        begin_faults(plan, state)
         for store in parts.stores:
             state.rig.watchers.append(store_keeper(store))
         return cls.of_mode(VirtualMode(rig))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tickrig.device.twin import Copyable
@@ -10,6 +11,7 @@ from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives
 from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.rig import OutsideBridge, Rig
@@ -17,8 +19,11 @@ from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import Journal
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.emulators.testing.signals.driver import SignalDriver
+from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 
@@ -38,49 +43,84 @@ class BenchOperator(Operator):
         return self._assembly.tick_us_of(name)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """What a bench is put together of.
+
+    Attributes:
+        mounts: the devices on their wires.
+        bodies: what drives move, seen as devices `body` too.
+        start: inputs at the start, by device and name.
+        signals: values that change by themselves: `DEVICE/INPUT`, or a name for formulas.
+        stores: files in which nodes keep what they store, to be saved while time passes.
+        seed: of all chance.
+    """
+
+    mounts: Sequence[Mount]
+    bodies: Sequence[BodyOnDrives] = ()
+    start: Mapping[str, Mapping[str, Setting]] = field(default_factory=dict)
+    signals: Mapping[str, SignalSpec] = field(default_factory=dict)
+    stores: Sequence[StoreFile] = ()
+    seed: int = 0
+
+
 class RigState(Copyable):
     """What a bench consists of in virtual and in real time, and what its twin has too.
 
     Args:
-        mounts: the devices on their wires.
-        bodies: what drives move, seen as devices `body` too.
+        parts: what it is put together of.
         bridges: joints with the outside world.
         clock: a `VirtualClock` unless given.
-        seed: of all chance, for the trace.
         trace: the file in which the run is recorded; without it it is kept in memory, if `keeps`.
         keeps: whether the run is recorded at all without a file.
 
     Raises:
+        ValueError: an input or a signal that cannot be.
         OSError: the file cannot be opened.
     """
 
-    def __init__(  # noqa: PLR0913 - options, by keyword
+    def __init__(
         self,
-        mounts: Sequence[Mount],
-        bodies: Sequence[BodyOnDrives] = (),
+        parts: Parts,
+        *,
         bridges: Sequence[OutsideBridge] = (),
         clock: Clock | None = None,
-        *,
-        seed: int = 0,
         trace: Path | None = None,
         keeps: bool = True,
     ) -> None:
+        mounts = parts.mounts
         self.mounts = {mount.name: mount for mount in mounts}
-        header = BenchHeader(
-            {name: entry for mount in mounts for name, entry in mount.entries.items()},
-            {mount.name: mount.wire_entry for mount in mounts},
-            seed,
+        self.assembly = Assembly(
+            {
+                **{name: part for mount in mounts for name, part in mount.parts.items()},
+                **{body.name: Nodes([], [body]) for body in parts.bodies},
+            }
         )
-        self.recorder = TraceRecorder(trace, header) if trace or keeps else None
-        stations = [station for mount in mounts for station in mount.stations(self.recorder)]
-        self.rig = Rig(*stations, bridges=bridges, couplings=bodies, clock=clock)
+        self._start(parts.start)
+        self.recorder = (
+            TraceRecorder(trace, header_of(mounts, parts.seed)) if trace or keeps else None
+        )
+        self.rig = Rig(
+            *(station for mount in mounts for station in mount.stations(self.recorder)),
+            bridges=bridges,
+            couplings=(*parts.bodies, *self._drivers(parts)),
+            clock=clock,
+        )
         for mount in mounts:
             if isinstance(mount, BusMount):
                 self.rig.move_on(mount.wire)
-        parts = {name: part for mount in mounts for name, part in mount.parts.items()}
-        self.assembly = Assembly({**parts, **{body.name: Nodes([], [body]) for body in bodies}})
         self.faults = AssemblyFaults({mount.name: mount.faults for mount in mounts})
         self.operator = BenchOperator.at(self.assembly, self.rig, self.faults)
+
+    def _start(self, start: Mapping[str, Mapping[str, Setting]]) -> None:
+        for device, values in start.items():
+            for name, value in values.items():
+                self.assembly.parts[device].inputs.set(name, value)
+
+    def _drivers(self, parts: Parts) -> Sequence[SignalDriver]:
+        if not parts.signals:
+            return ()
+        return (SignalDriver(parts.signals, self.assembly.parts, parts.seed),)
 
     def fault_name(self, owner: str, fault: str) -> str:
         """Return the full name of a fault of a device, or of its wire, or of a wire.
@@ -97,6 +137,12 @@ class RigState(Copyable):
             if device in mount.parts:
                 return mount.name
         raise ValueError(f"no device {device!r}; known: {', '.join(self.assembly.parts)}")
+
+
+def header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
+    """Return what a trace says of a bench."""
+    entries = {name: entry for mount in mounts for name, entry in mount.entries.items()}
+    return BenchHeader(entries, {mount.name: mount.wire_entry for mount in mounts}, seed)
 
 
 class BenchRig(RunningEmulator):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.bench.bench_rig import RigState
+from tickrig.emulators.testing.bench.bench_rig import Parts, RigState
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
 from tickrig.emulators.testing.rig_file.plan import (
     BodyPlan,
@@ -33,22 +33,10 @@ from tickrig.emulators.testing.rig_file.plan import (
     WirePlan,
     WireType,
 )
+from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
 from tickrig.host.text.bench_header import DeviceEntry
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What a bench is put together of.
-
-    Attributes:
-        mounts: the devices on their wires.
-        bodies: what drives move.
-        stores: files in which nodes keep what they store, to be saved while time passes.
-    """
-
-    mounts: Sequence[Mount]
-    bodies: Sequence[BodyOnDrives] = ()
-    stores: Sequence[StoreFile] = ()
+from tickrig.host.text.values import Setting
 
 
 @cache
@@ -62,7 +50,7 @@ def parts_of(plan: RigPlan) -> Parts:
 
     Raises:
         Refused: a device cannot be made, such as of an EDS that cannot be read.
-        ValueError: options that its type does not take.
+        ValueError: options that its type does not take, or a signal that cannot be.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, StoreFile] = {}
@@ -74,20 +62,40 @@ def parts_of(plan: RigPlan) -> Parts:
         elif devices:
             mounts.append(_line(wire, devices, seed))
     bodies = [_body(plan.body, mounts)] if plan.body else []
-    return Parts(mounts, bodies, tuple(stores.values()))
+    return Parts(
+        mounts=mounts,
+        bodies=bodies,
+        start={device.name: _settings_of(device.start) for device in plan.devices.values()},
+        signals=_signals(plan),
+        stores=tuple(stores.values()),
+        seed=plan.seed,
+    )
 
 
-def begin(plan: RigPlan, state: RigState) -> None:
-    """Set the inputs of the start, and let the faults come in their time.
+def _settings_of(start: Mapping[str, object]) -> dict[str, Setting]:
+    return {key: value for key, value in start.items() if isinstance(value, int | float | str)}
 
-    Raises:
-        ValueError: no such input or fault, or not like this.
-    """
-    full = state.assembly.full_name
-    for device in plan.devices.values():
-        for name, value in device.start.items():
-            if isinstance(value, int | float | str):
-                state.operator.set(full(device.name, name), value)
+
+def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
+    """Return the signals by what they drive, `DEVICE/INPUT`, or by their names."""
+    tables = {**plan.signals} | {
+        f"{device.name}/{name}": value
+        for device in plan.devices.values()
+        for name, value in device.start.items()
+        if not isinstance(value, int | float | str)
+    }
+    return {name: _signal(name, table, plan.path) for name, table in tables.items()}
+
+
+def _signal(name: str, table: object, file: Path | None) -> SignalSpec:
+    spec = read_signal_spec(table, (name,), file.parent if file else Path())
+    if isinstance(spec, list):
+        raise ValueError("; ".join(map(str, spec)))
+    return spec
+
+
+def begin_faults(plan: RigPlan, state: RigState) -> None:
+    """Let the faults come in their time; ValueError if there is none, or it cannot be like this."""
     for fault in plan.faults:
         name = state.fault_name(fault.owner, fault.spec.name)
         spec = fault.spec

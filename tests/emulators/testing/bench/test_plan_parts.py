@@ -135,3 +135,24 @@ def test_what_a_node_stored_is_there_again(tmp_path: Path) -> None:
     with Bench.of_plan(plan) as bench:
         bench.run_for("10ms")
         assert bench.get("0x1017") == 250
+
+
+def test_inputs_follow_signals() -> None:
+    load = {"ramp": [0.0, 0.2], "over": "1s"}
+    plan = plan_of(
+        drive("left", 5, start={"load_nm": {"formula": "torque / 2"}}),
+        wires=(BUS,),
+        signals={"torque": load},
+    )
+    with Bench.of_plan(plan) as bench:
+        bench.run_for("500ms")
+        assert bench.get("load_nm") == pytest.approx(0.05, abs=1e-3)
+        twin = bench.fork()
+        twin.run_for("1s")
+        assert (twin.get("load_nm"), bench.now_us) == (0.1, 500_000)
+
+
+def test_a_signal_that_cannot_be_is_told() -> None:
+    plan = plan_of(drive("left", 5, start={"load_nm": {"ramp": [0]}}), wires=(BUS,))
+    with pytest.raises(ValueError, match=r"left/load_nm\.ramp: it takes two numbers"):
+        Bench.of_plan(plan)
