@@ -19,6 +19,10 @@ COMMANDS: Final = {
     "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
     "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
+    "report": (
+        "tickrig.emulators.testing.commands.report_cli:report_command",
+        "Make one HTML page of test runs that were kept as JSON.",
+    ),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
         "Run RT components, and work with them while they run.",
@@ -36,6 +40,7 @@ def main() -> None:
     tickrig emu rrc --link /tmp/rrc               emulate a device
     tickrig new device lamp                       begin a device of your own
     tickrig replay run.trace                      replay a recorded run
+    tickrig report run.json -o bench.html         see a test run as a page
     tickrig demo rrc                              see a device and a host at work
     tickrig rtc run system.toml                   run RT components
 

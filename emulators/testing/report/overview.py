@@ -1,0 +1,134 @@
+"""What a report says of all tests together: counts, requirements, the slowest."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import groupby
+from typing import Final
+
+from tickrig.emulators.testing.report.bench_report import BenchReport, Outcome, TestRecord
+
+SLOWEST: Final = 10
+LONGEST_ANCHOR: Final = 120
+UNWELL: Final = (Outcome.FAILED, Outcome.ERROR, Outcome.BLOCKED)
+"""What somebody has to look at."""
+
+_NO_ANCHOR: Final = re.compile(r"[^A-Za-z0-9]+")
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedTest:
+    """A test in its place on the page.
+
+    Attributes:
+        record: the test.
+        anchor: where it is, the same in each report of these tests.
+        file: what its name begins with.
+        name: the rest of it.
+    """
+
+    record: TestRecord
+    anchor: str
+    file: str
+    name: str
+
+
+class Verdict(StrEnum):
+    """What tests say about a requirement.
+
+    Attributes:
+        FAILED: a test failed, or could not be run to its end.
+        NOT_SHOWN: none failed, and none passed.
+        SHOWN: at least one passed, and none failed.
+    """
+
+    FAILED = "failed"
+    NOT_SHOWN = "not shown"
+    SHOWN = "shown"
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementRow:
+    """A requirement and its tests.
+
+    Attributes:
+        name: of the requirement.
+        text: what it demands.
+        tests: those that name it.
+    """
+
+    name: str
+    text: str
+    tests: tuple[ReportedTest, ...]
+
+    @property
+    def passed(self) -> int:
+        """How many of its tests passed."""
+        return sum(test.record.outcome is Outcome.PASSED for test in self.tests)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What its tests say; a blocked one says nothing."""
+        outcomes = {test.record.outcome for test in self.tests}
+        if outcomes & {Outcome.FAILED, Outcome.ERROR}:
+            return Verdict.FAILED
+        return Verdict.SHOWN if Outcome.PASSED in outcomes else Verdict.NOT_SHOWN
+
+
+def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
+    """Give each test its place."""
+    used: Counter[str] = Counter()
+    places = []
+    for test in tests:
+        file, _, name = test.nodeid.partition("::")
+        anchor = "t-" + _NO_ANCHOR.sub("-", test.nodeid).strip("-")[:LONGEST_ANCHOR]
+        used[anchor] += 1
+        while used[anchor] > 1:
+            anchor = f"{anchor}-{used[anchor]}"
+            used[anchor] += 1
+        places.append(ReportedTest(test, anchor, file, name or file))
+    return tuple(places)
+
+
+def by_file(tests: Sequence[ReportedTest]) -> list[tuple[str, list[ReportedTest]]]:
+    """Return the tests of each file, files as they first come."""
+    first = {test.file: number for number, test in reversed([*enumerate(tests)])}
+    ordered = sorted(tests, key=lambda test: first[test.file])
+    return [(file, list(group)) for file, group in groupby(ordered, key=lambda test: test.file)]
+
+
+def counts(tests: Iterable[TestRecord]) -> dict[Outcome, int]:
+    """Count the tests by outcome, each outcome in its order."""
+    found = Counter(test.outcome for test in tests)
+    return {outcome: found[outcome] for outcome in Outcome}
+
+
+def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list[RequirementRow]:
+    """Return the requirements, by verdict and then by name, numbers in their order."""
+    texts = {requirement.name: requirement.text for requirement in report.requirements}
+    shown_by: dict[str, list[ReportedTest]] = {name: [] for name in texts}
+    for test in tests:
+        for name in dict.fromkeys(test.record.requirements):
+            shown_by.setdefault(name, []).append(test)
+    rows = [
+        RequirementRow(name, texts.get(name, ""), tuple(shown)) for name, shown in shown_by.items()
+    ]
+    order = list(Verdict)
+    return sorted(rows, key=lambda row: (order.index(row.verdict), _natural(row.name)))
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Return a key by which SAF-9 comes before SAF-10."""
+    return [
+        (int(piece), "") if piece.isdecimal() else (-1, piece)
+        for piece in re.split(r"([0-9]{1,18})", name)
+    ]
+
+
+def slowest(tests: Iterable[ReportedTest]) -> list[ReportedTest]:
+    """Return the tests that took longest, the slowest first."""
+    return sorted(tests, key=lambda test: -test.record.wall_us)[:SLOWEST]

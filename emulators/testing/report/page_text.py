@@ -1,0 +1,73 @@
+r"""Times, sizes and foreign texts as a page writes them.
+
+>>> duration(3_100), duration(2_000_000), duration(200_000_000)
+('3.1 ms', '2.00 s', '3 min 20 s')
+>>> harmless("a\x1b[31m\u202eb\ud800")
+'a␛[31m<U+202E>b<U+D800>'
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from tickrig.host.text.values import format_time
+
+DASH: Final = "\N{EN DASH}"
+"""Where there is nothing to be told."""
+
+_UNSEEN: Final = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb"
+    "\ufffe\uffff\ud800-\udfff]"
+)
+
+
+def harmless(value: Any) -> Any:  # a template prints values of any type
+    """Return a text in which nothing is unseen: control characters, marks that turn text round."""
+    if type(value) is not str or (value.isascii() and value.isprintable()):
+        return value
+    return _UNSEEN.sub(_shown, value.replace("\r\n", "\n"))
+
+
+def _shown(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    return chr(0x2400 + code) if code < 0x20 else "␡" if code == 0x7F else f"<U+{code:04X}>"
+
+
+def duration(us: int | None) -> str:
+    """Write how long something took."""
+    match us:
+        case None:
+            return DASH
+        case _ if us < 1_000:
+            return f"{us} us"
+        case _ if us < 1_000_000:
+            return f"{us / 1_000:.3g} ms" if us < 999_500 else "1.00 s"
+        case _ if us < 100_000_000:
+            return f"{us / 1_000_000:.2f} s"
+        case _:
+            minutes, seconds = divmod(round(us / 1_000_000), 60)
+            return f"{minutes} min {seconds:02} s"
+
+
+def seconds(us: int) -> str:
+    """Write a time in seconds, no digit more than there is.
+
+    >>> seconds(630_000), seconds(2_000_000)
+    ('0.63', '2')
+    """
+    return format_time(us).rstrip("0").rstrip(".")
+
+
+def size(characters: int) -> str:
+    """Write how long a text is."""
+    return f"{characters} bytes" if characters < 1_000 else f"{characters / 1_000:.3g} kB"
+
+
+def counted(number: int, noun: str) -> str:
+    """Write a number with its noun.
+
+    >>> counted(1, "test"), counted(2, "test")
+    ('1 test', '2 tests')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,72 @@
+"""Reports in files: the page, and the JSON that it can be made of later."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from tickrig.emulators.testing.report.bench_report import BenchReport
+from tickrig.emulators.testing.report.report_json import from_json, to_json
+
+
+def write_report(report: BenchReport, path: Path) -> None:
+    """Write the page of a report; needs Jinja2 (extra `report`).
+
+    A file of this name is replaced when the new one is whole, else it stays as it is.
+
+    Raises:
+        OSError: the file cannot be written; its `filename` is `path`.
+        ImportError: Jinja2 is not there.
+    """
+    from tickrig.emulators.testing.report.page import html_page  # noqa: PLC0415 - an extra
+
+    write_whole(path, html_page(report))
+
+
+def write_run(report: BenchReport, path: Path) -> None:
+    """Write a report as JSON, whole or not at all.
+
+    Raises:
+        OSError: the file cannot be written; its `filename` is `path`.
+    """
+    write_whole(path, to_json(report) + "\n")
+
+
+def read_run(path: Path) -> BenchReport:
+    """Read a report that `write_run` wrote.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is no report; the text says where and what.
+    """
+    return from_json(path.read_text("utf-8"))
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Replace a file when its text is on the disk; what is no file, as a pipe, is written to.
+
+    Raises:
+        OSError: the file cannot be written; its `filename` is `path`.
+    """
+    data = text.encode("utf-8", "backslashreplace")
+    try:
+        place = path.resolve()
+        if place.exists() and not place.is_file():
+            place.write_bytes(data)
+        else:
+            _replace(place, data)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _replace(path: Path, data: bytes) -> None:
+    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}")
+    try:
+        beside.unlink(missing_ok=True)  # of a run that was killed
+        with beside.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tickrig.emulators.testing.report.bench_report import (
+    JournalLine,
+    Outcome,
+    PlannedFault,
+    SignalSeries,
+    TestRecord,
+    Value,
+)
+from tickrig.emulators.testing.report.timeline import Lane, Span, Timeline, timeline_of
+
+
+def line_of(
+    *series: SignalSeries,
+    faults: tuple[PlannedFault, ...] = (),
+    journal: tuple[JournalLine, ...] = (),
+    virtual_us: int | None = 1_000_000,
+) -> Timeline:
+    test = TestRecord(
+        "t", Outcome.PASSED, virtual_us=virtual_us, series=series, faults=faults, journal=journal
+    )
+    line = timeline_of(test)
+    assert line is not None
+    return line
+
+
+def lane(*points: tuple[int, Value], steps: bool = True) -> Lane:
+    return line_of(SignalSeries("v", "V", points, steps)).lanes[0]
+
+
+def test_a_step_holds_until_the_next_and_to_the_end() -> None:
+    assert lane((0, 0), (500_000, 10)).path == "M0 100H500V0H1000"
+
+
+def test_a_line_goes_straight_and_ends_with_its_last_sample() -> None:
+    drawn = lane((0, 0.0), (250_000, 10.0), (500_000, 5.0), steps=False)
+    assert drawn.path == "M0 100L250 0L500 50"
+
+
+def test_where_nothing_is_known_the_curve_has_a_gap() -> None:
+    assert lane((0, 0), (200_000, None), (400_000, 1)).path == "M0 100H200M400 0H1000"
+    drawn = lane((0, 0.0), (200_000, None), (400_000, 1.0), (500_000, 0.0), steps=False)
+    assert drawn.path == "M0 100M400 0L500 100"
+
+
+def test_words_stand_as_long_as_they_hold() -> None:
+    drawn = lane((0, "Off"), (250_000, "On"), (300_000, "On"), (500_000, None), (750_000, "Off"))
+    assert drawn.words == (Span(0, 25, "Off"), Span(25, 25, "On"), Span(75, 25, "Off"))
+    assert drawn.path == ""
+
+
+def test_a_number_that_never_changes_is_said_once() -> None:
+    drawn = lane((0, 5), (900_000, 5))
+    assert (drawn.constant, drawn.words) == (True, (Span(0, 100, "5 V"),))
+
+
+def test_zero_is_marked_where_a_curve_crosses_it() -> None:
+    assert lane((0, -5), (1, 15)).zero == 75
+    assert lane((0, 5), (1, 15)).zero is None
+
+
+def test_a_fault_lasts_from_when_it_came_to_when_it_went() -> None:
+    faults = (
+        PlannedFault("cut", 250_000, 500_000),
+        PlannedFault("stays", 900_000),
+        PlannedFault("never", when="the 3rd OK"),
+    )
+    line = line_of(faults=faults)
+    assert line.faults == (Span(25, 25, "cut"), Span(90, 10, "stays"))
+    assert [span.place for span in line.faults] == ["inside", "before"]
+    assert line.waiting == faults[2:]
+
+
+def test_actions_and_misses_are_on_the_axis() -> None:
+    journal = (
+        JournalLine(0, "", "<", "OK"),
+        JournalLine(500_000, "", "!", "cut"),
+        JournalLine(2_000_000, "", "?", "no OK"),
+    )
+    events = line_of(SignalSeries("v", points=((0, 1),)), journal=journal).events
+    assert [(event.left, event.text, event.missed) for event in events] == [
+        (50, "cut", False),
+        (100, "no OK", True),
+    ]
+
+
+def test_a_test_with_nothing_on_it_has_no_line() -> None:
+    assert timeline_of(TestRecord("t", Outcome.PASSED, virtual_us=1)) is None
+
+
+@pytest.mark.parametrize(
+    ("points", "virtual_us", "span"),
+    [
+        (((100, 1), (900, 2)), None, (0, 900)),
+        (((100, 1), (900, 2)), 1_000, (0, 1_000)),
+        (((800, 1), (900, 2)), None, (800, 900)),
+        (((5, 1),), None, (5, 6)),
+        (((0, 1),), 0, (0, 1)),
+        (((-5, 1), (5, 1)), None, (-5, 5)),
+    ],
+)
+def test_the_axis_holds_what_happened(
+    points: tuple[tuple[int, Value], ...], virtual_us: int | None, span: tuple[int, int]
+) -> None:
+    assert line_of(SignalSeries("v", points=points), virtual_us=virtual_us).axis[:] == span
+
+
+NUMBERS = st.none() | st.integers(-(10**20), 10**20) | st.floats()
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 10**13), NUMBERS | st.text()), min_size=1),
+    st.booleans(),
+    st.none() | st.integers(0, 10**13),
+)
+def test_any_samples_are_drawn_within_the_field(
+    points: list[tuple[int, Value]], steps: bool, virtual_us: int | None
+) -> None:
+    series = SignalSeries("v", points=tuple(sorted(points, key=lambda at: at[0])), steps=steps)
+    line = line_of(series, virtual_us=virtual_us)
+    for drawn in line.lanes:
+        numbers = [
+            float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", drawn.path)
+        ]
+        assert all(0 <= number <= 1_000 for number in numbers)
+        assert all(0 <= word.left <= word.left + word.width <= 100.01 for word in drawn.words)
+    assert line.size > 0
