@@ -33,8 +33,8 @@ OURS: Final = {
 HELP: Final = """\
 It runs in real time until Ctrl-C. A scenario alone runs in virtual time: as
 fast as it goes, with the same transcript each time, exit status 1 if something
-expected did not come. Together with --link or --control it is played in real
-time."""
+expected did not come. Together with --link, --serve or --control it is
+played in real time."""
 PANEL: Final = "Show an operator panel in this terminal."
 
 

@@ -108,7 +108,7 @@ class SerialRun(EmulatorRun):
         return Emulator(
             self._type.name,
             self._device,
-            outside=SerialHub(ports) if len(ports) > 1 else next(iter(ports), None),
+            outside=SerialHub(ports) if ports else None,
             clock=self._clock if ports else None,
             seed=self._options.seed,
             trace=self._open_trace(),

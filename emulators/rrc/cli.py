@@ -24,12 +24,13 @@ def main(context: click.Context, /, **options: Any) -> None:
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
     as fast as it goes, with the same transcript each time, exit status 1 if
-    something expected did not come. Together with --link or --control it is
-    played in real time.
+    something expected did not come. Together with --link, --serve or
+    --control it is played in real time.
 
     \b
     rrc-emu --link /tmp/rrc --control /tmp/rrc.ctl
     tickrig ctl /tmp/rrc.ctl press power_button
+    rrc-emu --serve rfc2217://7000
     rrc-emu --scenario drive.txt
     echo '1s press power_button' | rrc-emu --link /tmp/rrc --scenario -
     rrc-emu --link /tmp/rrc --fault flip=0.001 --fault cut@5s-7s -v

@@ -56,8 +56,8 @@ def main(context: click.Context, /, **options: Any) -> None:
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
     as fast as it goes, with the same transcript each time, exit status 1 if
-    something expected did not come. Together with --link or --control it is
-    played in real time.
+    something expected did not come. Together with --link, --serve or
+    --control it is played in real time.
 
     \b
     Faults: power_cut the supply, slow_answer; on the line noise=0.01 bytes of

@@ -47,8 +47,8 @@ def main(context: click.Context, /, **options: Any) -> None:
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
     as fast as it goes, with the same transcript each time, exit status 1 if
-    something expected did not come. Together with --link or --control it is
-    played in real time.
+    something expected did not come. Together with --link, --serve or
+    --control it is played in real time.
 
     \b
     urg-emu --link /tmp/urg --control /tmp/urg.ctl --room 4,3 --post 1,0.5,0.1
