@@ -247,8 +247,9 @@ class Rig(Copyable):
         self._enter_due()
         while not done():
             next_us = min(self._planned_us, self._wires_due_us)
-            if next_us > deadline_us:
-                self._idle_to(deadline_us)
+            if next_us > deadline_us or next_us == NEVER:
+                if deadline_us < NEVER:
+                    self._idle_to(deadline_us)
                 return done()
             self._happen(next_us)
         return True
@@ -306,10 +307,6 @@ class Rig(Copyable):
             self._act(next_us)
         else:
             self._run(next_us)
-        if self.watchers:
-            for watch in tuple(self.watchers):
-                watch(self.now_us)
-            self._enter_due()
 
     def _act(self, now_us: int) -> None:
         """Do what is due at `now_us`, before the tick of that time."""
@@ -317,6 +314,7 @@ class Rig(Copyable):
         self.acting_us = now_us
         try:
             self.event_queue.run(now_us)
+            self._watch(now_us)
         finally:
             self.acting_us = None
         self._enter_due()
@@ -346,6 +344,13 @@ class Rig(Copyable):
         self._couple(now_us)
         for bridge in self._bridges:
             bridge.give_out(now_us)
+        if self.watchers:
+            self._watch(now_us)
+            self._enter_due()
+
+    def _watch(self, now_us: int) -> None:
+        for watch in tuple(self.watchers):
+            watch(now_us)
 
     def _tick(self, now_us: int) -> None:
         """Let all devices with work compute, then send."""

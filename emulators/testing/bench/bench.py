@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self, TypeVar
 
 from tickrig.emulators.canopen.build import store_keeper
 from tickrig.emulators.serial.emulator import LineSettings
@@ -15,8 +15,14 @@ from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.mode import BenchMode
 from tickrig.emulators.testing.bench.plan_parts import begin_faults, parts_of
+from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
+from tickrig.emulators.testing.bench.triggers import Condition
 from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
 from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.host.text.values import Setting
+from tickrig.wire.instant import NEVER
+
+T = TypeVar("T")
 
 
 class Bench(BenchDevice):
@@ -142,6 +148,72 @@ class Bench(BenchDevice):
         """
         return self._mode.wait_until(done, us_of(within))
 
+    async def sleep(self, duration: Duration) -> None:
+        """Wait in an async body; other tasks go on meanwhile.
+
+        Args:
+            duration: microseconds, or a text as `"100ms"`.
+        """
+        await Wait(_never, self.now_us + us_of(duration))
+
+    async def until(self, done: Condition, within: Duration | None = None) -> bool:
+        """Wait in an async body until something is so.
+
+        Args:
+            done: says whether it is, such as `on_line("OK:beep")`; it only looks.
+            within: for how long at most; for ever unless given.
+
+        Returns:
+            False if the time was over first.
+        """
+        return await Wait(done, NEVER if within is None else self.now_us + us_of(within))
+
+    async def edge(self, name: str, within: Duration | None = None) -> Setting:
+        """Wait in an async body until an input or output changes.
+
+        Args:
+            name: of the input or output.
+            within: for how long at most; for ever unless given.
+
+        Returns:
+            Its value then: the old one if the time was over first.
+        """
+        before = self.get(name)
+        await self.until(lambda: self.get(name) != before, within)
+        return self.get(name)
+
+    def start(self, body: Coroutine[Any, Any, T]) -> Task[T]:
+        """Let an async body run beside the test from now on, whoever makes time pass.
+
+        Args:
+            body: it awaits `sleep`, `until`, `edge` or a task, and makes no time pass itself.
+
+        Returns:
+            The task; `await` it, or ask it for its `result()`.
+        """
+        return self._mode.act(lambda rig: Task(rig, body))
+
+    def run(self, body: Coroutine[Any, Any, T]) -> T:
+        """Run an async body to its end, and return what it returns.
+
+        Args:
+            body: it awaits `sleep`, `until`, `edge` or tasks that it starts.
+
+        Raises:
+            TypeError: it awaits something else, such as `asyncio.sleep`.
+            RuntimeError: what it waits for never comes.
+
+        >>> from tickrig.device.rrc.machine import Rrc
+        >>> async def body(bench):
+        ...     await bench.sleep("1s")
+        ...     bench.press("power_button")
+        ...     return await bench.edge("state")
+        >>> with Bench(Rrc()) as bench:
+        ...     bench.run(body(bench))
+        'Standby'
+        """
+        return run_body(self._mode, body)
+
     def transcript(self) -> str:
         """Return the latest lines and frames, and what was done: time, where, direction, text."""
         return text_of(self._mode.journal())
@@ -171,3 +243,7 @@ class Bench(BenchDevice):
     def close(self) -> None:
         """Give everything back."""
         self._mode.close()
+
+
+def _never() -> bool:
+    return False

@@ -49,7 +49,8 @@ class VirtualMode:
     @property
     def now_us(self) -> int:
         """The rig's time."""
-        return self._rig.rig.now_us
+        rig = self._rig.rig
+        return rig.now_us if rig.acting_us is None else rig.acting_us
 
     def wire_of(self, device: str) -> str:
         """Return the name of the wire that a device is on."""

@@ -1,0 +1,144 @@
+"""Async bodies of tests: several things that are watched and done at the same time.
+
+A body awaits times and conditions of the bench; nothing here knows asyncio, whose loop has a
+clock of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Generator
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.wire.instant import NEVER
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """What a body waits for.
+
+    Attributes:
+        done: says whether it is so.
+        until_us: when it goes on even if it is not.
+    """
+
+    done: Callable[[], bool]
+    until_us: int = NEVER
+
+    def __await__(self) -> Generator[Wait, bool, bool]:
+        """Wait; return whether it came to be so in time."""
+        came: bool = yield self
+        return came
+
+
+class Waiting(Protocol):
+    """Whoever lets time pass for the body of a test."""
+
+    @property
+    def now_us(self) -> int:
+        """The time."""
+        ...
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time."""
+        ...
+
+
+def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
+    """Run the body of a test: time passes while it waits.
+
+    Raises:
+        TypeError: it awaits something else, such as `asyncio.sleep`.
+        RuntimeError: what it waits for never comes.
+    """
+    came: bool | None = None
+    while True:
+        try:
+            wait = _wait_of(body.send(came))
+        except StopIteration as end:
+            result: T = end.value
+            return result
+        came = waiting.wait_until(wait.done, max(0, wait.until_us - waiting.now_us))
+        if not came and wait.until_us == NEVER:
+            raise RuntimeError("nothing will ever happen for which this body waits")
+
+
+class Task(Generic[T]):
+    """A body that runs beside the test, between two ticks, whoever makes time pass.
+
+    Args:
+        rig: the rig whose time it waits in.
+        body: what it does; it must not make time pass itself.
+    """
+
+    def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, T]) -> None:
+        self._rig, self._body = rig, body
+        self._wait: Wait | None = None
+        self._result: list[T] = []
+        self._error: BaseException | None = None
+        rig.rig.watchers.append(self._look)
+        self._go_on(None)
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, in whatever way."""
+        return self._wait is None
+
+    def result(self) -> T:
+        """Return what it returned, or raise what it raised.
+
+        Raises:
+            RuntimeError: it has not ended yet.
+        """
+        if self._error is not None:
+            raise self._error
+        if not self._result:
+            raise RuntimeError("the task has not ended yet")
+        return self._result[0]
+
+    def __await__(self) -> Generator[Wait, bool, T]:
+        """Wait for its end."""
+        yield Wait(lambda: self.done)
+        return self.result()
+
+    def cancel(self) -> None:
+        """End it where it waits; one that has ended is no error."""
+        if self._wait is not None:
+            self._end()
+            self._body.close()
+
+    def _look(self, now_us: int) -> None:
+        wait = self._wait
+        if wait is not None and ((came := wait.done()) or now_us >= wait.until_us):
+            self._go_on(came)
+
+    def _go_on(self, came: bool | None) -> None:
+        try:
+            self._wait = _wait_of(self._body.send(came))
+        except StopIteration as end:
+            self._result = [end.value]
+            self._end()
+        except BaseException as error:  # raised where its result is asked for
+            self._error = error
+            self._end()
+        else:
+            if self._wait.until_us < NEVER:
+                self._rig.event_queue.put(("task", id(self)), self._wait.until_us, _nothing)
+
+    def _end(self) -> None:
+        self._wait = None
+        self._rig.event_queue.drop(("task", id(self)))
+        self._rig.rig.watchers.remove(self._look)
+
+
+def _wait_of(wait: object) -> Wait:
+    if not isinstance(wait, Wait):
+        raise TypeError(f"a bench waits for bench.sleep, bench.edge and the like, not for {wait!r}")
+    return wait
+
+
+def _nothing(now_us: int) -> None:
+    """Be a time at which tasks are looked at."""

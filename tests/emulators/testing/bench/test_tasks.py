@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from tickrig import Bench
+from tickrig.device import Rrc
+
+
+async def blink(bench: Bench, times: list[int]) -> str:
+    for _ in range(3):
+        bench.set("stick", 10, 0)
+        times.append(bench.now_us)
+        await bench.sleep("15ms")
+    return "blinked"
+
+
+def test_a_body_sleeps_in_the_time_of_the_bench() -> None:
+    times: list[int] = []
+    with Bench(Rrc()) as bench:
+        assert bench.run(blink(bench, times)) == "blinked"
+        assert (times, bench.now_us) == ([0, 15_000, 30_000], 45_000)
+
+
+def test_tasks_go_on_while_a_host_waits() -> None:
+    times: list[int] = []
+    with Bench(Rrc()) as bench:
+        task = bench.start(blink(bench, times))
+        with pytest.raises(RuntimeError, match="not ended"):
+            task.result()
+        link = bench.link
+        while link.receive(100_000):
+            pass
+        assert (times, task.result()) == ([0, 15_000, 30_000], "blinked")
+
+
+def test_a_body_waits_for_tasks_lines_and_states() -> None:
+    async def body(bench: Bench) -> None:
+        task = bench.start(blink(bench, []))
+        assert await task == "blinked"
+        bench.press("power_button")
+        assert await bench.until(bench.on_line("EV:PowerOnTrigger"), "1s")
+        assert await bench.edge("state") == "Standby"
+        assert await bench.edge("state", within="10ms") == "Standby"
+        assert not await bench.until(lambda: False, "1ms")
+
+    with Bench(Rrc()) as bench:
+        bench.run(body(bench))
+
+
+def test_what_a_task_raises_is_raised_where_it_is_awaited() -> None:
+    async def fail(bench: Bench) -> None:
+        await bench.sleep("1ms")
+        bench.set("nothing", 1)
+
+    async def body(bench: Bench) -> None:
+        await bench.start(fail(bench))
+
+    with Bench(Rrc()) as bench, pytest.raises(ValueError, match="no input 'nothing'"):
+        bench.run(body(bench))
+
+
+def test_a_task_is_cancelled() -> None:
+    times: list[int] = []
+    with Bench(Rrc()) as bench:
+        task = bench.start(blink(bench, times))
+        bench.run_for("20ms")
+        task.cancel()
+        task.cancel()
+        bench.run_for("1s")
+        assert (times, task.done) == ([0, 15_000], True)
+
+
+def test_what_is_no_wait_of_a_bench_is_told() -> None:
+    async def body() -> None:
+        await asyncio.sleep(0)
+
+    with Bench(Rrc()) as bench, pytest.raises(TypeError, match=r"waits for bench\.sleep"):
+        bench.run(body())
+
+
+def test_what_never_comes_is_told() -> None:
+    async def body(bench: Bench) -> None:
+        await bench.until(lambda: False)
+
+    with Bench(Rrc()) as bench, pytest.raises(RuntimeError, match="nothing will ever happen"):
+        bench.run(body(bench))
