@@ -125,6 +125,8 @@ class FilterNode(Node):
             self.setting = self.spec.shaped(self._state)
         moving = not isnan(self._state) and self._next() != self._state
         self.due_us = (self._moves + 1) * self.spec.every_us if moving else NEVER
+        if self.filter.formula.timed:
+            self.due_us = min(self.due_us, now_us + 1)
 
     def _next(self) -> float:
         if not isfinite(self._input):

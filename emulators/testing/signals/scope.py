@@ -173,4 +173,6 @@ def _check_target(scope: Scope, key: str) -> Iterator[Mistake]:
     for value in map(spec.shaped, spec.source.ends):
         if not isinstance(value, str) and not item.low <= value <= item.high:
             unit = f" {item.unit}" if item.unit else ""
-            yield Mistake((key,), f"it reaches {value:g}, and {name} {item.low}..{item.high}{unit}")
+            yield Mistake(
+                (key,), f"it reaches {value:g}, and {name} takes {item.low}..{item.high}{unit}"
+            )
