@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 
+from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.host.text.trace import (
@@ -18,7 +16,6 @@ from tickrig.host.text.trace import (
     parse_header,
     parse_records,
 )
-from tickrig.wire.instant import NEVER
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,23 +45,6 @@ class Recording:
         return len({record.at_us for record in self.records if record.mark is not Mark.END})
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """The first tick at which a replay did not say what was recorded.
-
-    Attributes:
-        at_us: the tick.
-        recorded: what the device said then.
-        replayed: what it says now.
-        line: the line of the trace, 0 if it said nothing then.
-    """
-
-    at_us: int
-    recorded: bytes
-    replayed: bytes
-    line: int
-
-
 def read_recording(data: bytes) -> Recording:
     """Read a trace, also one whose writer was killed in the middle of a line.
 
@@ -84,22 +64,23 @@ def read_recording(data: bytes) -> Recording:
     return Recording(header, records, ended)
 
 
-def replay(recording: Recording, device: Emulated[bytes]) -> Difference | None:
+def replay(recording: Recording, device: Emulated[bytes]) -> Difference[bytes] | None:
     """Feed a fresh device what was recorded; None if it said the same.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
     """
     records = recording.records
-    port = _ReplayPort(record for record in records if record.mark is Mark.TO_DEVICE)
+    received = ((r.at_us, r.data) for r in records if r.mark is Mark.TO_DEVICE)
+    port = ReplayPort(received, b"")
     rig = Rig(Station(device, port))
     for record in records:
         if record.mark is Mark.PHYSICAL:
             rig.run_to(record.at_us - 1)
             _set_signal(device, record)
     rig.run_to(recording.until_us)
-    said = [record for record in records if record.mark is Mark.FROM_DEVICE]
-    return _first_difference(said, port.sent)
+    said = [(r.at_us, r.data, r.line) for r in records if r.mark is Mark.FROM_DEVICE]
+    return first_difference(said, port.sent, b"")
 
 
 def _set_signal(device: Emulated[bytes], record: Record) -> None:
@@ -110,35 +91,3 @@ def _set_signal(device: Emulated[bytes], record: Record) -> None:
         device.inputs.set(*record.change)
     except ValueError as error:
         raise TraceError(f"line {record.line}: {error}") from None
-
-
-def _first_difference(recorded: Sequence[Record], replayed: Sequence[Record]) -> Difference | None:
-    silence = Record(NEVER, Mark.FROM_DEVICE)
-    for then, now in zip_longest(recorded, replayed, fillvalue=silence):
-        if (then.at_us, then.data) != (now.at_us, now.data):
-            first_us = min(then.at_us, now.at_us)
-            old, new = (r if r.at_us == first_us else silence for r in (then, now))
-            return Difference(first_us, old.data, new.data, old.line)
-    return None
-
-
-class _ReplayPort:
-    """Gives the device what it heard at the ticks it heard it."""
-
-    def __init__(self, recorded: Iterable[Record]) -> None:
-        self._recorded = deque(recorded)
-        self.sent: list[Record] = []
-
-    @property
-    def due_us(self) -> int:
-        return self._recorded[0].at_us if self._recorded else NEVER
-
-    def poll(self, now_us: int, /) -> bytes:
-        out = b""
-        while self._recorded and self._recorded[0].at_us <= now_us:
-            out += self._recorded.popleft().data
-        return out
-
-    def send(self, now_us: int, traffic: bytes, /) -> None:
-        if traffic:
-            self.sent.append(Record(now_us, Mark.FROM_DEVICE, traffic))

@@ -1,0 +1,130 @@
+"""Replay the recorded run of a bench, device by device."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+from tickrig.device.core import Device
+from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.text.bench_header import BenchHeader, parse_bench_header
+from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
+from tickrig.host.text.trace import RESET, Mark, TraceError
+from tickrig.wire.can import Frames
+
+Traffic = bytes | Frames
+
+
+@dataclass(frozen=True)
+class BenchRecording:
+    """A trace as it was read.
+
+    Attributes:
+        header: what was on the bench.
+        records: the lines in order.
+        ended: whether it says how long the run lasted.
+            Without that the writer was killed or its disk full, and the last
+            tick, which may not be whole, is left out.
+    """
+
+    header: BenchHeader
+    records: tuple[BenchRecord, ...]
+    ended: bool
+
+    @property
+    def until_us(self) -> int:
+        """How far the recording reaches."""
+        return self.records[-1].at_us if self.records else 0
+
+    @cached_property
+    def ticks(self) -> int:
+        """How many ticks of a device had traffic or a change."""
+        passed = (Mark.END, Mark.WIRE)
+        return len({(x.at_us, x.name) for x in self.records if x.mark not in passed})
+
+    def of(self, name: str) -> tuple[BenchRecord, ...]:
+        """Return the lines of a device."""
+        return tuple(x for x in self.records if x.name == name and x.mark is not Mark.WIRE)
+
+
+def read_bench_recording(data: bytes) -> BenchRecording:
+    """Read a trace, also one whose writer was killed in the middle of a line.
+
+    Raises:
+        TraceError: not a trace of this version, or a line of it is damaged.
+    """
+    try:
+        text = data.decode("ascii")
+    except UnicodeDecodeError as error:
+        raise TraceError(f"not a trace: byte {error.start} is not ASCII") from None
+    first, *lines = text.split("\n")
+    header = parse_bench_header(first)
+    records = tuple(BenchParser(header).parse(lines[:-1]))
+    ended = bool(records) and records[-1].mark is Mark.END
+    if not ended:
+        records = tuple(r for r in records if r.at_us < records[-1].at_us)
+    return BenchRecording(header, records, ended)
+
+
+def replay_device(
+    recording: BenchRecording, name: str, device: Device[Any]
+) -> Difference[Any] | None:
+    """Feed a fresh device what one of the bench met; None if it said the same.
+
+    Args:
+        recording: the run.
+        name: which device of it.
+        device: a fresh one.
+
+    Raises:
+        TraceError: the trace names an input that the device does not have.
+    """
+    nothing: Traffic = () if recording.header.on_can(name) else b""
+    records = recording.of(name)
+    received = ((at, what) for at, what, _ in traffic_of(records, Mark.TO_DEVICE))
+    port = ReplayPort[Any](received, nothing)
+    rig = Rig(Station(device, port))
+    for record in records:
+        if record.mark is Mark.PHYSICAL:
+            rig.run_to(record.at_us - 1)
+            do(device, record)
+    rig.run_to(recording.until_us)
+    said = [*traffic_of(records, Mark.FROM_DEVICE)]
+    return first_difference(said, port.sent, nothing)
+
+
+def traffic_of(records: Sequence[BenchRecord], mark: Mark) -> Iterator[tuple[int, Traffic, int]]:
+    """Give what passed one way: the time, all of that tick, the first line of it."""
+    passed = (record for record in records if record.mark is mark)
+    for at_us, group in groupby(passed, key=lambda record: record.at_us):
+        first, *more = group
+        if isinstance(first.traffic, bytes):
+            yield at_us, b"".join(x.traffic for x in (first, *more)), first.line  # type: ignore[misc]  # one device, one type
+        else:
+            yield at_us, tuple(x.traffic for x in (first, *more)), first.line  # type: ignore[misc]  # as above
+
+
+def do(device: Any, record: BenchRecord) -> None:
+    """Do to a device what was done.
+
+    Raises:
+        TraceError: it has no such input, or cannot have that value.
+    """
+    try:
+        if record.text == RESET:
+            device.reset()
+        elif (change := record.change) is None:
+            device.bus_state(BUS_STATE[record.text])
+        elif hasattr(device, "signal"):
+            signal = device.signal(change[0])
+            if signal is None:
+                raise ValueError(f"no input {change[0]!r:.60}")
+            signal.write(change[1])
+        else:
+            device.inputs.set(*change)
+    except (ValueError, AttributeError) as error:
+        raise TraceError(f"line {record.line}: {record.name}: {error}") from None
