@@ -10,6 +10,7 @@ from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import version_option
 
 HERE: Final = "tickrig.emulators.commands"
+TESTING: Final = "tickrig.emulators.testing.commands"
 COMMANDS: Final = {
     "ctl": (
         f"{HERE}.ctl_cli:ctl",
@@ -18,9 +19,9 @@ COMMANDS: Final = {
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
     "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
-    "replay": (f"{HERE}.replay_cli:replay_command", "Replay the trace FILE on a fresh device."),
+    "replay": (f"{TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
-        "tickrig.emulators.testing.commands.report_cli:report_command",
+        f"{TESTING}.report_cli:report_command",
         "Make one HTML page of test runs that were kept as JSON.",
     ),
     "rtc": (

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import groupby
 from typing import Any
 
 from tickrig.device.core import Device
 from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.text.bench_header import BenchHeader, parse_bench_header
+from tickrig.host.text.bench_header import BenchHeader, Place, parse_bench_header
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
 from tickrig.host.text.trace import RESET, Mark, TraceError
 from tickrig.wire.can import Frames
@@ -40,11 +39,14 @@ class BenchRecording:
         """How far the recording reaches."""
         return self.records[-1].at_us if self.records else 0
 
-    @cached_property
-    def ticks(self) -> int:
-        """How many ticks of a device had traffic or a change."""
-        passed = (Mark.END, Mark.WIRE)
-        return len({(x.at_us, x.name) for x in self.records if x.mark not in passed})
+    @property
+    def at_port(self) -> bool:
+        """Whether its times are those of a host at its port, not of ticks."""
+        return self.header.place is Place.PORT
+
+    def ticks_of(self, name: str) -> set[int]:
+        """Return the ticks at which a device had traffic or a change."""
+        return {record.at_us for record in self.of(name)}
 
     def of(self, name: str) -> tuple[BenchRecord, ...]:
         """Return the lines of a device."""

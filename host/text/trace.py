@@ -30,7 +30,8 @@ RESET: Final = "reset"
 Config = Mapping[str, str | int | float | None]
 """Configuration of a device, as the header of its trace carries it."""
 
-_HEADER: Final = re.compile(r"# tickrig-trace v([0-9]+) ([\w-]+) (\{.*\})")
+_VERSION: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
+_HEADER: Final = re.compile(r"# tickrig-trace v1 ([\w-]+) (\{.*\})")
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
 _INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2,3})?)", re.ASCII)
 
@@ -93,16 +94,17 @@ class Record:
 
 def parse_header(line: str) -> Header:
     """Read the first line; TraceError if it is none of ours."""
+    version = _VERSION.match(line)
+    if version is not None and int(version[1]) != VERSION:
+        raise TraceError(f"this is trace version {int(version[1])}; versions 1 and 2 are known")
     match = _HEADER.fullmatch(line)
     if match is None:
         raise TraceError(
             f"line 1 is not '# tickrig-trace v{VERSION} DEVICE {{CONFIG}}': {line!r:.60}"
         )
-    if int(match[1]) != VERSION:
-        raise TraceError(f"this is trace version {match[1]}; this program reads version {VERSION}")
     try:
-        return Header(match[2], json.loads(match[3]))
-    except ValueError as error:
+        return Header(match[1], json.loads(match[2]))
+    except (ValueError, RecursionError) as error:
         raise TraceError(f"line 1: the configuration is not JSON: {error}") from None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from contextlib import suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -51,10 +51,8 @@ class StoreFile:
         """
         memory = self._nodes.setdefault(name, Nonvolatile())
         self._written.setdefault(name, memory.version)
-        for key, data in tuple(memory.parameters.items()):
-            if not _fits(dictionary.find(key >> 8, key & 0xFF), data):
-                _log.warning("%s: node %s: no room for %s", self.path, name, _multiplexer(key))
-                del memory.parameters[key]
+        for misfit in drop_misfits(memory, dictionary):
+            _log.warning("%s: node %s: no room for %s", self.path, name, misfit)
         return memory
 
     def save(self) -> bool:
@@ -84,22 +82,21 @@ def _read(path: Path) -> dict[str, Nonvolatile]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise StoreError(f"{path}: not a store file: its format is not {FORMAT!r}")
     try:
-        return {name: _parse(node) for name, node in content["nodes"].items()}
+        return {name: parse_memory(node) for name, node in content["nodes"].items()}
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise StoreError(f"{path}: a damaged store file: {error!r}") from error
-
-
-def _fits(entry: Entry | None, data: bytes) -> bool:
-    if entry is None:
-        return False
-    return len(data) == entry.size if entry.size else len(data) <= entry.description.max_bytes
 
 
 def _multiplexer(key: int) -> str:
     return f"{key >> 8:04X}:{key & 0xFF:02X}"
 
 
-def _parse(node: dict[str, Any]) -> Nonvolatile:
+def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
+    """Read what a node has stored.
+
+    Raises:
+        AttributeError, KeyError, TypeError, ValueError: it is not what `memory_values` gives.
+    """
     parameters = {}
     for name, data in node["parameters"].items():
         index, sub = name.split(":")
@@ -107,6 +104,35 @@ def _parse(node: dict[str, Any]) -> Nonvolatile:
     return Nonvolatile(
         parameters, _number(node["node_id"], NODE_IDS), _number(node["bit_rate_index"], range(10))
     )
+
+
+def memory_values(memory: Nonvolatile) -> dict[str, Any]:
+    """Return what a node has stored, as JSON has it."""
+    return {
+        "node_id": memory.node_id,
+        "bit_rate_index": memory.bit_rate_index,
+        "parameters": {
+            _multiplexer(key): data.hex().upper() for key, data in sorted(memory.parameters.items())
+        },
+    }
+
+
+def drop_misfits(memory: Nonvolatile, dictionary: Dictionary) -> list[str]:
+    """Drop values that a dictionary has no room for; return which, as `1017:00`."""
+    misfits = [
+        key
+        for key, data in memory.parameters.items()
+        if not _fits(dictionary.find(key >> 8, key & 0xFF), data)
+    ]
+    for key in misfits:
+        del memory.parameters[key]
+    return [_multiplexer(key) for key in misfits]
+
+
+def _fits(entry: Entry | None, data: bytes) -> bool:
+    if entry is None:
+        return False
+    return len(data) == entry.size if entry.size else len(data) <= entry.description.max_bytes
 
 
 def _number(value: object, allowed: Container[int]) -> int | None:
@@ -118,17 +144,7 @@ def _number(value: object, allowed: Container[int]) -> int | None:
 def _format(nodes: dict[str, Nonvolatile]) -> str:
     content = {
         "format": FORMAT,
-        "nodes": {
-            name: {
-                "node_id": memory.node_id,
-                "bit_rate_index": memory.bit_rate_index,
-                "parameters": {
-                    _multiplexer(key): data.hex().upper()
-                    for key, data in sorted(memory.parameters.items())
-                },
-            }
-            for name, memory in sorted(nodes.items())
-        },
+        "nodes": {name: memory_values(memory) for name, memory in sorted(nodes.items())},
     }
     return json.dumps(content, indent=1) + "\n"
 

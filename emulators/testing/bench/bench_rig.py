@@ -96,7 +96,6 @@ class RigState(Copyable):
                 **{body.name: Nodes([], [body]) for body in parts.bodies},
             }
         )
-        self._start(parts.start)
         self.recorder = (
             TraceRecorder(trace, header_of(mounts, parts.seed)) if trace or keeps else None
         )
@@ -106,6 +105,7 @@ class RigState(Copyable):
             couplings=(*parts.bodies, *self._drivers(parts)),
             clock=clock,
         )
+        self._start(parts.start)  # it is recorded too
         for mount in mounts:
             if isinstance(mount, BusMount):
                 self.rig.move_on(mount.wire)

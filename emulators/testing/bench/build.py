@@ -12,6 +12,7 @@ from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of
+from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.trace import Config
 
@@ -37,7 +38,7 @@ def mounts_of(
         if isinstance(device, CanopenSlave):
             mount = mounts.setdefault(BUS, BusMount(BUS, seed=seed))
             assert isinstance(mount, BusMount)
-            mount.add(name, device, DeviceEntry(BUS, device.model, {}, device.configured_id))
+            mount.add(name, device, node_entry(BUS, device))
             continue
         made = _of_type(device, seed)
         mounts[name] = lone = LineMount(name, line or made.line)

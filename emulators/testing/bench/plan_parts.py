@@ -25,6 +25,7 @@ from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.bench_rig import Parts, RigState
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
+from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.plan import (
     BodyPlan,
     DeviceKind,
@@ -158,7 +159,7 @@ def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[CanopenSl
             stores[device.store] = StoreFile(device.store)
         memory = stores[device.store].nonvolatile(device.name, dictionary)
     slave = make_slave(dictionary, node_id, memory, description.application)
-    return slave, DeviceEntry(device.wire, device.type, {}, node_id)
+    return slave, node_entry(device.wire, slave, kind, device.profile or AUTO)
 
 
 def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:

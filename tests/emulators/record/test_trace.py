@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
-from tickrig.emulators.record.replay import Difference, Recording, read_recording, replay
+from tickrig.emulators.record.replay import Recording, read_recording, replay
+from tickrig.emulators.record.replay_port import Difference
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.serial.emulator import Emulator
@@ -100,7 +101,7 @@ def test_a_reset_is_recorded_and_replayed(tmp_path: Path) -> None:
         ("0.005000 ! key=1\n", "", Difference(5_000, b"click\n", b"", 6)),
     ],
 )
-def test_the_first_difference_is_found(old: str, new: str, difference: Difference) -> None:
+def test_the_first_difference_is_found(old: str, new: str, difference: Difference[bytes]) -> None:
     text = (HEADER + HEARD).replace(old, new)
     assert text != HEADER + HEARD
     assert replay(reading(text), Lamp()) == difference
@@ -152,7 +153,7 @@ def test_a_full_disk_is_said_once_and_the_emulator_goes_on(
     [
         ("", "line 1 is not '# tickrig-trace v1"),
         ("hello\n", "line 1 is not"),
-        ("# tickrig-trace v2 lamp {}\n", "version 2; this program reads version 1"),
+        ("# tickrig-trace v2 lamp {}\n", "version 2; versions 1 and 2 are known"),
         ("# tickrig-trace v1 lamp {,}\n", "the configuration is not JSON"),
         (HEADER + "0.1 > x\n", "line 2 is not 'SECONDS MARK TEXT'"),
         (HEADER + "0.001000 ? x\n", "line 2 is not"),

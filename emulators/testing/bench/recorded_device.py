@@ -1,0 +1,119 @@
+"""Devices of a bench as the header of a trace has them, and made again of that."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.build import describe
+from tickrig.emulators.canopen.choices import AUTO, PROFILES
+from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.store_file import drop_misfits, memory_values, parse_memory
+from tickrig.emulators.commands.device_type import build_recorded
+from tickrig.host.cli.refused import Refused
+from tickrig.host.text.bench_header import DeviceEntry
+from tickrig.host.text.trace import Header
+from tickrig.host.text.user_file import SUFFIX
+
+PROFILE: Final = "profile"
+
+
+def node_entry(
+    wire: str, slave: CanopenSlave, device: Path | str = "", profile: str = AUTO
+) -> DeviceEntry:
+    """Return what a trace says of a CANopen slave, before its first tick.
+
+    Args:
+        wire: name of the bus.
+        slave: the slave.
+        device: what it was made of: EDS or DCF, the name of a model, or `FILE.py:Class`; empty
+            for the model that it says it is.
+        profile: of `choices.PROFILES`, for a file.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    file = _file_of(str(device)) if isinstance(device, str) else device
+    memory = slave.nonvolatile
+    stored = memory.parameters or memory.node_id or memory.bit_rate_index is not None
+    return DeviceEntry(
+        wire,
+        str(device) or slave.model,
+        {PROFILE: profile} if isinstance(device, Path) else {},
+        slave.configured_id,
+        sha256(file.read_bytes()).hexdigest() if file else "",
+        memory_values(memory) if stored else {},
+    )
+
+
+def make_recorded(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Any:
+    """Make the device that was recorded, as it was when the recording began.
+
+    Args:
+        name: of the device.
+        entry: what the trace says of it.
+        folder: of the trace; its files are looked for here too.
+        cache: of EDS files.
+
+    Raises:
+        ValueError: it cannot be made; the text is for people.
+    """
+    try:
+        if not entry.type:
+            raise ValueError("it was made by a program, not of a type")
+        if entry.node_id is None:
+            return build_recorded(Header(entry.type, entry.config))
+        return _node(name, entry, folder, cache)
+    except Refused as refused:
+        raise ValueError(f"device {name}: {refused}") from None
+    except ValueError as error:
+        raise ValueError(f"device {name}: {error}") from None
+
+
+def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
+    device = _found(entry, folder)
+    profile = str(entry.config.get(PROFILE, AUTO))
+    if profile not in PROFILES:
+        raise ValueError(f"profile {profile!r:.60} is not one of {', '.join(PROFILES)}")
+    description = describe(cache, device, profile)
+    dictionary = description.make_dictionary()
+    memory = _memory(entry, dictionary) if entry.stored else None
+    slave = make_slave(dictionary, entry.node_id or 0, memory, description.application)
+    return Node(name, slave, CanWire())
+
+
+def _memory(entry: DeviceEntry, dictionary: Dictionary) -> Nonvolatile:
+    try:
+        memory = parse_memory(entry.stored)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"what it had stored is damaged: {error!r}") from None
+    if misfits := drop_misfits(memory, dictionary):
+        raise ValueError(f"it has no room for what it had stored at {misfits[0]}")
+    return memory
+
+
+def _found(entry: DeviceEntry, folder: Path) -> Path | str:
+    """Return the model, or where the very file is that was recorded."""
+    if entry.type in MODELS:
+        return entry.type
+    named = _file_of(entry.type) or Path(entry.type)
+    for file in (named, folder / named, folder / named.name):
+        if file.is_file():
+            if sha256(file.read_bytes()).hexdigest() != entry.sha256:
+                raise ValueError(f"{file} is another file than the one that was recorded")
+            return file if named == Path(entry.type) else f"{file}:{entry.type.rpartition(':')[2]}"
+    raise ValueError(f"its file {named} is not here, nor beside the trace")
+
+
+def _file_of(device: str) -> Path | None:
+    """Return the file of `FILE.py:Class`, None for a model."""
+    file, _, _ = device.rpartition(":")
+    return Path(file) if file.endswith(SUFFIX) else None

@@ -1,0 +1,112 @@
+"""The command `tickrig replay`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.start import loading
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.values import format_time
+
+if TYPE_CHECKING:
+    from tickrig.emulators.record.bench_replay import BenchRecording
+    from tickrig.emulators.record.replay_port import Difference
+
+
+@click.command("replay")
+@click.argument("file", type=PATH)
+@click.pass_context
+def replay_command(context: click.Context, /, file: Path) -> None:
+    """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
+
+    \b
+    rrc-emu --link /tmp/rrc --trace run.trace
+    tickrig replay run.trace
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.host.text.bench_header import PREFIX  # noqa: PLC0415 - slow
+
+    try:
+        data = file.read_bytes()
+        play = _replay_bench if data.startswith(PREFIX.encode()) else _replay
+        ticks, name, difference = play(file, data)
+    except OSError as error:
+        refuse_path("trace", error)
+    except ValueError as error:
+        raise Refused(f"trace {file}: {error}") from None
+    if difference is None:
+        click.echo(f"identical: {ticks} ticks")
+    else:
+        click.echo(_describe(name, difference, file))
+        context.exit(1)
+
+
+def _replay(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
+    """Replay a trace of one device on a serial line."""
+    with loading():
+        from tickrig.emulators.commands.device_type import build_recorded  # noqa: PLC0415 - slow
+        from tickrig.emulators.record.replay import read_recording, replay  # noqa: PLC0415
+
+    recording = read_recording(data)
+    difference = replay(recording, build_recorded(recording.header))
+    _warn(file, ended=recording.ended)
+    return recording.ticks, "", difference
+
+
+def _replay_bench(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
+    """Replay each device of a bench; return how many ticks, and the first difference of all."""
+    with loading():
+        from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
+
+    recording = read_bench_recording(data)
+    if recording.at_port:
+        raise ValueError("it was recorded at a host's port, without ticks: use tickrig compare")
+    found = _differences(file, recording)
+    _warn(file, ended=recording.ended)
+    ticks = sum(len(recording.ticks_of(name)) for name, _ in found)
+    differing = [(name, difference) for name, difference in found if difference is not None]
+    first = min(differing, key=lambda row: row[1].at_us, default=("", None))
+    return ticks, *first
+
+
+def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Difference[Any] | None]]:
+    from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
+    from tickrig.emulators.record.bench_replay import replay_device  # noqa: PLC0415
+    from tickrig.emulators.testing.bench.recorded_device import make_recorded  # noqa: PLC0415
+
+    devices, cache = recording.header.devices, EdsCache()
+    typed = {name: entry for name, entry in devices.items() if entry.type}
+    if devices and not typed:
+        raise ValueError("its devices were made by a program, not of types: it cannot be replayed")
+    for name in devices:
+        if name not in typed:
+            click.echo(f"{file}: {name} was made by a program, not of a type: left out", err=True)
+    return [
+        (name, replay_device(recording, name, make_recorded(name, entry, file.parent, cache)))
+        for name, entry in typed.items()
+    ]
+
+
+def _warn(file: Path, *, ended: bool) -> None:
+    if not ended:
+        click.echo(f"{file}: no end line (killed?); its last tick is left out", err=True)
+
+
+def _describe(name: str, difference: Difference[Any], file: Path) -> str:
+    place = f" ({file}:{difference.line})" if difference.line else ""
+    then, now = _text(difference.recorded), _text(difference.replayed)
+    at = format_time(difference.at_us)
+    of = f" {name}" if name else ""
+    return f"different at {at}{of}{place}\n  recorded < {then}\n  replayed < {now}"
+
+
+def _text(traffic: Any) -> str:
+    """Return bytes or frames as a trace has them."""
+    if not traffic:
+        return "(nothing)"
+    return escape(traffic) if isinstance(traffic, bytes) else " ".join(map(str, traffic))
