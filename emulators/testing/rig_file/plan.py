@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.host.text.values import Setting
 
 LATE_MS: Final = 50
 STICK_PCT: Final = 10
@@ -86,8 +88,8 @@ class DevicePlan:
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
         profile: of a file: `choices.PROFILES`; None for `auto`.
         store: file in which a CANopen node keeps what 1010h and LSS store.
-        start: inputs at the start by name, members of groups each for itself: a number, a text
-            or the table of a signal.
+        start: inputs at the start by name, members of groups each for itself: a value, or the
+            signal that drives it.
     """
 
     name: str
@@ -98,7 +100,7 @@ class DevicePlan:
     node_id: int | None = None
     profile: str | None = None
     store: Path | None = None
-    start: Mapping[str, object] = field(default_factory=dict)
+    start: Mapping[str, Setting | SignalSpec] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +247,7 @@ class RigPlan:
         seed: of all chance.
         wires: by name, those that the file leaves out too.
         devices: by name, in the order of the file.
-        signals: by name, for formulas: a number or the table of a signal.
+        signals: by name, for formulas.
         faults: in the order of the file.
         body: what drives move, None if nothing.
         real: the bench in real time.
@@ -256,7 +258,7 @@ class RigPlan:
     seed: int = 0
     wires: Mapping[str, WirePlan] = field(default_factory=dict)
     devices: Mapping[str, DevicePlan] = field(default_factory=dict)
-    signals: Mapping[str, object] = field(default_factory=dict)
+    signals: Mapping[str, SignalSpec] = field(default_factory=dict)
     faults: tuple[FaultPlan, ...] = ()
     body: BodyPlan | None = None
     real: RealPlan = field(default_factory=RealPlan)

@@ -1,0 +1,162 @@
+"""`[device.NAME]`: what each device is, and the wire that it is on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.commands.device_type import DEVICES
+from tickrig.emulators.testing.rig_file.fields import check_name, near, shown
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, WirePlan, WireType
+from tickrig.emulators.testing.rig_file.schema import CANOPEN_DEVICE, SERIAL_DEVICE
+from tickrig.emulators.testing.rig_file.section import Schema, Section
+from tickrig.host.text.user_file import SUFFIX
+
+BUS: Final = "can"
+"""The bus that a file leaves out."""
+
+RESERVED: Final = ("control", "tolerance", "body", BUS)
+"""Names that mean something else beside those of devices."""
+
+EDS_SUFFIXES: Final = (".eds", ".dcf")
+EVERYTHING: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
+READ_LATER: Final = "start"
+
+Wires = dict[str, WirePlan | None]
+
+
+class DeviceReader:
+    """Reads the devices and puts them on wires.
+
+    Args:
+        section: `[device]`, None if there is none.
+        wires: those of the file, None for one of which it is not known what it is; those that
+            the file leaves out are entered.
+        folder: where files are looked for.
+
+    Attributes:
+        plans: by name, None for a device of which it is not known what it is.
+        sections: the table of each.
+    """
+
+    def __init__(self, section: Section | None, wires: Wires, folder: Path) -> None:
+        self._wires, self._folder = wires, folder
+        self._given = dict(wires)
+        self.plans: dict[str, DevicePlan | None] = {}
+        self.sections: dict[str, Section] = {}
+        for name, table in section.subs() if section else ():
+            self.plans[name] = None
+            if table is not None:
+                self.sections[name] = table
+                self._check_name(name, table)
+                self.plans[name] = self._read(name, table)
+
+    def put_on_wires(self) -> None:
+        """Find the wire of each device, and note what is wrong with wires."""
+        for name, plan in self.plans.items():
+            if plan is not None:
+                wire = self._wire_of(self.sections[name], plan)
+                self.plans[name] = replace(plan, wire=wire) if wire else None
+
+    def _check_name(self, name: str, section: Section) -> None:
+        try:
+            check_name(name)
+            if name in self._given:
+                raise ValueError("there is a wire of this name")
+            if name in RESERVED:
+                raise ValueError(f"{', '.join(RESERVED)} are no names of devices")
+        except ValueError as error:
+            section.wrong(str(error))
+
+    def _read(self, name: str, section: Section) -> DevicePlan | None:
+        given = section.values.get("type")
+        kind, place = None, ""
+        if isinstance(given, str) and given:
+            try:
+                kind, place = kind_of(given, self._folder)
+            except ValueError as error:
+                section.wrong(str(error), "type")
+        schema = {None: EVERYTHING, DeviceKind.SERIAL: SERIAL_DEVICE}.get(kind, CANOPEN_DEVICE)
+        values = section.read(schema, READ_LATER, elsewhere=EVERYTHING)
+        if (wire := values.get("wire", "")) and wire not in self._given:
+            section.unknown(f"no wire {wire!r}; {near(wire, list(self._given))}", "wire")
+        if kind is None:
+            return None
+        if "profile" in values and kind is not DeviceKind.EDS:
+            section.wrong(f"it belongs to an EDS or DCF; {given!r} has its own", "profile")
+        return DevicePlan(
+            name=name,
+            kind=kind,
+            type=place,
+            wire=values.get("wire", ""),
+            config=_beside(values.get("config", {}), self._folder),
+            node_id=values.get("node_id"),
+            profile=values.get("profile"),
+            store=self._folder / values["store"] if "store" in values else None,
+        )
+
+    def _wire_of(self, section: Section, plan: DevicePlan) -> str | None:
+        """Return the wire of a device; None if it cannot be said."""
+        is_node = plan.kind is not DeviceKind.SERIAL
+        if not plan.wire:
+            return self._bus_of(section) if is_node else self._line_of(plan.name)
+        wire = self._given.get(plan.wire)
+        if wire is None:
+            return None
+        if (wire.type is WireType.CAN) != is_node:
+            what = "a CANopen device" if is_node else "a device on a serial line"
+            section.wrong(f"{plan.wire!r} is of type {wire.type.value}, and this {what}", "wire")
+            return None
+        return plan.wire
+
+    def _bus_of(self, section: Section) -> str | None:
+        """Return the only bus, made if the file has none."""
+        if None in self._given.values():
+            return None
+        buses = [each.name for each in self._given.values() if each and each.type is WireType.CAN]
+        if len(buses) > 1:
+            section.wrong(f"no key 'wire': there are {' and '.join(buses)}")
+            return None
+        if not buses:
+            self._wires.setdefault(BUS, WirePlan(name=BUS, type=WireType.CAN, given=False))
+        return buses[0] if buses else BUS
+
+    def _line_of(self, name: str) -> str:
+        """Return the line of a device's own."""
+        self._wires.setdefault(name, WirePlan(name=name, given=False))
+        return name
+
+
+def kind_of(text: str, folder: Path) -> tuple[DeviceKind, str]:
+    """Return what a type names, and the same with the path that it has for this program.
+
+    Args:
+        text: as the file has it.
+        folder: where files are looked for.
+
+    Raises:
+        ValueError: it names nothing that there is.
+    """
+    if not text.isprintable():
+        raise ValueError(f"no device {shown(text)}")
+    if f"{SUFFIX}:" in text:
+        return DeviceKind.DEVICE_RTC, str(folder / text)
+    if text.lower().endswith(EDS_SUFFIXES):
+        return DeviceKind.EDS, str(folder / text)
+    if text in MODELS:
+        return DeviceKind.MODEL, text
+    if text not in DEVICES.built_in and text not in (names := DEVICES.names()):
+        hint = near(text, [*names, *MODELS])
+        raise ValueError(f"no device {shown(text)}; {hint} (or an EDS or DCF file, FILE.py:Class)")
+    return DeviceKind.SERIAL, text
+
+
+def _beside(config: Mapping[str, Any], folder: Path) -> dict[str, object]:
+    """Return options with `FILE.py:Class` found beside the rig file."""
+    return {
+        key: str(folder / value) if isinstance(value, str) and f"{SUFFIX}:" in value else value
+        for key, value in config.items()
+    }

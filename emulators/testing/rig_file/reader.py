@@ -1,0 +1,167 @@
+"""Read a rig file: what is on the bench, or all that is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.emulators.bench.operator import WireFault
+from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.testing.rig_file.body import read_body
+from tickrig.emulators.testing.rig_file.devices import DeviceReader
+from tickrig.emulators.testing.rig_file.doors import DoorReader
+from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
+from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan, WirePlan, WireType
+from tickrig.emulators.testing.rig_file.probe import Probe, check_wire_fault, probe
+from tickrig.emulators.testing.rig_file.schema import TOP
+from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
+from tickrig.emulators.testing.rig_file.starts import Start, StartReader
+from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
+from tickrig.emulators.testing.rig_file.wires import check_wires, read_wires
+from tickrig.host.text.toml_document import Mistake
+from tickrig.host.text.toml_reader import read_toml
+
+SEED: Final = "seed"
+
+
+def read_rig_file(path: Path) -> RigPlan:
+    """Read a rig file.
+
+    Args:
+        path: the file; names of other files in it are looked for beside it.
+
+    Returns:
+        What it says.
+
+    Raises:
+        OSError: it cannot be read.
+        RigFileError: all that is wrong with it.
+    """
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        reason = f"the byte 0x{data[error.start]:02x} is no UTF-8: a rig file is a text"
+        raise RigFileError(str(path), (Mistake(line, reason),)) from None
+    return parse_rig_file(text, path)
+
+
+def parse_rig_file(text: str, path: Path) -> RigPlan:
+    """Read the text of a rig file; see `read_rig_file`.
+
+    Args:
+        text: the whole.
+        path: of the file, which need not be there.
+    """
+    document = read_toml(text)
+    notes = Notes(document)
+    plan = _Reader(Section(notes, (), document.values), path).read()
+    if notes.all:
+        raise RigFileError(str(path), notes.all)
+    return plan
+
+
+class _Reader:
+    """Reads one file."""
+
+    def __init__(self, top: Section, path: Path) -> None:
+        self._top, self._path, self._folder = top, path, path.parent
+        self._wires = read_wires(top.sub("wire"))
+        self._devices = DeviceReader(top.sub("device"), self._wires, self._folder)
+        self._probes: dict[str, Probe | None] = {}
+
+    def read(self) -> RigPlan:
+        """Read all of it; what is wrong is noted."""
+        top = self._top
+        seed = top.read({SEED: TOP[SEED]}, *(name for name in TOP if name != SEED)).get(SEED, 0)
+        if "device" not in top.values and top.notes.document.whole:
+            top.wrong("no device: a rig file has tables [device.NAME] with a type")
+        self._make_probes()
+        self._devices.put_on_wires()
+        check_wires(top, self._wires, self._devices.plans)
+        node_ids = self._check_node_ids()
+        starts = StartReader(self._folder)
+        signals = starts.read_signals(section) if (section := top.sub("signal")) else {}
+        devices = self._with_starts(starts)
+        physical = self._physical
+        if top.notes.document.whole:
+            starts.check(physical)
+        doors = DoorReader(self._wires, self._devices.plans, self._folder)
+        fault, body, real, hardware = map(top.sub, ("fault", "body", "real", "hardware"))
+        return RigPlan(
+            seed=seed,
+            wires={name: wire for name, wire in self._wires.items() if wire},
+            devices=devices,
+            signals=signals,
+            faults=tuple(read_faults(fault, self._fault_owners())) if fault else (),
+            body=read_body(body, physical, node_ids) if body else None,
+            real=doors.read_real(real) if real else RigPlan().real,
+            hardware=doors.read_hardware(hardware) if hardware else None,
+            path=self._path,
+        )
+
+    @property
+    def _physical(self) -> Mapping[str, HasSignals]:
+        return {name: each.physical if each else UNKNOWN for name, each in self._probes.items()}
+
+    def _make_probes(self) -> None:
+        cache = EdsCache()
+        for name, plan in self._devices.plans.items():
+            wrong = self._devices.sections[name].wrong if plan else None
+            self._probes[name] = probe(plan, cache, wrong) if plan and wrong else None
+
+    def _with_starts(self, starts: StartReader) -> dict[str, DevicePlan]:
+        """Return the devices with their starts."""
+        found: dict[str, DevicePlan] = {}
+        for name, plan in self._devices.plans.items():
+            section = self._devices.sections.get(name)
+            start: Start = {}
+            if section and (table := section.sub("start")):
+                start = starts.read_start(name, table, self._physical[name])
+            if plan:
+                found[name] = replace(plan, start=start)
+        return found
+
+    def _check_node_ids(self) -> dict[int, str]:
+        """Note nodes without a node-ID, and those that share one; return their names by it."""
+        names: dict[int, str] = {}
+        seen: dict[tuple[str, int], str] = {}
+        for name, each in self._probes.items():
+            plan, section = self._devices.plans[name], self._devices.sections.get(name)
+            if not (section and each) or each.baud is not None:
+                continue
+            if each.node_id is None:
+                section.wrong("no key 'node_id': its file gives none; 1..127, or lss")
+            elif each.node_id != UNCONFIGURED:
+                first = seen.setdefault((plan.wire if plan else name, each.node_id), name)
+                if first != name:
+                    section.wrong(f"node-ID {each.node_id} is that of {first!r} already", "node_id")
+                names.setdefault(each.node_id, name)
+        return names
+
+    def _wire_faults(self, wire: WirePlan | None) -> CheckFault | None:
+        """Return what judges faults of a wire, None if nobody can."""
+        if wire is None:
+            return None
+        faults: Mapping[str, WireFault] = CAN_FAULTS
+        if wire.type is not WireType.CAN:
+            plans = self._devices.plans.values()
+            first = next((self._probes[x.name] for x in plans if x and x.wire == wire.name), None)
+            if first is None:
+                return None
+            faults = first.wire_faults
+        return lambda name, rate: check_wire_fault(faults, name, rate, list(faults))
+
+    def _fault_owners(self) -> dict[str, CheckFault | None]:
+        owners: dict[str, CheckFault | None] = {
+            name: self._wire_faults(wire) for name, wire in self._wires.items()
+        }
+        for name, each in self._probes.items():
+            owners[name] = each.check_fault if each else None
+        return owners

@@ -1,0 +1,172 @@
+"""The keys of each table of a rig file; docs/rig-file.md shows them as they stand here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from tickrig.device.body.wheeled_body import SIDES
+from tickrig.emulators.canopen.choices import AUTO, PROFILES
+from tickrig.emulators.testing.rig_file.fields import (
+    command,
+    flag,
+    framing,
+    node_id,
+    number,
+    one_of,
+    path,
+    table,
+    text,
+    texts,
+    whole,
+)
+from tickrig.emulators.testing.rig_file.plan import WireType
+from tickrig.emulators.testing.rig_file.section import Key, Schema
+
+MOST_BAUD: Final = 50_000_000
+NONE: Final = "none"
+ITS_DEVICE: Final = "that of its device"
+
+_BAUD: Final = Key(whole(50, MOST_BAUD), f"50..{MOST_BAUD}", "bits a second", ITS_DEVICE)
+_BITRATE: Final = Key(
+    whole(10_000, 1_000_000), "10000..1000000", "bits a second", "that of a DCF, or 1000000"
+)
+_TYPE: Final = {
+    "type": Key(
+        one_of(*(each.value for each in WireType)),
+        ", ".join(f'"{each.value}"' for each in WireType),
+        "what the wire is",
+    )
+}
+_LINE: Final = {
+    "baud": _BAUD,
+    "framing": Key(framing, '"8N1", "7E2", ...', "data bits, parity, stop bits", '"8N1"'),
+    "buffer_bytes": Key(
+        whole(1, 1 << 24), f"1..{1 << 24}", "room of each sender and receiver", ITS_DEVICE
+    ),
+}
+_RS485: Final = {
+    "echo": Key(flag, "true, false", "each end hears its own bytes too", "false"),
+    "bursts": Key(
+        flag,
+        "true, false",
+        "a receiver takes what was sent back to back when it has ended",
+        "false",
+    ),
+}
+
+WIRES: Final[Mapping[WireType, Schema]] = {
+    WireType.SERIAL: _TYPE | _LINE,
+    WireType.RS485: _TYPE | _LINE | _RS485,
+    WireType.CAN: _TYPE | {"bitrate": _BITRATE},
+}
+"""Of `[wire.NAME]`."""
+
+_DEVICE: Final = {
+    "type": Key(
+        text,
+        "device type, CANopen model, EDS or DCF file, `FILE.py:Class`",
+        "what it is",
+    ),
+    "wire": Key(text, "name of a wire", "what it is connected to", "its own line; the only bus"),
+    "start": Key(table, "a table", "its inputs at the start, see below", NONE),
+}
+
+SERIAL_DEVICE: Final[Schema] = _DEVICE | {
+    "config": Key(table, "a table", "options of `tickrig emu TYPE`, without dashes", NONE)
+}
+CANOPEN_DEVICE: Final[Schema] = _DEVICE | {
+    "node_id": Key(node_id, '1..127, "lss"', "its node-ID", "that of the DCF or model"),
+    "profile": Key(
+        one_of(*PROFILES),
+        ", ".join(f'"{name}"' for name in PROFILES),
+        "what it does with the objects of an EDS or DCF",
+        f'"{AUTO}"',
+    ),
+    "store": Key(path, "a file", "where it keeps what 1010h and LSS store", NONE),
+}
+
+BODY: Final[Schema] = {
+    "kind": Key(one_of(*SIDES), ", ".join(f'"{name}"' for name in SIDES), "how it is driven"),
+    "wheel_radius_m": Key(number(1e-4, 100), "above 0", "of each wheel, in m"),
+    "tread_m": Key(number(1e-3, 1_000), "above 0", "between left and right wheels, in m"),
+    "mass_kg": Key(number(0, 1e6), "0 or more", "on the driven wheels, in kg", "0"),
+    "friction": Key(number(0, 10), "0..10", "between wheels and ground", "they never slip"),
+    "mirrored": Key(texts, "a list of wheels", "their drive is mounted the other way round", NONE),
+}
+"""Beside the wheels of its kind."""
+
+_BUS: Final[Schema] = {
+    "interface": Key(text, "a driver of python-can", "of the bus outside"),
+    "channel": Key(text, "a text", "of the driver, as can0", NONE),
+    "bitrate": Key(_BITRATE.field, _BITRATE.values, "for the driver to set", "as it is"),
+    "options": Key(table, "a table", "more for the driver", NONE),
+}
+
+REAL: Final[Schema] = {"control": Key(path, "a file", "control socket of the bench", NONE)}
+REAL_LINE: Final[Schema] = {
+    "link": Key(path, "a file", "symbolic link to its pty", NONE),
+    "serve": Key(texts, "a URL or several", "`rfc2217://` or `socket://[HOST:]PORT`", NONE),
+}
+REAL_BUS: Final[Schema] = _BUS
+
+HARDWARE: Final[Schema] = {
+    "control": Key(path, "a file", "control socket of an emulator as the operator", "the terminal")
+}
+HARDWARE_LINE: Final[Schema] = {
+    "port": Key(text, "a device path or URL", "where it is"),
+    "baud": Key(_BAUD.field, _BAUD.values, _BAUD.text, "that of the wire"),
+}
+HARDWARE_BUS: Final[Schema] = _BUS
+HARDWARE_DEVICE: Final[Schema] = {
+    "control": Key(path, "a file", "as above, for this device", "that of all"),
+    "power_on": Key(command, "a command line", "switches it on", "the operator does it"),
+    "power_off": Key(command, "a command line", "switches it off", "the operator does it"),
+}
+TOLERANCE: Final[Schema] = {
+    "stick_pct": Key(number(0, 50), "0..50", "how far a stick held by hand may be off", "10"),
+    "time_ms": Key(number(0, 1_000), "0..1000", "how far a time may be off", "50"),
+}
+
+TOP: Final[Schema] = {
+    "seed": Key(whole(0, (1 << 63) - 1), "0 or more", "of all chance", "0"),
+    **{
+        name: Key(table, "tables", meaning, NONE)
+        for name, meaning in (
+            ("wire", "what connects devices and hosts"),
+            ("device", "what is on the bench"),
+            ("signal", "values for formulas, see below"),
+            ("fault", "faults by device or wire, see below"),
+            ("body", "what drives move"),
+            ("real", "the bench in real time"),
+            ("hardware", "where the real devices are"),
+        )
+    },
+}
+
+PAGE: Final[Mapping[str, Schema]] = {
+    "the top": TOP,
+    "`[wire.NAME]`, serial": WIRES[WireType.SERIAL],
+    "`[wire.NAME]`, RS485": WIRES[WireType.RS485],
+    "`[wire.NAME]`, CAN": WIRES[WireType.CAN],
+    "`[device.NAME]`, on a serial line": SERIAL_DEVICE,
+    "`[device.NAME]`, CANopen": CANOPEN_DEVICE,
+    "`[body]`": BODY,
+    "`[real]`": REAL,
+    "`[real.NAME]`, of a line": REAL_LINE,
+    "`[real.NAME]`, of a bus": REAL_BUS,
+    "`[hardware]`": HARDWARE,
+    "`[hardware.NAME]`, of a line": HARDWARE_LINE,
+    "`[hardware.NAME]`, of a bus": HARDWARE_BUS,
+    "`[hardware.NAME]`, of a device": HARDWARE_DEVICE,
+    "`[hardware.tolerance]`": TOLERANCE,
+}
+"""All tables, by what the page calls them."""
+
+
+def rows(schema: Schema) -> Iterator[str]:
+    """Yield the lines of a schema's table for the page."""
+    yield "| key | value | unless given | meaning |"
+    yield "|---|---|---|---|"
+    for name, key in schema.items():
+        yield f"| `{name}` | {key.values} | {key.default or 'needed'} | {key.text} |"

@@ -1,0 +1,132 @@
+"""`[device.NAME.start]` and `[signal.NAME]`: inputs at the start, and what drives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.testing.rig_file.fields import check_name, closest, near, shown
+from tickrig.emulators.testing.rig_file.section import Section, is_broken
+from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
+from tickrig.emulators.testing.signals.scope import SLASH, check_signals
+from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.sources import Constant
+from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
+from tickrig.host.text.toml_document import TomlPath
+from tickrig.host.text.values import Setting
+
+Start = dict[str, Setting | SignalSpec]
+
+UNREAD = SignalSpec(Constant(0.0))
+"""In place of a signal that cannot be read, so that formulas find its name."""
+
+
+class StartReader:
+    """Reads starts and signals, and judges them together.
+
+    Args:
+        folder: where files of tables are looked for.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._signals: dict[str, SignalSpec] = {}
+        self._places: dict[str, tuple[Section, TomlPath]] = {}
+
+    def read_signals(self, section: Section) -> dict[str, SignalSpec]:
+        """Read `[signal]`."""
+        for name, value in section.values.items():
+            try:
+                check_name(name)
+            except ValueError as error:
+                section.wrong(str(error), name)
+            spec = self._spec(section, (name,), value) or UNREAD
+            self._signals[name], self._places[name] = spec, (section, (name,))
+        return dict(self._signals)
+
+    def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
+        """Read the start of a device.
+
+        Args:
+            device: its name.
+            section: the table.
+            physical: what it has.
+        """
+        start: Start = {}
+        if physical is UNKNOWN:
+            section = replace(section, values=_without_lists(section.values))
+        for keys, name, value in self._inputs(section, physical.inputs.groups):
+            if name in start:
+                section.wrong(f"{name} is given twice", *keys)
+            elif name not in (table := physical.inputs.table):
+                names = [*physical.inputs.groups, *table]
+                section.wrong(f"no input {shown(name)}; {near(name, names)}", *keys)
+            elif (found := self._value(section, keys, value, f"{device}{SLASH}{name}")) is not None:
+                start[name] = found
+                if not isinstance(found, SignalSpec):
+                    _check(section, keys, physical, name, found)
+        return start
+
+    def check(self, devices: Mapping[str, HasSignals]) -> None:
+        """Note what is wrong with signals together: names that nothing has, ranges, circles."""
+        for mistake in check_signals(self._signals, devices):
+            section, keys = self._places[str(mistake.keys[0])]
+            section.wrong(mistake.reason, *keys)
+
+    def _inputs(
+        self, section: Section, groups: Mapping[str, tuple[str, ...]]
+    ) -> Iterator[tuple[TomlPath, str, Any]]:
+        """Yield each input with the keys of its value; a group gives several."""
+        for name, value in section.values.items():
+            members = groups.get(name)
+            if members is None:
+                yield (name,), name, value
+            elif isinstance(value, list) and len(value) == len(members):
+                for at, (member, each) in enumerate(zip(members, value, strict=True)):
+                    yield (name, at), member, each
+            elif not is_broken(value):
+                wanted = f"[{', '.join(members)}]"
+                came = f"{len(value)} values" if isinstance(value, list) else shown(value)
+                section.wrong(f"it takes {wanted}, not {came}", name)
+
+    def _value(
+        self, section: Section, keys: TomlPath, value: Any, full: str
+    ) -> Setting | SignalSpec | None:
+        """Return a value, or a signal, which is kept to be checked; None if it is noted."""
+        if isinstance(value, bool | int | float | str):
+            return int(value) if isinstance(value, bool) else value
+        spec = self._spec(section, keys, value)
+        if spec is not None:
+            self._signals[full], self._places[full] = spec, (section, keys)
+        return spec
+
+    def _spec(self, section: Section, keys: TomlPath, value: Any) -> SignalSpec | None:
+        if is_broken(value):
+            return None
+        spec = read_signal_spec(value, keys, self._folder)
+        if isinstance(spec, SignalSpec):
+            return spec
+        depth = len(keys)
+        misspelt = [str(each[depth]) for each, _ in spec if each[depth:] and each[depth] in value]
+        for mistake in spec:
+            missing = mistake.keys[depth:]
+            if not (missing and missing[0] not in value and closest(str(missing[0]), misspelt)):
+                section.wrong(mistake.reason, *mistake.keys)
+        return None
+
+
+def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all values but those that may be groups."""
+    return {name: value for name, value in values.items() if not isinstance(value, list)}
+
+
+def _check(
+    section: Section, keys: TomlPath, physical: HasSignals, name: str, value: Setting
+) -> None:
+    try:
+        physical.inputs.check(name, value)
+    except ValueError as error:
+        section.wrong(str(error), *keys)
