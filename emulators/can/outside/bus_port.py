@@ -128,6 +128,11 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     bus, interface, channel = open_raw(options, instead)
     stack.callback(bus.shutdown)
     name = interface if channel is None else f"{interface} {channel}"
-    port = CanBusPort(bus)
     label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return OpenBus(WithoutEcho(port) if interface in ECHOING else port, name, label)
+    return OpenBus(port_on(bus, interface), name, label)
+
+
+def port_on(bus: can.BusABC, interface: str) -> CountingPort:
+    """Return the port on an open bus, without the echo that some interfaces give."""
+    port = CanBusPort(bus)
+    return WithoutEcho(port) if interface in ECHOING else port

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 
 from tickrig.emulators.canopen.build import store_keeper
 from tickrig.emulators.serial.emulator import LineSettings
@@ -24,6 +24,12 @@ from tickrig.wire.instant import NEVER
 
 T = TypeVar("T")
 
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.bench.real.outside import Outside
+
+VIRTUAL: Final = "virtual"
+REAL: Final = "real"
+
 
 class Bench(BenchDevice):
     """Devices on a bench, for a test: in virtual time, in real time, or real ones.
@@ -36,6 +42,7 @@ class Bench(BenchDevice):
         device: the only device: itself, or its type by name.
         seed: of all chance.
         line: what the serial lines are like, if the type of the device does not say it.
+        mode: `virtual` time, or `real` time with hosts at ptys and buses.
         devices: several, by name; CANopen slaves share a bus.
 
     Raises:
@@ -56,36 +63,34 @@ class Bench(BenchDevice):
         *,
         seed: int = 0,
         line: LineSettings | None = None,
+        mode: str = VIRTUAL,
         **devices: BenchedDevice,
     ) -> None:
         named = {**({} if device is None else {name_of(device): device}), **devices}
         if not named:
             raise ValueError("a bench has at least one device")
-        rig = BenchRig("bench", RigState(Parts(mounts=mounts_of(named, seed, line), seed=seed)))
-        self._start(VirtualMode(rig))
+        parts = Parts(mounts=mounts_of(named, seed, line), seed=seed)
+        self._start(_emulated(mode, parts, RigPlan()))
 
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
 
     @classmethod
-    def of_plan(cls, plan: RigPlan) -> Self:
-        """Return the bench of a rig file, in virtual time.
+    def of_plan(cls, plan: RigPlan, mode: str = VIRTUAL) -> Self:
+        """Return the bench of a rig file.
 
         Args:
             plan: what the file says.
+            mode: `virtual`, or `real`: where its hosts are then is in the plan.
 
         Raises:
             Refused: a device cannot be made.
-            ValueError: an option, input or fault that there is not.
+            ValueError: an option, input, fault or mode that there is not.
+            PortGone: a bus cannot be opened.
+            OSError: no port is to be had, or no link or socket can be made.
         """
-        parts = parts_of(plan)
-        state = RigState(parts)
-        rig = BenchRig("bench", state)
-        begin_faults(plan, state)
-        for store in parts.stores:
-            state.rig.watchers.append(store_keeper(store))
-        return cls.of_mode(VirtualMode(rig))
+        return cls.of_mode(_emulated(mode, parts_of(plan), plan))
 
     @classmethod
     def of_mode(cls, mode: BenchMode) -> Self:
@@ -247,3 +252,27 @@ class Bench(BenchDevice):
 
 def _never() -> bool:
     return False
+
+
+def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
+    """Start emulated devices in virtual or in real time."""
+    if mode == VIRTUAL:
+        return VirtualMode(_rig(parts, plan))
+    if mode != REAL:
+        raise ValueError(f"a bench of emulated devices is in mode virtual or real, not {mode!r}")
+    from tickrig.emulators.testing.bench.real.real_mode import RealMode  # noqa: PLC0415 - POSIX
+
+    return RealMode.open(parts.mounts, plan.real, lambda outside: _rig(parts, plan, outside))
+
+
+def _rig(parts: Parts, plan: RigPlan, outside: Outside | None = None) -> BenchRig:
+    """Make a rig with all that a plan says of it."""
+    state = (
+        RigState(parts)
+        if outside is None
+        else RigState(parts, bridges=outside.bridges, clock=outside.clock)
+    )
+    begin_faults(plan, state)
+    for store in parts.stores:
+        state.rig.watchers.append(store_keeper(store))
+    return BenchRig("bench", state)

@@ -1,0 +1,88 @@
+"""The outside ends of an emulated bench: ptys, TCP ports, and buses of python-can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+
+from tickrig.emulators.rig.rig import OutsideBridge
+from tickrig.emulators.serial.bridge import Bridge
+from tickrig.emulators.serial.network.network_port import NetworkPort
+from tickrig.emulators.serial.network.serve_url import parse_serve_url
+from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.emulators.serial.serial_hub import SerialHub
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.emulators.testing.bench.real.doors import LinePlace
+from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
+from tickrig.host.control.clock import ServingClock
+
+IN_PROCESS = "virtual"
+"""The bus of python-can that has both ends in one process."""
+
+
+class Outside:
+    """Where hosts find the wires of a bench in real time.
+
+    A serial line is at a pty, and at what it is served by too. A CAN bus is joined with one of
+    python-can: unless told otherwise one in this process, on a channel of its own.
+
+    Args:
+        mounts: the wires.
+        plan: where they are to be.
+
+    Attributes:
+        clock: of the rig.
+        bridges: between the wires and the outside, for the rig.
+        places: where hosts of this process come in, by the name of the wire.
+        ports: of the lines, by the name of the wire.
+
+    Raises:
+        BusGone: a bus cannot be opened.
+        OSError: no port is to be had, or no link can be made.
+    """
+
+    def __init__(self, mounts: Iterable[Mount], plan: RealPlan | None = None) -> None:
+        doors = {} if plan is None else plan.doors
+        self.clock, self._stack = ServingClock(), ExitStack()
+        self.bridges: list[OutsideBridge] = []
+        self.places: dict[str, LinePlace | BusPlan] = {}
+        self.ports: dict[str, list[PtyPort | NetworkPort]] = {}
+        with ExitStack() as undo:
+            undo.callback(self.close)
+            for mount in mounts:
+                door = doors.get(mount.name, DoorPlan())
+                if isinstance(mount, LineMount):
+                    self._open_line(mount, door)
+                else:
+                    self._open_bus(mount, door.bus or _own_bus(mount))
+            undo.pop_all()
+
+    def _open_line(self, mount: LineMount, door: DoorPlan) -> None:
+        pty = PtyPort(door.link)
+        self._stack.callback(pty.close)
+        ports = self.ports[mount.name] = [pty]
+        for url in door.serve:
+            served = NetworkPort(parse_serve_url(url))
+            self._stack.callback(served.close)
+            ports.append(served)
+        self.bridges.append(Bridge(mount.line.b, SerialHub(ports) if door.serve else pty))
+        self.places[mount.name] = LinePlace(pty.path, mount.settings.baud)
+
+    def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
+        from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
+        from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.bench.real.watched_bus import open_bus  # noqa: PLC0415
+
+        bus = open_bus(plan, {})
+        self._stack.callback(bus.shutdown)
+        self.bridges.append(CanBridge(mount.open_end(), port_on(bus, plan.interface)))
+        self.places[mount.name] = plan
+
+    def close(self) -> None:
+        """Give everything back."""
+        self._stack.close()
+
+
+def _own_bus(mount: BusMount) -> BusPlan:
+    """Return a bus that nobody else has."""
+    return BusPlan(interface=IN_PROCESS, channel=f"{mount.name} {id(mount)}")

@@ -1,0 +1,240 @@
+"""A bench in real time: the rig runs in a thread of its own, hosts are at ptys and buses."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
+
+from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.mounts import LineMount, Mount
+from tickrig.emulators.testing.bench.real.control_thread import ControlThread
+from tickrig.emulators.testing.bench.real.cpu_waits import CpuWaits
+from tickrig.emulators.testing.bench.real.door_watch import HostPace
+from tickrig.emulators.testing.bench.real.doors import Doors
+from tickrig.emulators.testing.bench.real.lateness import too_slow
+from tickrig.emulators.testing.bench.real.outside import Outside
+from tickrig.emulators.testing.bench.real.rig_thread import RigThread
+from tickrig.emulators.testing.bench.virtual_mode import answer_of
+from tickrig.emulators.testing.rig_file.plan import RealPlan
+from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.text.trace import Mark
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+T = TypeVar("T")
+
+SWITCH_S: Final = 0.0005
+"""A thread that computes lets the rig come to its turn after this time (Python: 5 ms)."""
+
+
+class HostInCondition(BaseException):
+    """A condition that is asked between two ticks cannot wait for a device."""
+
+
+class _Watch(HostPace):
+    """Knows how late the host is, and keeps it out of the rig's thread."""
+
+    def __init__(self, thread: RigThread) -> None:
+        super().__init__()
+        self._thread = thread
+
+    def used(self) -> None:
+        if self._thread.here:
+            raise HostInCondition
+
+    def passed(self, mark: Mark, traffic: Any) -> None:
+        """The rig hears it itself."""
+
+
+class RealMode:
+    """A `BenchMode` whose time is that of this machine; it begins with the first door or wait.
+
+    Args:
+        rig: the rig, with the clock and the bridges of `outside`.
+        outside: where hosts find its wires; closed in the end.
+    """
+
+    name = "real"
+
+    def __init__(self, rig: BenchRig, outside: Outside) -> None:
+        self._rig, self._clock, self._stack = rig, outside.clock, ExitStack()
+        self._thread = RigThread(rig, outside.clock)
+        self._control, self._begun = EmulatorControl(rig), False
+        self._pace, self._waits = _Watch(self._thread), CpuWaits()
+        self._doors = Doors(outside.places, lambda wire: self._pace)
+        rig.rig.watchers.append(self._waits.look)
+        self._watch_settings(outside)
+        for close in (outside.close, self._thread.stop, self._doors.close):
+            self._stack.callback(close)
+
+    @classmethod
+    def open(
+        cls, mounts: Sequence[Mount], plan: RealPlan, rig_at: Callable[[Outside], BenchRig]
+    ) -> Self:
+        """Return the mode of devices on their wires.
+
+        Args:
+            mounts: the wires with their devices.
+            plan: where hosts find them.
+            rig_at: makes the rig, with the clock and the bridges of the outside.
+
+        Raises:
+            PortGone: a bus cannot be opened.
+            OSError: no port is to be had, or no link or socket can be made.
+        """
+        outside = Outside(mounts, plan)
+        with ExitStack() as undo:
+            undo.callback(outside.close)
+            mode = cls(rig_at(outside), outside)
+            if plan.control is not None:
+                server = ControlThread(plan.control, mode._control, mode._thread.call)
+                mode._stack.callback(server.close)
+            undo.pop_all()
+        return mode
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        return tuple(self._rig.state.assembly.parts)
+
+    @property
+    def wires(self) -> tuple[str, ...]:
+        """The names of all wires."""
+        return tuple(self._rig.state.mounts)
+
+    @property
+    def now_us(self) -> int:
+        """The time of the rig; between two ticks that of this machine."""
+        now_us = self._rig.rig.now_us
+        if not self._thread.running:
+            return now_us
+        return min(self._clock.now_us, now_us + self._tick_us)
+
+    @property
+    def _tick_us(self) -> int:
+        return self._rig.state.assembly.tick_us
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on."""
+        return self._rig.state.wire_of(device)
+
+    def request(self, do: str, **fields: object) -> Object:
+        """Ask as the control socket is asked; ValueError if it is refused."""
+        request = {"v": VERSION, "do": do, **fields}
+        return answer_of(self._thread.call(partial(self._control.answer, request)))
+
+    def act(self, action: Callable[[BenchRig], T]) -> T:
+        """Do something to the rig between two ticks."""
+        return self._thread.call(partial(action, self._rig))
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+        self.wait_until(lambda: False, duration_us)
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time.
+
+        It is asked between the ticks. If it wants to hear a device it is asked in the thread of
+        the caller instead, once a tick.
+        """
+        self._begin()
+        until_us = self.now_us + within_us
+        try:
+            if self._thread.wait_until(done, until_us - self._tick_us):
+                return True
+            self._sleep_until(until_us)
+            return self._thread.call(done)
+        except HostInCondition:
+            return self._ask_until(done, until_us)
+
+    def _ask_until(self, done: Callable[[], bool], until_us: int) -> bool:
+        while not done():
+            if self.now_us >= until_us:
+                return False
+            self.run_for(min(self._tick_us, until_us - self.now_us))
+        return True
+
+    def _sleep_until(self, until_us: int) -> None:
+        while (left_us := until_us - self.now_us) > 0 and self._thread.running:
+            with self._pace.waiting(left_us):
+                time.sleep(left_us / 1e6)
+
+    def _begin(self) -> None:
+        """Let time pass from now on."""
+        if not self._begun:
+            self._begun = True
+            self._stack.callback(sys.setswitchinterval, sys.getswitchinterval())
+            sys.setswitchinterval(SWITCH_S)
+            self._thread.start()
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        link = self._doors.link(wire)
+        self._begin()
+        return link
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        port = self._doors.serial(wire, options)
+        self._begin()
+        return port
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        bus = self._doors.can_bus(wire, options)
+        self._begin()
+        return bus
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        network = self._doors.canopen_network(wire)
+        self._begin()
+        return network
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return the latest lines and frames, and what was done."""
+        return self._thread.call(self._rig.journal.lines)
+
+    def too_slow(self) -> str:
+        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+        rig, behind_us = self._rig.rig, 0
+        if self._thread.running:
+            behind_us = self._clock.now_us - rig.now_us - self._tick_us
+            self._thread.call(lambda: self._waits.look(rig.now_us))
+        return too_slow(
+            host=max(self._pace.late_us, self._waits.worst_us),
+            emulator=max(rig.worst_late_us, behind_us),
+        )
+
+    def fork(self) -> NoReturn:
+        """Refuse: what is outside cannot be copied."""
+        raise NotOnThisBench("a twin goes on in virtual time: this bench is in real time")
+
+    def close(self) -> None:
+        """Give everything back; raise what a device raised, unless it was raised before."""
+        self._begun = True
+        self._stack.close()
+
+    def _watch_settings(self, outside: Outside) -> None:
+        """Note what a host sets its port to, if the device is not like that."""
+        for wire, ports in outside.ports.items():
+            mount = self._rig.state.mounts[wire]
+            assert isinstance(mount, LineMount)
+            for port in ports:
+                port.watch_setting(mount.settings.baud, partial(self._note_setting, wire))
+
+    def _note_setting(self, wire: str, setting: str) -> None:
+        text = f"the host has set its port to {setting}"
+        self._rig.journal.add(self._rig.effective_us, Mark.PHYSICAL, text.encode(), wire)

@@ -1,0 +1,76 @@
+"""A bus of python-can, with a watch at it."""
+
+from __future__ import annotations
+
+from time import monotonic_ns
+from typing import Any
+
+import can
+
+from tickrig.emulators.testing.bench.errors import PortGone
+from tickrig.emulators.testing.bench.real.door_watch import DoorWatch
+from tickrig.emulators.testing.rig_file.plan import BusPlan
+from tickrig.host.links.can_link import keep_to_group
+from tickrig.host.links.can_message import to_frame
+from tickrig.host.text.trace import Mark
+
+
+class BusGone(PortGone, can.CanOperationError):
+    """A bus is there no more; for hosts, python-can's own error."""
+
+
+class _Watched(can.BusABC):
+    """What a watched bus does beside what its class does."""
+
+    _watch: DoorWatch
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        self._watch.used()
+        begun_ns = monotonic_ns()
+        message = super().recv(timeout)
+        if message is not None:
+            self._tell(Mark.FROM_DEVICE, message)
+        elif timeout is not None:
+            self._watch.waited(round(timeout * 1e6), (monotonic_ns() - begun_ns) // 1_000)
+        return message
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self._watch.used()
+        super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
+        self._tell(Mark.TO_DEVICE, msg)
+
+    def _tell(self, mark: Mark, message: can.Message) -> None:
+        if frame := to_frame(message):
+            self._watch.passed(mark, (frame,))
+
+
+def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
+    """Open a bus.
+
+    Args:
+        plan: which.
+        options: more, as `can.Bus` takes them.
+
+    Raises:
+        BusGone: it cannot be opened.
+    """
+    rate = {} if plan.bit_rate is None else {"bitrate": plan.bit_rate}
+    try:
+        bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
+    except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
+        raise BusGone(f"cannot open {name_of(plan)}: {error}") from error
+    keep_to_group(bus, plan.interface)
+    return bus
+
+
+def open_watched(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -> can.BusABC:
+    """Open a bus with a watch at it; see `open_bus`."""
+    bus = open_bus(plan, options)
+    kind = type(bus)
+    bus.__class__ = type(kind.__name__, (_Watched, kind), {"_watch": watch})
+    return bus
+
+
+def name_of(plan: BusPlan) -> str:
+    """Return what people call a bus, as `socketcan can0`."""
+    return plan.interface if plan.channel is None else f"{plan.interface} {plan.channel}"
