@@ -29,7 +29,7 @@ class _Watched(can.BusABC):
         begun_ns = monotonic_ns()
         message = super().recv(timeout)
         if message is not None:
-            self._tell(Mark.FROM_DEVICE, message)
+            self._pass_on(Mark.FROM_DEVICE, message)
         elif timeout is not None:
             self._watch.waited(round(timeout * 1e6), (monotonic_ns() - begun_ns) // 1_000)
         return message
@@ -37,9 +37,9 @@ class _Watched(can.BusABC):
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self._watch.used()
         super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
-        self._tell(Mark.TO_DEVICE, msg)
+        self._pass_on(Mark.TO_DEVICE, msg)
 
-    def _tell(self, mark: Mark, message: can.Message) -> None:
+    def _pass_on(self, mark: Mark, message: can.Message) -> None:
         if frame := to_frame(message):
             self._watch.passed(mark, (frame,))
 
