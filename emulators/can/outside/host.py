@@ -53,6 +53,7 @@ class CanHost:
         rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self._repeats: list[Repeat] = []
+        rig.watchers.append(self._send_due)
 
     @property
     def now_us(self) -> int:
@@ -65,12 +66,16 @@ class CanHost:
         self._end.send(self.now_us, traffic)
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
-        """Send a frame now and one in each period, in turn, until it is stopped."""
+        """Send a frame now and one in each period, in turn, until it is stopped.
+
+        Whoever makes the rig's time pass lets them be sent.
+        """
         if period_us < 1 or not frames:
             raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
         repeat = Repeat(frames, period_us, self.now_us)
         self.send(repeat.take())
         self._repeats.append(repeat)
+        self._wake()
         return repeat
 
     def receive(self, timeout_us: int, /) -> Frames:
@@ -103,23 +108,38 @@ class CanHost:
 
     def close(self) -> None:
         """Close the link; the rig stays as it is."""
+        if not self._closed:
+            self._rig.watchers.remove(self._send_due)
         self._closed = True
         self._repeats.clear()
 
     def _step(self, deadline_us: int) -> None:
-        """Let the rig run until a frame has come, or one is to be repeated."""
-        self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
-        repeat_us = min((repeat.due_us for repeat in self._repeats), default=NEVER)
-        until_us = min(repeat_us, deadline_us)
-        if until_us == NEVER:
+        """Let the rig run until a frame has come."""
+        if deadline_us == NEVER:
             if self._rig.next_us == NEVER:
                 raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
-            until_us = self._rig.next_us + CHUNK_US
-        self._rig.run_to(until_us, self._end)
-        for repeat in self._repeats:
-            if repeat.due_us <= self.now_us:
-                self._end.send(self.now_us, repeat.take())
+            deadline_us = self._rig.next_us + CHUNK_US
+        self._rig.run_to(deadline_us, self._end)
+
+    def _wake(self) -> None:
+        """Let the rig stop when the next frame is to be repeated."""
+        self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
+        if self._repeats:
+            due_us = min(repeat.due_us for repeat in self._repeats)
+            self._rig.event_queue.put(("repeat", id(self)), due_us, _nothing)
+
+    def _send_due(self, now_us: int) -> None:
+        """Send what is due; called after each step of the rig."""
+        due = [repeat for repeat in self._repeats if repeat.due_us <= now_us]
+        for repeat in due:
+            self._end.send(now_us, repeat.take())
+        if due:
+            self._wake()
 
     def _check_open(self) -> None:
         if self._closed:
             raise LinkClosed("the link was closed")
+
+
+def _nothing(now_us: int) -> None:
+    """Be a time at which the rig stops."""

@@ -36,7 +36,7 @@ class SimNetwork(canopen.Network):
     and a run is the same each time. Where an object of the library comes to
     this network its conditions and queues are exchanged, and its methods see
     the rig's `time`; nothing outside of it is touched. A callback is called
-    while something waits, never by itself. Not changed: classes of yours that
+    while time passes, whoever makes it pass. Not changed: classes of yours that
     call the real `time`; let time pass by `run_for` or `sleep` instead.
 
     Args:
@@ -54,8 +54,11 @@ class SimNetwork(canopen.Network):
         self._names: dict[str, object] = {"time": self.clock, "queue": SimQueues(self)}
         self._names["BlockUploadStream"] = retimed(BlockUploadStream, dict(self._names), LIBRARY)
         self._adopted: dict[int, object] = {}
+        self._waits = 0
         super().__init__()
         self._adopt(self.time)
+        rig.watchers.append(self._hear)
+        self._rig = rig
 
     @property
     def time_s(self) -> float:
@@ -69,6 +72,8 @@ class SimNetwork(canopen.Network):
     def disconnect(self) -> None:
         """Close the link; the rig stays as it is."""
         super().disconnect()
+        if self._hear in self._rig.watchers:
+            self._rig.watchers.remove(self._hear)
         self.host.close()
 
     def run_for(self, duration_us: int) -> None:
@@ -81,15 +86,28 @@ class SimNetwork(canopen.Network):
         return self._wait_until(done, None if timeout_us is None else self.host.now_us + timeout_us)
 
     def _wait_until(self, done: Callable[[], bool], deadline_us: int | None) -> bool:
-        while not done():
-            left_us = None if deadline_us is None else deadline_us - self.host.now_us
-            taken = self.host.take(left_us)
-            if taken is None:
-                return done()
-            message = to_message(taken[1], EPOCH_S * 1_000_000 + taken[0])
-            for listener in tuple(self.listeners):
-                listener.on_message_received(message)  # type: ignore[no-untyped-call]  # canopen's
+        self._waits += 1
+        try:
+            while not done():
+                left_us = None if deadline_us is None else deadline_us - self.host.now_us
+                taken = self.host.take(left_us)
+                if taken is None:
+                    return done()
+                self._deliver(*taken)
+        finally:
+            self._waits -= 1
         return True
+
+    def _hear(self, now_us: int) -> None:
+        """Deliver what has come while somebody else made time pass."""
+        if not self._waits:
+            while (taken := self.host.take(0)) is not None:
+                self._deliver(*taken)
+
+    def _deliver(self, at_us: int, frame: CanFrame) -> None:
+        message = to_message(frame, EPOCH_S * 1_000_000 + at_us)
+        for listener in tuple(self.listeners):
+            listener.on_message_received(message)  # type: ignore[no-untyped-call]  # canopen's
 
     def send_message(self, can_id: int, data: Data, remote: bool = False) -> None:
         """Send a frame; no time passes."""
