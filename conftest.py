@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.hil.rig_file import RIG, BadRigFile, read_rig_file
+from tickrig.emulators.testing.plugin import pytest_plugin
 
 collect_ignore = ["tests/stranger"]  # of somebody else: `tests/test_stranger.py` installs it
 
@@ -17,7 +18,9 @@ settings.register_profile("tickrig", deadline=None, suppress_health_check=[Healt
 settings.load_profile("tickrig")
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
+    if not pluginmanager.has_plugin("tickrig"):  # it is not installed, and runs from src
+        pluginmanager.register(pytest_plugin, "tickrig")
     parser.addoption(
         "--hil",
         metavar="RIG.TOML",

@@ -19,6 +19,7 @@ from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
 from tickrig.emulators.testing.bench.triggers import Condition
 from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
 from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.host.control.requests import Object
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
@@ -153,6 +154,7 @@ class Bench(BenchDevice):
         """
         return self._mode.wait_until(done, us_of(within))
 
+<<<<<<< HEAD
     async def sleep(self, duration: Duration) -> None:
         """Wait in an async body; other tasks go on meanwhile.
 

@@ -1,0 +1,54 @@
+"""What is told after a failure: what was asked, what happened last, and how to repeat it."""
+
+from __future__ import annotations
+
+import shlex
+from os.path import relpath
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from tickrig.emulators.testing.plugin.journal_text import last_lines
+from tickrig.emulators.testing.plugin.settings import SETTINGS
+from tickrig.host.text.values import format_time
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.plugin.benched_test import BenchedTest
+
+LINES: Final = 20
+"""So many lines and frames are told."""
+
+
+def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
+    """Return the sections of a report, each with its title."""
+    command = ("bench: repeat it with", repeat_command(test.item))
+    if test.bench is None:
+        return [("bench", test.asked.text), command]
+    last = last_lines(test.bench, LINES) or "nothing happened"
+    return [("bench", _asked(test)), ("bench: what happened last", last), command]
+
+
+def repeat_command(item: pytest.Item) -> str:
+    """Return the command that runs a test again, for a shell."""
+    config = item.config
+    file, *names = str(item.nodeid).split("::")
+    seed = config.stash[SETTINGS].seed
+    words = [
+        "pytest",
+        "::".join([relpath(config.rootpath / file, config.invocation_params.dir), *names]),
+    ]
+    for flag, value in (
+        ("--bench-mode", config.getoption("bench_mode")),
+        ("--bench-seed", None if seed is None else str(seed)),
+    ):
+        words += [] if value is None else [flag, value]
+    return shlex.join(words)
+
+
+def _asked(test: BenchedTest) -> str:
+    bench = test.bench
+    assert bench is not None
+    what = test.asked.text
+    devices = ", ".join(bench.devices)
+    named = what if what == devices else f"{what} with {devices}"
+    return f"{named}; {bench.mode}, seed {test.asked.seed_used}, {format_time(bench.now_us)} s old"

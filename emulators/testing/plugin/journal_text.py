@@ -1,0 +1,66 @@
+"""What happened on a bench, for people: CAN frames with what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.mounts import BusMount
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import format_time
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoder import Decoder
+
+
+def buses_of(bench: Bench) -> tuple[str, ...]:
+    """Return the names of its CAN buses."""
+    try:
+        mounts = bench._mode.act(lambda rig: rig.state.mounts)
+    except NotOnThisBench:
+        return ()
+    return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
+
+
+def decoded(lines: Iterable[WireLine], buses: Collection[str]) -> Iterator[tuple[WireLine, str]]:
+    """Return each line with its text; frames have their meaning behind them.
+
+    Args:
+        lines: from the first on: what frames mean depends on those before them.
+        buses: names of the CAN buses.
+    """
+    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
+
+    decoder = Decoder()
+    for line in lines:
+        text = escape(line.data)
+        if line.source in buses and line.mark is not Mark.PHYSICAL:
+            text = f"{text}  {_meaning(decoder, line)}".rstrip()
+        yield line, text
+
+
+def last_lines(bench: Bench, count: int) -> str:
+    """Return the last that happened on a bench: time, where, direction, text."""
+    told = list(decoded(bench._mode.journal(), buses_of(bench)))[-count:]
+    return "\n".join(
+        f"{format_time(line.at_us)} {line.source} {line.mark} {text}" for line, text in told
+    )
+
+
+def _meaning(decoder: Decoder, line: WireLine) -> str:
+    from tickrig.host.monitor.frames.record import Record  # noqa: PLC0415 - as the decoder
+    from tickrig.wire.can import CanFrame  # noqa: PLC0415
+    from tickrig.wire.can_error import ErrorFrame  # noqa: PLC0415
+    from tickrig.wire.errors import FramingError  # noqa: PLC0415
+
+    text = line.data.decode()
+    frame: CanFrame | ErrorFrame
+    try:
+        frame = ErrorFrame.parse(text)
+    except FramingError:
+        frame = CanFrame.parse(text)
+    return decoder.take(Record(line.at_us, line.source, frame)).text

@@ -1,0 +1,131 @@
+"""The pytest plug-in: options, markers and fixtures; all else is imported when a test asks.
+
+Entry point `pytest11`: every pytest of an environment with tickrig loads this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from tickrig.emulators.testing.plugin.settings import OPTIONS, RANDOM, SETTINGS, Settings
+from tickrig.emulators.testing.plugin.stash import BENCHED, skipped_where_it_cannot
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.bench.bench import Bench
+    from tickrig.emulators.testing.plugin.bench_source import BenchSource
+    from tickrig.emulators.testing.plugin.safe_state import SafeState
+
+MARKERS: Final = (
+    "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
+    "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
+    "allows(*what): what may have been on the bench though no fault ordered it: 'lost' for what "
+    "found a buffer full, 'error frames' (tickrig)",
+    "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
+)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Enter the options, on the command line and in the configuration file."""
+    group = parser.getgroup("tickrig", "benches of tickrig")
+    for name, metavar, text in OPTIONS:
+        flag = "--" + name.replace("_", "-")
+        if metavar:
+            group.addoption(flag, dest=name, metavar=metavar, help=text)
+        else:
+            group.addoption(flag, dest=name, action="store_const", const="true", help=text)
+        parser.addini(name, text, default="")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Enter the markers, and read what was asked for."""
+    for line in MARKERS:
+        config.addinivalue_line("markers", line)
+    if (config.getoption("bench_seed") or config.getini("bench_seed")) == RANDOM:
+        config.option.bench_seed = _any_seed()  # so the workers of pytest-xdist get it too
+    settings = config.stash[SETTINGS] = Settings.of(config)
+    config.pluginmanager.register(_mode_fixture(settings.modes), "tickrig-bench-mode")
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say what was asked for."""
+    return config.stash[SETTINGS].head or None
+
+
+def _any_seed() -> str:
+    from secrets import randbelow  # noqa: PLC0415 - not always
+
+    return str(randbelow(1_000_000))
+
+
+def _mode_fixture(modes: tuple[str, ...]) -> object:
+    """Return a plug-in with the fixture `bench_mode`, which has a parameter for each mode."""
+
+    class ModeFixture:
+        @pytest.fixture(params=modes if len(modes) > 1 else None)
+        def bench_mode(self, request: pytest.FixtureRequest) -> str:
+            """What kind of bench: virtual, real or hardware, as `--bench-mode` says."""
+            mode: str = getattr(request, "param", modes[0])
+            return mode
+
+    return ModeFixture()
+
+
+@pytest.fixture
+def bench_config(request: pytest.FixtureRequest) -> BenchSource:
+    """What is on the bench; override it: a device, arguments of `Bench`, or a rig file."""
+    source: BenchSource = getattr(request, "param", None)
+    return source
+
+
+@pytest.fixture
+def bench_safe() -> SafeState:
+    """What outputs are when a test is over; override it: values by name, or a check."""
+    return None
+
+
+@pytest.fixture
+def bench(
+    request: pytest.FixtureRequest,
+    bench_config: BenchSource,
+    bench_mode: str,
+    bench_safe: SafeState,
+) -> Iterator[Bench]:
+    """A bench for this test alone, of `bench_config` or `--bench`; healthy after the test."""
+    from tickrig.emulators.testing.plugin.benched_test import benched  # noqa: PLC0415 - asked for
+
+    source: BenchSource = getattr(request, "param", bench_config)
+    with benched(request, source, bench_mode, bench_safe) as opened:
+        yield opened
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
+    """Note requirements; skip a test whose fixtures its bench cannot give."""
+    for marker in item.iter_markers("req"):
+        item.user_properties.extend(("req", name) for name in marker.args)
+    with skipped_where_it_cannot():
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
+    """Skip a test that its bench cannot run; fail one that leaves its bench in a bad state."""
+    with skipped_where_it_cannot():
+        result = yield
+        if (test := item.stash.get(BENCHED, None)) is not None:
+            test.check()
+    return result
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Complete the reports of tests that have a bench."""
+    report = yield
+    if (test := item.stash.get(BENCHED, None)) is not None:
+        test.judge(report, call)
+    return report

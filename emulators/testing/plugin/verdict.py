@@ -1,0 +1,33 @@
+"""No failure of a device is what the bench is to blame for."""
+
+from __future__ import annotations
+
+import pytest
+
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.errors import BenchBlocked
+
+
+def blocked(report: pytest.TestReport, call: pytest.CallInfo[None], bench: Bench | None) -> str:
+    """Say why a phase of a test came to no verdict about the device; empty if it did."""
+    if call.excinfo is not None and isinstance(call.excinfo.value, BenchBlocked):
+        return str(call.excinfo.value) or type(call.excinfo.value).__name__
+    if bench is None or not report.failed or report.when == "teardown":
+        return ""
+    return bench._mode.too_slow()
+
+
+def make_error(report: pytest.TestReport, reason: str) -> None:
+    """Make an error of the bench out of what would be a failure of the device, or expected."""
+    report.outcome = "failed"
+    report.__dict__.pop("wasxfail", None)  # nobody expects the bench to be at fault
+    if report.when == "call":
+        report.when = "setup"  # pytest and JUnit call it an error then
+    report.sections.append(("bench: blocked", reason))
+    crash = getattr(report.longrepr, "reprcrash", None)
+    if crash is None:
+        report.longrepr = f"blocked: {reason}\n{report.longreprtext}".rstrip()
+    elif reason in crash.message:
+        crash.message = f"blocked: {reason}"
+    else:
+        crash.message = f"blocked: {reason}: {crash.message}"

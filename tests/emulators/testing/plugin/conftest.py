@@ -1,0 +1,32 @@
+"""Test runs of their own, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import can
+import canopen
+import pytest
+import serial
+
+from tickrig.emulators.testing.plugin import benched_test, journal_text, pytest_plugin
+from tickrig.host.monitor.decode import decoder
+
+Run = Callable[..., pytest.RunResult]
+
+IMPORTED_ONCE = (benched_test, journal_text, decoder, can, canopen, serial)
+"""A run of its own forgets what it has imported, and what is imported twice has two classes."""
+
+
+@pytest.fixture
+def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run pytest with the plug-in, whether it is installed or not, and with no other one."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("COLUMNS", "250")
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+
+    def run(*options: str) -> pytest.RunResult:
+        given = ("--strict-markers", "-rA", *options)
+        return pytester.runpytest_inprocess(*given, plugins=[pytest_plugin])
+
+    return run

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+from xml.etree import ElementTree as Xml
+
+import pytest
+
+from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.test_bench_fixture import RRC
+
+pytest_plugins = ("pytester",)
+
+
+@pytest.mark.parametrize(
+    ("needs", "skipped"),
+    [
+        ("'virtual'", ""),
+        ("'hand', 'fault:cut', 'fault:vr2_fault', 'input:stick', 'output:state'", ""),
+        ("'device:rrc'", ""),
+        ("'real or virtual'", ""),
+        ("'device:urg or fault:cut'", ""),
+        ("'real'", "needs real, and this bench is virtual"),
+        ("'real or hardware'", "needs real or hardware, and this bench is virtual"),
+        ("'virtual', 'fault:smoke'", "needs fault:smoke: no fault 'smoke'; known: *cut*"),
+        ("'device:urg'", "needs device:urg: no device 'urg'; known: rrc"),
+        ("'real or input:lamp'", "needs *: this bench is virtual and no input 'lamp'; known: *"),
+    ],
+)
+def test_a_test_runs_where_all_is_that_it_needs(
+    pytester: pytest.Pytester, run: Run, needs: str, skipped: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        @pytest.mark.needs({needs})
+        def test_one(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=not skipped, skipped=bool(skipped))
+    if skipped:
+        result.stdout.fnmatch_lines([f"SKIPPED [[]1[]] test_*.py:3: {skipped}"])
+
+
+def test_what_nobody_can_have_is_an_error(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.needs("fault:cut", "vitual")
+        def test_one(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["no bench: needs('vitual'): nobody has that; known: virtual, *"])
+
+
+def test_markers_of_a_module_count_too(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+
+        pytestmark = pytest.mark.needs("hardware")
+
+        def test_one(bench):
+            pass
+
+        def test_without_a_bench():
+            pass
+        """
+    )
+    run().assert_outcomes(passed=1, skipped=1)
+
+
+def test_what_a_bench_cannot_do_skips_the_test(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.emulators.testing.bench.errors import NotOnThisBench
+
+        @pytest.fixture
+        def plug(bench):
+            raise NotOnThisBench("no plug here")
+
+        @pytest.mark.xfail(strict=True)
+        def test_one(bench):
+            raise NotOnThisBench("no hand here")
+
+        def test_two(plug):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(skipped=2)
+    result.stdout.fnmatch_lines(["SKIPPED*.py:8: no hand here", "SKIPPED*.py:12: no plug here"])
+
+
+def test_requirements_stand_in_junit_files(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.req("SAF-12", "SAF-13")
+        def test_one():
+            pass
+
+        @pytest.mark.req("SAF-14")
+        @pytest.mark.skip
+        def test_two():
+            pass
+        """
+    )
+    run("--junitxml=out.xml")
+    found = Xml.parse(pytester.path / "out.xml").iter("property")
+    assert [(item.get("name"), item.get("value")) for item in found] == [
+        ("req", "SAF-12"),
+        ("req", "SAF-13"),
+        ("req", "SAF-14"),
+    ]
+
+
+def test_markers_are_told(run: Run) -> None:
+    run("--markers").stdout.fnmatch_lines(
+        ["@pytest.mark.needs([*]what): *(tickrig)", "@pytest.mark.req([*]names): *(tickrig)"]
+    )

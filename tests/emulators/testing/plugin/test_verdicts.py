@@ -1,0 +1,228 @@
+from __future__ import annotations
+
+from xml.etree import ElementTree as Xml
+
+import pytest
+
+from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.test_bench_fixture import RRC
+
+pytest_plugins = ("pytester",)
+
+
+def test_a_failure_tells_what_was_asked_what_happened_and_how_to_repeat_it(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.parametrize("name", ["a b"])
+        def test_one(bench, name):
+            bench.link.send(b"hello\\n")
+            bench.run_for("1.5s")
+            assert bench.get("state") == "Lost"
+        """
+    )
+    result = run("--bench-seed", "7")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*- bench -*",
+            "rrc; virtual, seed 7, 1.500000 s old",
+            "*- bench: what happened last -*",
+            "0.*0 rrc > hello",
+            "0.*0 rrc < ER:*",
+            "*- bench: repeat it with -*",
+            "pytest 'test_a_*.py::test_one[[]a b[]]' --bench-seed 7",
+        ]
+    )
+
+
+def test_frames_are_told_with_what_they_mean(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.device import make_epos
+
+        @pytest.fixture
+        def bench_config():
+            return {"left": make_epos(1), "right": make_epos(2)}
+
+        def test_one(bench):
+            bench["left"].fault("power_off@50ms")
+            bench.run_for("100ms")
+            assert not bench.now_us
+        """
+    )
+    result = run()
+    result.stdout.fnmatch_lines(
+        [
+            "left, right; virtual, seed 0, 0.100000 s old",
+            "0.* can < 701#00  *boot*",
+            "0.050000 left ! power_off=1",
+        ]
+    )
+
+
+def test_what_blocks_a_test_is_no_failure_of_the_device(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.emulators.testing.bench.errors import OperatorRefused, PortGone
+
+        def test_one(bench):
+            raise PortGone("/dev/ttyUSB0 is gone")
+
+        @pytest.mark.xfail(reason="no wonder")
+        def test_two(bench):
+            raise OperatorRefused("power_button: the operator said no")
+        """
+    )
+    result = run("--junitxml=out.xml")
+    result.assert_outcomes(errors=2)
+    result.stdout.fnmatch_lines(
+        [
+            "ERROR *::test_one - blocked: /dev/ttyUSB0 is gone",
+            "ERROR *::test_two - blocked: power_button: the operator said no",
+        ]
+    )
+    suite = Xml.parse(pytester.path / "out.xml").find("testsuite")
+    assert suite is not None
+    assert (suite.get("errors"), suite.get("failures")) == ("2", "0")
+
+
+def test_blocked_tests_are_run_again_with_lf(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        from tickrig.emulators.testing.bench.errors import PortGone
+
+        def test_well(bench):
+            pass
+
+        def test_blocked(bench):
+            raise PortGone("/dev/ttyUSB0 is gone")
+
+        def test_failed(bench):
+            assert bench.now_us
+
+        def test_last(bench):
+            pass
+        """
+    )
+    run().assert_outcomes(passed=2, errors=1, failed=1)
+    run("--lf").assert_outcomes(errors=1, failed=1)
+    run("-x").assert_outcomes(passed=1, errors=1)
+
+
+BUS = """
+        import can
+        import pytest
+        from tickrig.device import make_epos
+
+        @pytest.fixture
+        def bench_config():
+            return make_epos(1)
+"""
+
+
+@pytest.mark.parametrize(("fault", "healthy"), [("bench.fault('corrupt=1')", True), ("", False)])
+def test_error_frames_that_nobody_ordered_fail_the_test(
+    pytester: pytest.Pytester, run: Run, fault: str, healthy: bool
+) -> None:
+    pytester.makepyfile(
+        f"""{BUS}
+        def test_one(bench):
+            {fault or "bench._mode.act(lambda rig: rig.wire.arm('corrupt', 1.0))"}
+            bench.run_for("100ms")
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=healthy, failed=not healthy)
+    if not healthy:
+        result.stdout.fnmatch_lines(["can: an error frame that no fault ordered, at 0.* s: *"])
+
+
+def test_what_found_a_buffer_full_fails_the_test_unless_a_fault_is_to_blame(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.device import Urg
+
+        @pytest.fixture
+        def bench_config():
+            return Urg()
+
+        def flood(bench):
+            bench.run_for("3s")
+            bench.link.send(b"SCIP2.0\\nBM\\nMD0044072501000\\n")
+            bench.run_for("5s")
+
+        def test_nobody_reads_what_was_asked_for(bench):
+            flood(bench)
+
+        def test_a_bad_line(bench):
+            bench.fault("drop=0.001@6s")
+            flood(bench)
+
+        @pytest.mark.allows("lost")
+        def test_it_may_be(bench):
+            flood(bench)
+
+        @pytest.mark.allows("loss")
+        def test_what_no_marker_allows(bench):
+            flood(bench)
+
+        def test_told_once(bench):
+            flood(bench)
+            assert bench.now_us == 0
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=2, failed=2, errors=1)
+    result.stdout.fnmatch_lines(
+        [
+            "no bench: allows('loss'): it can allow 'error frames' and 'lost'",
+            "urg: * bytes found a buffer full",
+        ]
+    )
+    assert result.stdout.str().count("found a buffer full") == 1
+
+
+@pytest.mark.parametrize(
+    ("safe", "said"),
+    [
+        ("{'state': 'Off'}", ""),
+        ("{'out_v_pct': 0, 'state': 'Standby'}", "state is Off, and safe is Standby"),
+        ("lambda bench: bench.get('out_v_pct') == 0", ""),
+        ("lambda bench: bench.get('out_v_pct') > 0", "bench_safe says that it is not safe"),
+        ("lambda bench: '' if bench.now_us else 'too young'", "too young"),
+    ],
+)
+def test_outputs_are_safe_after_a_test(
+    pytester: pytest.Pytester, run: Run, safe: str, said: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        @pytest.fixture
+        def bench_safe():
+            return {safe}
+
+        def test_one(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=not said, failed=bool(said))
+    if said:
+        result.stdout.fnmatch_lines(["after the test the bench is not as it has to be:", said])
