@@ -154,7 +154,10 @@ class Bench(BenchDevice):
         """
         return self._mode.wait_until(done, us_of(within))
 
-<<<<<<< HEAD
+    def describe(self) -> Object:
+        """Return what there is to set, to read and to break, as `tickrig ctl SOCKET describe`."""
+        return self._mode.request("describe")
+
     async def sleep(self, duration: Duration) -> None:
         """Wait in an async body; other tasks go on meanwhile.
 

@@ -48,7 +48,7 @@ def fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
     return source
 
 
-class Asked(NamedTuple):
+class Wanted(NamedTuple):
     """What a test asked for.
 
     Attributes:
@@ -80,12 +80,10 @@ class Asked(NamedTuple):
             BenchBlocked: a port is not there, or somebody said no.
         """
         source = self.source() if callable(self.source) else self.source
-        asked = self._replace(source=source)
+        wanted = self._replace(source=source)
         if source is None:
-            raise ValueError(
-                "nobody says what is on the bench: write a fixture bench_config"
-            )
-        return asked.open_devices()
+            raise ValueError("nobody says what is on the bench: write a fixture bench_config")
+        return wanted.open_devices()
 
     def open_devices(self) -> Bench:
         """Put devices on a bench."""

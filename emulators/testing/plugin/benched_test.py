@@ -9,7 +9,7 @@ import pytest
 
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.bench_source import Asked, BenchSource, fresh
+from tickrig.emulators.testing.plugin.bench_source import Wanted, BenchSource, fresh
 from tickrig.emulators.testing.plugin.failure_report import sections_of
 from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
@@ -24,15 +24,15 @@ class BenchedTest:
 
     Args:
         item: the test.
-        asked: what it asked for.
+        wanted: what it asked for.
         safe: what outputs are when it is over.
 
     Attributes:
         bench: its bench, from the moment at which it is open.
     """
 
-    def __init__(self, item: pytest.Item, asked: Asked, safe: SafeState) -> None:
-        self.item, self.asked, self._safe = item, asked, safe
+    def __init__(self, item: pytest.Item, wanted: Wanted, safe: SafeState) -> None:
+        self.item, self.wanted, self._safe = item, wanted, safe
         self.bench: Bench | None = None
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
@@ -45,9 +45,9 @@ class BenchedTest:
             ValueError: the test asks for what nobody has.
         """
         needs, self._allowed = needs_of(self.item), allowed_of(self.item)
-        check_mode(needs, self.asked.mode)
-        self.asked = self.asked._replace(source=fresh(self.item, self.asked.source))
-        bench = self.bench = self.asked.open()
+        check_mode(needs, self.wanted.mode)
+        self.wanted = self.wanted._replace(source=fresh(self.item, self.wanted.source))
+        bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
         with suppress(NotOnThisBench):
             self._health = bench._mode.act(Health)
@@ -57,6 +57,12 @@ class BenchedTest:
         """Give everything back."""
         if self.bench is not None:
             self.bench.close()
+
+    def run_body(self, function: pytest.Function) -> None:
+        """Run an async test: time of the bench passes while it waits."""
+        assert self.bench is not None
+        names = function._fixtureinfo.argnames
+        self.bench.run(function.obj(**{name: function.funcargs[name] for name in names}))
 
     def check(self) -> None:
         """Fail the test if it leaves its bench in a state in which none may be."""
@@ -80,8 +86,8 @@ def benched(
 ) -> Iterator[Bench]:
     """Give a test its bench."""
     settings = request.config.stash[SETTINGS]
-    asked = Asked(source, mode, settings.seed, request.path.parent)
-    test = request.node.stash[BENCHED] = BenchedTest(request.node, asked, safe)
+    wanted = Wanted(source, mode, settings.seed, request.path.parent)
+    test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe)
     try:
         yield _opened(test)
     finally:

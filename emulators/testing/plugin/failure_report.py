@@ -23,9 +23,9 @@ def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
     """Return the sections of a report, each with its title."""
     command = ("bench: repeat it with", repeat_command(test.item))
     if test.bench is None:
-        return [("bench", test.asked.text), command]
+        return [("bench", test.wanted.text), command]
     last = last_lines(test.bench, LINES) or "nothing happened"
-    return [("bench", _asked(test)), ("bench: what happened last", last), command]
+    return [("bench", _wanted(test)), ("bench: what happened last", last), command]
 
 
 def repeat_command(item: pytest.Item) -> str:
@@ -45,10 +45,10 @@ def repeat_command(item: pytest.Item) -> str:
     return shlex.join(words)
 
 
-def _asked(test: BenchedTest) -> str:
+def _wanted(test: BenchedTest) -> str:
     bench = test.bench
     assert bench is not None
-    what = test.asked.text
+    what = test.wanted.text
     devices = ", ".join(bench.devices)
     named = what if what == devices else f"{what} with {devices}"
-    return f"{named}; {bench.mode}, seed {test.asked.seed_used}, {format_time(bench.now_us)} s old"
+    return f"{named}; {bench.mode}, seed {test.wanted.seed_used}, {format_time(bench.now_us)} s old"

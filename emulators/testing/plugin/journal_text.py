@@ -45,9 +45,9 @@ def decoded(lines: Iterable[WireLine], buses: Collection[str]) -> Iterator[tuple
 
 def last_lines(bench: Bench, count: int) -> str:
     """Return the last that happened on a bench: time, where, direction, text."""
-    told = list(decoded(bench._mode.journal(), buses_of(bench)))[-count:]
+    described = list(decoded(bench._mode.journal(), buses_of(bench)))[-count:]
     return "\n".join(
-        f"{format_time(line.at_us)} {line.source} {line.mark} {text}" for line, text in told
+        f"{format_time(line.at_us)} {line.source} {line.mark} {text}" for line, text in described
     )
 
 

@@ -87,14 +87,14 @@ def _described(bench: Bench) -> Mapping[str, Any]:  # an answer of the control s
 
 
 def _inputs(bench: Bench) -> list[str]:
-    told = _described(bench)
-    return [*(item["name"] for item in told["inputs"]), *told["groups"]]
+    described = _described(bench)
+    return [*(item["name"] for item in described["inputs"]), *described["groups"]]
 
 
 def _faults(bench: Bench) -> list[str]:
-    told = _described(bench)
-    of_devices = [item["name"] for item in told["inputs"] if item["kind"] == "fault"]
-    return [*of_devices, *(item["name"] for item in told["wire_faults"])]
+    described = _described(bench)
+    of_devices = [item["name"] for item in described["inputs"] if item["kind"] == "fault"]
+    return [*of_devices, *(item["name"] for item in described["wire_faults"])]
 
 
 KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {

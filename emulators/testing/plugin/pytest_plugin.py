@@ -6,6 +6,7 @@ Entry point `pytest11`: every pytest of an environment with tickrig loads this m
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from inspect import iscoroutinefunction
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -25,6 +26,9 @@ MARKERS: Final = (
     "found a buffer full, 'error frames' (tickrig)",
     "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
 )
+
+OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
+"""Markers of async tests that are run by others."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -129,3 +133,15 @@ def pytest_runtest_makereport(
     if (test := item.stash.get(BENCHED, None)) is not None:
         test.judge(report, call)
     return report
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run an async test on its bench, unless it is of asyncio or the like."""
+    test = pyfuncitem.stash.get(BENCHED, None)
+    if test is None or not iscoroutinefunction(pyfuncitem.obj):
+        return None
+    if any(pyfuncitem.get_closest_marker(name) for name in OTHER_LOOPS):
+        return None
+    test.run_body(pyfuncitem)
+    return True

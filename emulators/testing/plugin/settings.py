@@ -49,10 +49,10 @@ class Settings(NamedTuple):
     @classmethod
     def of(cls, config: pytest.Config) -> Settings:
         """Return those of a test run; UsageError if one is wrong."""
-        asked = {option.name: _asked(config, option) for option in OPTIONS}
+        wanted = {option.name: _wanted(config, option) for option in OPTIONS}
         return cls(
-            _modes(asked["bench_mode"] or MODES[0]),
-            _seed(asked["bench_seed"]),
+            _modes(wanted["bench_mode"] or MODES[0]),
+            _seed(wanted["bench_seed"]),
         )
 
     @property
@@ -67,7 +67,7 @@ class Settings(NamedTuple):
 SETTINGS: Final = pytest.StashKey[Settings]()
 
 
-def _asked(config: pytest.Config, option: Option) -> str:
+def _wanted(config: pytest.Config, option: Option) -> str:
     given = config.getoption(option.name)
     return str(config.getini(option.name) if given is None else given).strip()
 
