@@ -9,7 +9,7 @@ import pytest
 
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.bench_source import Wanted, BenchSource, fresh
+from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted, fresh
 from tickrig.emulators.testing.plugin.failure_report import sections_of
 from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
