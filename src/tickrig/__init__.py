@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.serial.rs485_line import Rs485Line as Rs485Line
     from tickrig.emulators.serial.serial_line import SerialLine as SerialLine
     from tickrig.emulators.testing.bench.bench import Bench as Bench
+    from tickrig.emulators.testing.bench.bench import open_bench as open_bench
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
@@ -43,7 +44,7 @@ else:
             "tickrig.emulators.serial.emulator": ("LineSettings",),
             "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
             "tickrig.emulators.serial.serial_line": ("SerialLine",),
-            "tickrig.emulators.testing.bench.bench": ("Bench",),
+            "tickrig.emulators.testing.bench.bench": ("Bench", "open_bench"),
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),

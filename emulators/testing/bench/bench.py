@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
@@ -19,6 +20,7 @@ from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
 from tickrig.emulators.testing.bench.triggers import Condition
 from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
 from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -253,6 +255,24 @@ class Bench(BenchDevice):
     def close(self) -> None:
         """Give everything back."""
         self._mode.close()
+
+
+def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None) -> Bench:
+    """Open the bench that a rig file describes.
+
+    Args:
+        path: the rig file.
+        mode: `virtual`, `real` or `hardware`.
+        seed: of all chance, instead of that of the file.
+
+    Raises:
+        OSError: the file cannot be read, or a port cannot be had.
+        RigFileError: all that is wrong with the file.
+        Refused: a device cannot be made.
+        PortGone: a bus cannot be opened.
+    """
+    plan = read_rig_file(Path(path))
+    return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
 
 
 def _never() -> bool:
