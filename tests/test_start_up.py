@@ -27,6 +27,8 @@ MOST = {
     "tickrig ctl /nowhere status": 20,
     "tickrig ctl /nowhere press power_button": 20,
     "tickrig TAB": 12,
+    "tickrig check --help": 14,
+    "tickrig init --help": 14,
     "tickrig ctl /nowhere TAB": 20,
     "tickrig demo fig120 -- TAB": 19,
     "tickrig replay TAB": 18,

@@ -12,12 +12,20 @@ from tickrig.host.cli.options import version_option
 HERE: Final = "tickrig.emulators.commands"
 TESTING: Final = "tickrig.emulators.testing.commands"
 COMMANDS: Final = {
+    "check": (
+        f"{TESTING}.check_cli:check",
+        "Check rig files: say what is on the bench, or all that is wrong.",
+    ),
     "ctl": (
         f"{HERE}.ctl_cli:ctl",
         "Operate and watch the emulator whose control socket is SOCKET.",
     ),
     "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
     "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
+    "init": (
+        f"{TESTING}.init_cli:init",
+        "Write a rig file to begin with: devices, and all that can be said of them.",
+    ),
     "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
     "replay": (f"{TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
@@ -39,6 +47,8 @@ def main() -> None:
     \b
     tickrig ctl /tmp/rrc.ctl press power_button   operate a running emulator
     tickrig emu rrc --link /tmp/rrc               emulate a device
+    tickrig init                                  write a rig file to begin with
+    tickrig check rig.toml                        see what is wrong with a rig file
     tickrig new device lamp                       begin a device of your own
     tickrig replay run.trace                      replay a recorded run
     tickrig report run.json -o bench.html         see a test run as a page

@@ -15,6 +15,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import ANY_ID, describe
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.commands.device_config import configure, option_names
@@ -95,8 +96,9 @@ def probe(plan: DevicePlan, cache: EdsCache, wrong: Callable[..., None]) -> Prob
     node_id = found.node_id if plan.node_id is None else plan.node_id
     slave = make_slave(found.make_dictionary(), node_id or ANY_ID, None, found.application)
     node = Nodes([Node(plan.name, slave, CanWire())])
-    product = found.info.product_name
-    title = product if plan.kind is DeviceKind.EDS and product else Path(plan.type).name
+    title = found.info.product_name or Path(plan.type).name
+    if plan.kind is DeviceKind.MODEL:
+        title = MODELS[plan.type].text
     return Probe(node, CAN_FAULTS, title, node_id=node_id, bit_rate=found.bit_rate)
 
 

@@ -1,0 +1,67 @@
+"""The command `tickrig init`: a rig file to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.start import loading
+
+RIG: Final = "rig.toml"
+STANDARD_OUTPUT: Final = "-"
+
+
+def _complete_type(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    with loading():
+        from tickrig.emulators.canopen.choices import MODELS  # noqa: PLC0415 - slow
+        from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+
+    return [name for name in (*DEVICES.names(), *MODELS) if name.startswith(begun)]
+
+
+@click.command()
+@click.option(
+    "--device",
+    "types",
+    multiple=True,
+    metavar="TYPE",
+    shell_complete=_complete_type,
+    help="Device type, CANopen model, EDS or DCF file, or FILE.py:Class; may be repeated.  [rrc]",
+)
+@click.option("-o", "--output", "file", type=PATH, default=RIG, help=f"File to write.  [{RIG}]")
+def init(types: tuple[str, ...], file: Path) -> None:
+    """Write a rig file to begin with: devices, and all that can be said of them.
+
+    It checks and runs as it is; comments propose inputs, faults, ports. A file that is
+    there is left alone; - is standard output.
+
+    \b
+    tickrig init
+    tickrig init --device epos --device epos --device urg -o robot.toml
+    tickrig check rig.toml
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.testing.commands.rig_template import (  # noqa: PLC0415 - slow
+            TypeRefusedError,
+            rig_template,
+        )
+
+    on_output = str(file) == STANDARD_OUTPUT
+    folder = Path() if on_output else file.parent
+    try:
+        text = rig_template(types or ("rrc",), RIG if on_output else file.name, folder)
+    except TypeRefusedError as error:
+        raise Refused(f"--device {error}") from None
+    if on_output:
+        click.echo(text, nl=False)
+        return
+    try:
+        with file.open("x", encoding="utf-8", newline="\n") as out:
+            out.write(text)
+    except OSError as error:
+        refuse_path("file", error)
+    click.echo(file)

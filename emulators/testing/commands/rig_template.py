@@ -1,0 +1,161 @@
+"""The text of a new rig file: devices as they are, with all that could be said as comments."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.physical import InputSignal, SignalType
+from tickrig.emulators.bench.names import SHOWN
+from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.commands.device_config import option_names
+from tickrig.emulators.testing.rig_file.devices import RESERVED, kind_of
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
+from tickrig.emulators.testing.rig_file.probe import Probe, probe
+
+HEAD: Final = """\
+# A rig file: what is on the bench. Lines behind a # are proposals.
+#   tickrig check {file}
+#   tickrig run {file}
+
+seed = 0                        # of all chance
+"""
+BUS: Final = """\
+[wire.can0]
+type = "can"
+bitrate = {bit_rate}
+"""
+BIT_RATE: Final = 1_000_000
+MOST_NODES: Final = 127
+_NO_NAME: Final = re.compile(r"\W+", re.ASCII)
+
+
+class TypeRefusedError(ValueError):
+    """A type of which no device can be made; the text says why."""
+
+
+def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
+    """Write a rig file.
+
+    Args:
+        types: of the devices, as a rig file has them.
+        file: what it will be called.
+        folder: where it will be: other files are looked for there.
+
+    Raises:
+        TypeRefusedError: a device cannot be made.
+    """
+    made = list(_make(types, folder))
+    nodes = [found for _, found in made if found.baud is None]
+    parts = [HEAD.format(file=file)]
+    if nodes:
+        rates = [each.bit_rate for each in nodes if each.bit_rate]
+        parts.append(BUS.format(bit_rate=rates[0] if rates else BIT_RATE))
+    parts += ["\n".join(_device_lines(*each)) for each in made]
+    parts.append("\n".join(_fault_lines(made)))
+    parts.append("\n".join(_door_lines(made)))
+    return "\n".join(parts)
+
+
+def _make(types: Iterable[str], folder: Path) -> Iterator[tuple[DevicePlan, Probe]]:
+    """Yield each device with a name and a node-ID of its own."""
+    names, node_ids, cache = set[str](), set[int](), EdsCache()
+    for given in types:
+        reasons: list[str] = []
+        try:
+            kind, place = kind_of(given, folder)
+        except ValueError as error:
+            raise TypeRefusedError(str(error)) from None
+        plan = DevicePlan(name=_name(given, names), kind=kind, type=place, wire="")
+        found = probe(plan, cache, lambda reason, *keys, to=reasons: to.append(reason))
+        if found is None:
+            raise TypeRefusedError(f"{given}: {reasons[0]}")
+        node_id = None
+        if found.baud is None:
+            node_id = _free(found.node_id or 1, node_ids)
+        yield DevicePlan(name=plan.name, kind=kind, type=given, wire="", node_id=node_id), found
+
+
+def _name(given: str, taken: set[str]) -> str:
+    """Return a name that no other device has."""
+    base = given.rpartition(":")[2] if ":" in given else Path(given).stem
+    base = _NO_NAME.sub("_", base.lower()).strip("_") or "device"
+    if not base[0].isalpha() or base in RESERVED:
+        base = f"device_{base}"
+    name = base
+    while name in taken or name in RESERVED:
+        name = f"{base}{len(taken) + 1}"
+    taken.add(name)
+    return name
+
+
+def _free(node_id: int, taken: set[int]) -> int:
+    while node_id in taken:
+        node_id = node_id % MOST_NODES + 1
+    taken.add(node_id)
+    return node_id
+
+
+def _device_lines(plan: DevicePlan, found: Probe) -> Iterator[str]:
+    yield f"[device.{plan.name}]"
+    yield f"type = {json.dumps(plan.type)}".ljust(32) + f"# {found.title}"
+    if plan.node_id is not None:
+        yield f"node_id = {plan.node_id}"
+    elif plan.kind is DeviceKind.SERIAL and (options := option_names(plan.type)):
+        yield "# config = { }".ljust(32) + f"# options: {', '.join(options)}"
+    yield ""
+    inputs = [item for item in _inputs(found) if item.type is not SignalType.FAULT]
+    if inputs:
+        yield f"[device.{plan.name}.start]".ljust(32) + "# its inputs, and signals that drive them"
+        yield from map(_input_line, inputs)
+        yield ""
+
+
+def _inputs(found: Probe) -> Iterator[InputSignal]:
+    """Yield the inputs, without the objects of a dictionary."""
+    table = found.physical.inputs.table
+    yield from (table[name] for name in table if not name.startswith("0x"))
+
+
+def _input_line(item: InputSignal) -> str:
+    value = f"{item.initial:g}" if item.real else str(int(item.initial))
+    value = '""' if item.type is SignalType.TEXT else value
+    unit = f" {item.unit}" if item.unit else ""
+    span = "" if item.type is SignalType.TEXT else f" ({item.low:g}..{item.high:g}{unit})"
+    return f"# {item.name} = {value}".ljust(32) + f"# {item.text}{span}"
+
+
+def _fault_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
+    yield "# [fault]                       # NAME[=RATE][@FROM[-TO]]"
+    for plan, found in made:
+        names = [*found.physical.inputs.names(SignalType.FAULT), *found.wire_faults]
+        plain = next(each for each in names if _is_plain(found, each))
+        shown = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
+        yield f'# {plan.name} = "{plain}@2s-3s"'.ljust(32) + f"# {shown}"
+    yield ""
+
+
+def _is_plain(found: Probe, name: str) -> bool:
+    """Return whether a fault wants no rate."""
+    return name not in found.wire_faults or not found.wire_faults[name].rated
+
+
+def _door_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
+    made = list(made)
+    yield "# [real]                        # where hosts find it while 'tickrig run' runs"
+    for plan, found in made:
+        if found.baud is not None:
+            yield f'# {plan.name}.link = "{plan.name}.pty"'
+    if any(found.baud is None for _, found in made):
+        yield '# can0 = { interface = "socketcan", channel = "vcan0" }'
+    yield ""
+    yield "# [hardware]                    # where the real devices are"
+    for plan, found in made:
+        if found.baud is not None:
+            yield f'# {plan.name}.port = "/dev/ttyUSB0"'
+    if any(found.baud is None for _, found in made):
+        yield '# can0 = { interface = "socketcan", channel = "can0" }'
+    yield ""

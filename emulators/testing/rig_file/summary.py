@@ -1,0 +1,71 @@
+"""What is on a bench, in a few lines for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.emulators.canopen.node.node_spec import LSS
+from tickrig.emulators.testing.rig_file.plan import (
+    DevicePlan,
+    RigPlan,
+    WirePlan,
+    WireType,
+)
+
+WIRES: Final = {WireType.SERIAL: "serial line", WireType.RS485: "RS485", WireType.CAN: "CAN"}
+
+
+def summary(plan: RigPlan) -> Iterator[str]:
+    """Yield how much there is, then a line for each wire with what is on it.
+
+    Args:
+        plan: the bench.
+    """
+    counts = [
+        _count(len(plan.devices), "device"),
+        _count(len(plan.wires), "wire"),
+        _count(len(plan.signals) + sum(_driven(each) for each in plan.devices.values()), "signal"),
+        _count(len(plan.faults), "fault"),
+        "1 body" if plan.body else "",
+        "hardware" if plan.hardware else "",
+    ]
+    yield ", ".join(filter(None, counts))
+    width = max((len(name) for name in plan.wires), default=0)
+    for wire in plan.wires.values():
+        devices = ", ".join(map(device_text, plan.devices_on(wire.name)))
+        yield f"  {wire.name:{width}}  {wire_text(wire)}: {devices or 'nothing'}"
+
+
+def wire_text(wire: WirePlan) -> str:
+    """Say what a wire is, as far as the file says it.
+
+    >>> wire_text(WirePlan(name="a", bit_rate=9600))
+    'serial line 9600 8N1'
+    """
+    words = [WIRES[wire.type]]
+    if wire.bit_rate:
+        words.append(str(wire.bit_rate))
+        words.append("bit/s" if wire.type is WireType.CAN else wire.framing)
+    return " ".join(words)
+
+
+def device_text(device: DevicePlan) -> str:
+    """Say what a device is.
+
+    >>> device_text(DevicePlan(name="left", kind=DeviceKind.MODEL, type="epos", wire="a"))
+    'left (epos)'
+    """
+    node = {None: "", UNCONFIGURED: f", waits for {LSS.upper()}"}
+    about = node.get(device.node_id, f", node-ID {device.node_id}")
+    return f"{device.name} ({Path(device.type).name}{about})"
+
+
+def _driven(device: DevicePlan) -> int:
+    return sum(not isinstance(value, int | float | str) for value in device.start.values())
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' if number > 1 else ''}" if number else ""

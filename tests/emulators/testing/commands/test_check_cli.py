@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tickrig.emulators.testing.commands.check_cli import check
+
+GOOD = '[device.rrc]\ntype = "rrc"\n[wire.can0]\ntype = "can"\nbitrate = 500000\n'
+GOOD += '[device.left]\ntype = "epos"\nnode_id = "lss"\n[device.base]\ntype = "rh3-base"\n'
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words: str) -> tuple[int, str, str]:
+    result = CliRunner().invoke(check, words)
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_a_good_file_is_summed_up(folder: Path) -> None:
+    (folder / "rig.toml").write_text(GOOD)
+    assert run("rig.toml") == (
+        0,
+        "rig.toml: ok: 3 devices, 3 wires\n"
+        "  can0  CAN 500000 bit/s: left (epos, waits for LSS)\n"
+        "  rrc   serial line: rrc (rrc)\n"
+        "  base  serial line: base (rh3-base)\n",
+        "",
+    )
+
+
+def test_all_mistakes_of_all_files_are_told(folder: Path) -> None:
+    (folder / "a.toml").write_text(GOOD.replace('"epos"', '"eops"').replace("rrc]", "r-c]"))
+    (folder / "b.toml").write_bytes(b"\n\xff")
+    (folder / "c.toml").write_text(GOOD)
+    status, out, _ = run("a.toml", "b.toml", "c.toml")
+    assert status == 1
+    assert out.splitlines()[:4] == [
+        "a.toml:1: device.r-c: a name is letters, digits and _, a letter first, as r_c",
+        "a.toml:7: device.left.type: no device 'eops'; did you mean 'epos'?"
+        " (or an EDS or DCF file, FILE.py:Class)",
+        "b.toml:2: the byte 0xff is no UTF-8: a rig file is a text",
+        "c.toml: ok: 3 devices, 3 wires",
+    ]
+
+
+def test_a_file_that_cannot_be_read_is_told_and_the_others_are_checked(folder: Path) -> None:
+    (folder / "rig.toml").write_text(GOOD)
+    status, out, err = run("nowhere.toml", ".", "rig.toml")
+    assert (status, out.splitlines()[0]) == (2, "rig.toml: ok: 3 devices, 3 wires")
+    assert err == ("Error: nowhere.toml: No such file or directory\nError: .: Is a directory\n")
+
+
+def test_at_least_one_file_is_wanted() -> None:
+    assert run()[0] == 2

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.commands.device_type import DEVICES
+from tickrig.emulators.testing.commands.init_cli import init
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
+
+ROOT = Path(__file__).parents[4]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copy(ROOT / "examples" / "io_module.eds", tmp_path)
+    shutil.copy(ROOT / "examples" / "device_rtc_gripper.py", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(init, words)
+    return result.exit_code, result.output
+
+
+def test_without_words_it_is_an_rrc(folder: Path) -> None:
+    assert run() == (0, "rig.toml\n")
+    plan = read_rig_file(folder / "rig.toml")
+    assert [(each.name, each.type) for each in plan.devices.values()] == [("rrc", "rrc")]
+
+
+EVERY = [*DEVICES.built_in, *MODELS, "io_module.eds", "device_rtc_gripper.py:Gripper"]
+
+
+@pytest.mark.parametrize("types", [[each] for each in EVERY] + [EVERY * 2], ids=str)
+def test_what_it_writes_checks_with_and_without_its_proposals(
+    types: list[str], folder: Path
+) -> None:
+    status, out = run(*(word for each in types for word in ("--device", each)))
+    assert (status, out) == (0, "rig.toml\n")
+    assert len(read_rig_file(folder / "rig.toml").devices) == len(types)
+    text = (folder / "rig.toml").read_text("utf-8")
+    proposed = re.sub(r"^# (?=\S+ = |\[)", "", text, flags=re.MULTILINE)
+    (folder / "all.toml").write_text(proposed, "utf-8")
+    plan = read_rig_file(folder / "all.toml")
+    assert len(plan.faults) == len(types)
+    assert plan.hardware is not None
+    assert any(device.start for device in plan.devices.values())
+
+
+def test_a_file_that_is_there_is_left_alone(folder: Path) -> None:
+    (folder / "rig.toml").write_text("mine")
+    assert run() == (2, "Error: file rig.toml: File exists\n")
+    assert (folder / "rig.toml").read_text() == "mine"
+
+
+def test_standard_output_is_a_file_too(folder: Path) -> None:
+    status, out = run("--device", "epos", "-o", "-")
+    assert (status, "[device.epos]" in out) == (0, True)
+    assert not (folder / "rig.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ("eops", "--device no device 'eops'; did you mean 'epos'?"),
+        ("nowhere.eds", "--device nowhere.eds: file nowhere.eds: No such file"),
+        ("nowhere.py:A", "--device nowhere.py:A: nowhere.py: No such file"),
+    ],
+)
+def test_what_cannot_be_made_is_told_and_nothing_written(
+    given: str, complaint: str, folder: Path
+) -> None:
+    status, out = run("--device", given)
+    assert (status, complaint in out) == (2, True)
+    assert not (folder / "rig.toml").exists()
+
+
+def test_types_are_completed() -> None:
+    (option, *_) = init.params
+    with click.Context(init) as context:
+        found = [item.value for item in option.shell_complete(context, "r")]
+    assert found == ["rrc", "rtc-lite", "rh3-base", "rtc-echo"]
