@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from tickrig.host.links.errors import LinkClosed as LinkClosed
     from tickrig.host.links.errors import LinkError as LinkError
     from tickrig.host.links.errors import LinkTimeout as LinkTimeout
+    from tickrig.host.links.recording_link import RecordingLink as RecordingLink
     from tickrig.host.links.serial_link import SerialLink as SerialLink
     from tickrig.host.modbus.master import ModbusMaster as ModbusMaster
     from tickrig.host.rrc.client import RrcClient as RrcClient
@@ -26,6 +27,7 @@ else:
                 "LinkError",
                 "LinkTimeout",
             ),
+            "tickrig.host.links.recording_link": ("RecordingLink",),
             "tickrig.host.links.serial_link": ("SerialLink",),
             "tickrig.host.modbus.master": ("ModbusMaster",),
             "tickrig.host.rrc.client": ("RrcClient",),

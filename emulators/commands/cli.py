@@ -27,6 +27,10 @@ COMMANDS: Final = {
         "Write a rig file to begin with: devices, and all that can be said of them.",
     ),
     "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
+    "record": (
+        f"{TESTING}.record_cli:record_command",
+        "Record what passes between a host and the device at PORT, for `tickrig compare`.",
+    ),
     "replay": (f"{TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
         f"{TESTING}.report_cli:report_command",
@@ -50,6 +54,7 @@ def main() -> None:
     tickrig init                                  write a rig file to begin with
     tickrig check rig.toml                        see what is wrong with a rig file
     tickrig new device lamp                       begin a device of your own
+    tickrig record /dev/ttyUSB0 -o run.trace      record a real device and its host
     tickrig replay run.trace                      replay a recorded run
     tickrig report run.json -o bench.html         see a test run as a page
     tickrig demo rrc                              see a device and a host at work

@@ -77,6 +77,10 @@ class PtyPort(NonCopyable):
                 self.close()
                 raise
 
+    def fileno(self) -> int:
+        """Return the descriptor to wait on for what the host sends."""
+        return self._master
+
     @property
     def due_us(self) -> int:
         """Unknown to anybody but the host."""
