@@ -41,6 +41,18 @@ class ByteEnd(Port[bytes], Protocol):
         """Return how many bytes `send` takes at `now_us` without loss."""
         ...
 
+    @property
+    def sent_us(self) -> int:
+        """When the last byte sent from here will have passed; past or `NEVER` if it has."""
+        ...
+
+    def unsent(self, now_us: int) -> int:
+        """Return how many bytes sent from here have not passed yet."""
+        ...
+
+    def drop_unsent(self, now_us: int) -> None:
+        """Forget the bytes sent from here of which no bit is on the line yet."""
+
 
 class ByteLine(Protocol):
     """An emulated serial line with two ends or more; the device is at the first."""

@@ -84,6 +84,19 @@ class HostEnd:
         """Return how many bytes `send` takes at `now_us` without loss."""
         return self._end.room(now_us)
 
+    @property
+    def sent_us(self) -> int:
+        """When the last byte of the host will have passed; past or `NEVER` if it has."""
+        return self._end.sent_us
+
+    def unsent(self, now_us: int) -> int:
+        """Return how many bytes of the host have not passed yet."""
+        return self._end.unsent(now_us)
+
+    def drop_unsent(self, now_us: int) -> None:
+        """Forget the bytes of the host of which no bit is on the line yet."""
+        self._end.drop_unsent(now_us)
+
     def poll(self, now_us: int, /) -> bytes:
         """Take what the device sent."""
         if data := self._end.poll(now_us):

@@ -110,6 +110,26 @@ class Rs485Line(Copyable):
                 end.hear(burst)
         return end_us
 
+    def cut(self, sender: Rs485End, now_us: int) -> int:
+        """Take the bytes off the wires of which no bit is there yet.
+
+        Args:
+            sender: the end that was to send them.
+            now_us: the present.
+
+        Returns:
+            When the byte that is on its way has passed, in us.
+        """
+        end_us = now_us
+        for burst in self._air:
+            if burst.sender is sender and burst.end_us > now_us:
+                begun_us = now_us - burst.start_us
+                begun = 1 + begun_us * self._baud // self._byte_cost if begun_us >= 0 else 0
+                del burst.data[begun:]
+                burst.end_us = burst.start_us + self.after(len(burst.data))
+                end_us = max(end_us, burst.end_us)
+        return end_us
+
     def after(self, count: int) -> int:
         """Compute how long bytes take on the wires.
 
@@ -203,7 +223,20 @@ class Rs485End:
 
     def room(self, now_us: int) -> int:
         """Return how many bytes `send` takes at `now_us` without loss."""
-        return max(0, self._buffer_bytes - self._line.unsent(self._busy_us - now_us))
+        return max(0, self._buffer_bytes - self.unsent(now_us))
+
+    @property
+    def sent_us(self) -> int:
+        """When the last byte sent from here will have passed; past if it has."""
+        return self._busy_us
+
+    def unsent(self, now_us: int) -> int:
+        """Return how many bytes sent from here have not passed yet."""
+        return self._line.unsent(self._busy_us - now_us)
+
+    def drop_unsent(self, now_us: int) -> None:
+        """Forget the bytes sent from here of which no bit is on the line yet."""
+        self._busy_us = self._line.cut(self, now_us)
 
     def poll(self, now_us: int, /) -> bytes:
         """Take the bytes that have arrived by `now_us`."""

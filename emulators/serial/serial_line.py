@@ -71,6 +71,19 @@ class LineEnd:
         """Return how many bytes `send` takes at `now_us` without loss."""
         return self._out.room(now_us)
 
+    @property
+    def sent_us(self) -> int:
+        """When the last byte sent from here will have passed; past or `NEVER` if it has."""
+        return self._out.last_us
+
+    def unsent(self, now_us: int) -> int:
+        """Return how many bytes sent from here have not passed yet."""
+        return self._out.unsent(now_us)
+
+    def drop_unsent(self, now_us: int) -> None:
+        """Forget the bytes sent from here of which no bit is on the line yet."""
+        self._out.drop_unsent(now_us)
+
     def poll(self, now_us: int, /) -> bytes:
         """Take the bytes that have arrived by `now_us`."""
         return self._in.take(now_us)
@@ -137,11 +150,22 @@ class _Direction:
 
     def room(self, now_us: int) -> int:
         """Return what the sender's buffer takes; the receiver's may overflow later."""
-        unsent = 0
-        if self._bursts and now_us < self.last_us:
+        free = self._buffer_bytes - self.unsent(now_us)
+        return min(free, 2 * self._buffer_bytes - self._held)
+
+    def unsent(self, now_us: int) -> int:
+        if not self._bursts or now_us >= self.last_us:
+            return 0
+        burst = self._bursts[-1]
+        return len(burst.data) - self._arrived(burst, now_us)
+
+    def drop_unsent(self, now_us: int) -> None:
+        dropped = self.unsent(now_us) - 1  # all but the one that is on the line
+        if dropped > 0:
             burst = self._bursts[-1]
-            unsent = len(burst.data) - self._arrived(burst, now_us)
-        return min(self._buffer_bytes - unsent, 2 * self._buffer_bytes - self._held)
+            burst.data = burst.data[:-dropped]
+            self._held -= dropped
+            self._note_due()
 
     def _arrived(self, burst: _Burst, now_us: int) -> int:
         return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)

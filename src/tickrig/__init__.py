@@ -1,6 +1,6 @@
 """A rig on your desk for robot electronics you do not have."""
 
-from tickrig._lazy import lazy
+from tickrig._lazy import lazy, tell_pyserial
 
 __version__ = "0.1.0"
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from tickrig.emulators.rig.rig import Station as Station
     from tickrig.emulators.rig.sim_link import SimLink as SimLink
     from tickrig.emulators.serial.emulator import LineSettings as LineSettings
+    from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS as SERIAL_PORTS
+    from tickrig.emulators.serial.outside.serial_side import SerialSide as SerialSide
+    from tickrig.emulators.serial.outside.sim_serial import SimSerial as SimSerial
     from tickrig.emulators.serial.rs485_line import Rs485Line as Rs485Line
     from tickrig.emulators.serial.serial_line import SerialLine as SerialLine
     from tickrig.emulators.testing.bench.bench import Bench as Bench
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
     from tickrig.wire.serial.lines import LineSplitter as LineSplitter
+    from tickrig.wire.serial.uart import UartSetting as UartSetting
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -42,6 +46,9 @@ else:
             "tickrig.emulators.rig.rig": ("Rig", "Station"),
             "tickrig.emulators.rig.sim_link": ("SimLink",),
             "tickrig.emulators.serial.emulator": ("LineSettings",),
+            "tickrig.emulators.serial.outside.serial_ports": ("SERIAL_PORTS",),
+            "tickrig.emulators.serial.outside.serial_side": ("SerialSide",),
+            "tickrig.emulators.serial.outside.sim_serial": ("SimSerial",),
             "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
             "tickrig.emulators.serial.serial_line": ("SerialLine",),
             "tickrig.emulators.testing.bench.bench": ("Bench", "open_bench"),
@@ -49,5 +56,8 @@ else:
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),
             "tickrig.wire.serial.lines": ("LineSplitter",),
+            "tickrig.wire.serial.uart": ("UartSetting",),
         },
     )
+
+tell_pyserial()

@@ -1,6 +1,8 @@
-"""Names of a package that are imported when somebody asks for them (PEP 562)."""
+"""What an import of tickrig does: names are imported when somebody asks for them (PEP 562)."""
 
 from __future__ import annotations
+
+import sys
 
 TYPE_CHECKING = False  # as typing has it: importing typing would take longer than all else here
 if TYPE_CHECKING:
@@ -30,3 +32,13 @@ def lazy(
         return found
 
     return sorted(modules), find, lambda: sorted(modules)
+
+
+def tell_pyserial() -> None:
+    """Let pyserial find the handler of `tickrig://`, if it is loaded already.
+
+    Else that is done when the first line is offered under a name; so an import costs nothing.
+    """
+    packages = getattr(sys.modules.get("serial"), "protocol_handler_packages", None)
+    if packages is not None and "tickrig.emulators.serial.outside" not in packages:
+        packages.append("tickrig.emulators.serial.outside")

@@ -1,0 +1,77 @@
+"""The names under which pyserial opens lines of rigs: `tickrig://NAME`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+import serial
+
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+
+HANDLERS: Final = "tickrig.emulators.serial.outside"
+"""The package in which pyserial finds the module `protocol_tickrig`."""
+
+
+def register_handler() -> None:
+    """Let `serial.serial_for_url` know `tickrig://`; once is enough, more does nothing."""
+    if HANDLERS not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(HANDLERS)
+
+
+class SerialPorts:
+    """The lines that can be opened by name at present.
+
+    pyserial opens a port by a string, so the names have to be kept where the whole process finds
+    them: in `SERIAL_PORTS`, the one place of this package with state of its own. What is there
+    was put there by `offer`, for the time of a `with` block.
+    """
+
+    def __init__(self) -> None:
+        self._sides: dict[str, SerialSide] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that are offered."""
+        return tuple(self._sides)
+
+    @contextmanager
+    def offer(self, name: str, side: SerialSide) -> Iterator[SerialSide]:
+        """Let a line be opened as `tickrig://NAME`, for the time of a `with` block.
+
+        Args:
+            name: as in a URL: without `?`, `#` and spaces; pyserial leaves its case alone.
+            side: the host's side of the line.
+
+        Yields:
+            The host's side.
+
+        Raises:
+            ValueError: the name is offered already, or no URL has such a name.
+        """
+        if not name or set(name) & set("?# \t\r\n"):
+            raise ValueError(f"{name!r} cannot be in a URL: no spaces, no ? and no #")
+        if name in self._sides:
+            raise ValueError(f"tickrig://{name} is offered already")
+        register_handler()
+        self._sides[name] = side
+        try:
+            yield side
+        finally:
+            del self._sides[name]
+
+    def find(self, name: str) -> SerialSide:
+        """Return the host's side of a line.
+
+        Args:
+            name: its name.
+
+        Raises:
+            KeyError: no rig offers it.
+        """
+        return self._sides[name]
+
+
+SERIAL_PORTS: Final = SerialPorts()
+"""The lines behind `tickrig://`."""

@@ -1,0 +1,231 @@
+"""A pyserial port on a rig: waiting makes its virtual time pass."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from serial.serialutil import LF, SerialTimeoutException
+
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.sim_port import SimPort
+from tickrig.wire.instant import NEVER
+from tickrig.wire.serial.uart import UartSetting
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+INPUT_BYTES: Final = 4_096
+"""So many bytes wait here for a host that does not read; more wait in the line, then are lost."""
+
+ROOM_BYTES: Final = 256
+"""For so much room, at most, a write waits at once."""
+
+
+class SimSerial(SimPort):
+    """A `serial.Serial` whose device is on a rig.
+
+    Calls, settings and exceptions are pyserial's. What waits makes the rig's time pass: `read`
+    until a byte is there, its stop bit too, and exactly its timeout if none comes; `write` until
+    the line's buffer takes all; `flush`, a break and `send_break`. Nothing else does.
+
+    Where the systems differ it is as Linux, but for `inter_byte_timeout`, which is as documented
+    and on Windows (on POSIX pyserial ignores it). Not emulated: XON and XOFF, DSR and DTR as flow
+    control, RS485 modes (the emulated line turns round by itself); they can be set and change
+    nothing. With `rtscts` nothing is sent before CTS is on; what was sent while it was on goes.
+
+    Args:
+        side: the host's side of the line.
+        options: as `serial.Serial` takes them: `timeout`, `baudrate`, ... What is not given of
+            baud rate and frame is the device's.
+
+    Attributes:
+        side: the same.
+        mismatch: what a setting is that is not the device's; None as `side` has it.
+
+    Raises:
+        SerialException: another port is open there, or the setting is refused.
+        ValueError: a setting that no UART has.
+    """
+
+    def __init__(self, side: SerialSide, /, **options: Any) -> None:
+        device = side.device or UartSetting()
+        own = {
+            "baudrate": device.baud,
+            "bytesize": device.data_bits,
+            "parity": device.parity,
+            "stopbits": device.stop_bits,
+        }
+        name = options.pop("port", None) or "rig"
+        self._begin(**{**own, **options})
+        self.side = side
+        self.port = name
+        self.open()
+
+    def _begin(self, *positional: Any, **options: Any) -> None:
+        self._read_cancelled = self._write_cancelled = False
+        super()._begin(*positional, **options)
+
+    # Reading
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that have come and were not read."""
+        side = self._side()
+        self._take()
+        if not self._input:
+            side.look()
+        return len(self._input)
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Read bytes; time passes until they are there, or the timeout is over.
+
+        Args:
+            size: how many at most.
+
+        Returns:
+            As many, or fewer after the timeout, a gap of `inter_byte_timeout`, or `cancel_read`.
+
+        Raises:
+            SerialException: the port is closed; nothing came for an hour, and there is no timeout.
+        """
+        side = self._side()
+        until_us, gap_us = side.deadline_us(self.timeout), NEVER
+        data = bytearray()
+        while not self._read_cancelled:
+            if new := self._take(max(0, size - len(data))):
+                data += new
+                gap_us = side.deadline_us(self.inter_byte_timeout or None)  # 0 is none
+            if len(data) >= size or side.rig.now_us >= min(until_us, gap_us) or not self.is_open:
+                break
+            side.wait(min(until_us, gap_us), self._input_due_us, self._reading_ended)
+        else:
+            self._read_cancelled = False
+        if len(data) < size and side.rig.now_us >= until_us:
+            side.give_up(self.timeout)
+        if not data and self.timeout == 0:
+            side.look()
+        return bytes(data)
+
+    def read_until(self, expected: bytes = LF, size: int | None = None) -> bytes:
+        """Read until a sequence has come, or the timeout is over.
+
+        Args:
+            expected: the sequence.
+            size: how many bytes at most.
+        """
+        until_us = self._side().deadline_us(self.timeout)
+        data = bytearray()
+        while (byte := self.read(1)) and self.side is not None:
+            data += byte
+            full = size is not None and len(data) >= size
+            if data[-len(expected) :] == expected or full or self.side.rig.now_us >= until_us:
+                break
+        return bytes(data)
+
+    def cancel_read(self) -> None:
+        """Let a `read` return that waits at present, or the next one; any thread may call it."""
+        self._read_cancelled = self.is_open
+
+    def _input_due_us(self) -> int:
+        return self.side.receiver.due_us if self.side is not None else NEVER
+
+    def _reading_ended(self) -> bool:
+        return self._read_cancelled or not self.is_open
+
+    def _take(self, size: int = 0) -> bytes:
+        """Take what has come into the input buffer, and up to `size` bytes out of it."""
+        if self.side is not None and len(self._input) < INPUT_BYTES:
+            self._input += self.side.receiver.poll(self.side.rig.now_us)
+        taken = bytes(self._input[:size])
+        del self._input[:size]
+        return taken
+
+    # Writing
+
+    @property
+    def out_waiting(self) -> int:
+        """Bytes that were written and have not left."""
+        side = self._side()
+        if waiting := side.transmitter.unsent(side.rig.now_us):
+            side.look()
+        return waiting
+
+    def write(self, data: ReadableBuffer, /) -> int:
+        """Write bytes; time passes until the buffer of the line has taken them.
+
+        Args:
+            data: the bytes.
+
+        Returns:
+            How many were taken: all, but with a `write_timeout` of 0 or after `cancel_write`.
+
+        Raises:
+            SerialTimeoutException: the timeout is over; some may have been taken.
+            SerialException: the port is closed; there was no room for an hour.
+            TypeError: the data is text.
+        """
+        side = self._side()
+        if isinstance(data, str):
+            raise TypeError(f"unicode strings are not supported, please encode to bytes: {data!r}")
+        left = bytes(data)
+        length, until_us = len(left), side.deadline_us(self.write_timeout)
+        while left := left[side.transmitter.send(side.rig.now_us, left) :]:
+            if self.write_timeout == 0 or self._writing_ended():
+                break
+            if side.rig.now_us >= until_us:
+                side.give_up(self.write_timeout)
+                raise SerialTimeoutException("Write timeout")
+            side.wait(until_us, partial(self._room_us, side, len(left)), self._writing_ended)
+        self._write_cancelled = False
+        return length - len(left)
+
+    def cancel_write(self) -> None:
+        """Let a `write` return that waits at present, or the next; any thread may call it."""
+        self._write_cancelled = self.is_open
+
+    def flush(self) -> None:
+        """Wait until all that was written has left, to its last stop bit."""
+        side = self._side()
+        until_us = side.deadline_us(None)
+        while side.transmitter.unsent(side.rig.now_us):
+            if side.rig.now_us >= until_us:
+                side.give_up(None)
+            side.wait(until_us, lambda: side.transmitter.sent_us)
+
+    def reset_output_buffer(self) -> None:
+        """Forget what was written and of which no bit has left."""
+        side = self._side()
+        side.transmitter.drop_unsent(side.rig.now_us)
+
+    def _room_us(self, side: SerialSide, wanted: int) -> int:
+        """Return when there will be room for more, `NEVER` before CTS is on."""
+        now_us, transmitter = side.rig.now_us, side.transmitter
+        sent_us, unsent = transmitter.sent_us, transmitter.unsent(now_us)
+        if not unsent or sent_us == NEVER:
+            return NEVER if unsent else max(now_us + 1, side.rig.next_us)
+        return now_us + 1 + (sent_us - now_us) * min(wanted, ROOM_BYTES, unsent) // unsent
+
+    def _writing_ended(self) -> bool:
+        return self._write_cancelled or not self.is_open
+
+    # Breaks
+
+    def send_break(self, duration: float = 0.25) -> None:
+        """Hold the line at 0 for a time, which passes.
+
+        Args:
+            duration: how long, in seconds.
+        """
+        side = self._side()
+        self.break_condition = True
+        side.rig.run_for(round(duration * 1e6))
+        self.break_condition = False
+
+    def _update_break_state(self) -> None:
+        """Hold the line at 0 behind what was written, or let it go."""
+        side, on = self._side(), bool(self.break_condition)
+        if on:
+            self.flush()
+        if side.device is not None:
+            side.transmitter.set_break(side.rig.now_us, on=on)
