@@ -95,9 +95,13 @@ def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
 
 
 def by_file(tests: Sequence[ReportedTest]) -> list[tuple[str, list[ReportedTest]]]:
-    """Return the tests of each file, files as they first come."""
-    first = {test.file: number for number, test in reversed([*enumerate(tests)])}
-    ordered = sorted(tests, key=lambda test: first[test.file])
+    """Return the tests of each file, as they first come; those of equal names stand together."""
+    files: dict[str, int] = {}
+    names: dict[str, int] = {}
+    for number, test in enumerate(tests):
+        files.setdefault(test.file, number)
+        names.setdefault(test.record.nodeid, number)
+    ordered = sorted(tests, key=lambda test: (files[test.file], names[test.record.nodeid]))
     return [(file, list(group)) for file, group in groupby(ordered, key=lambda test: test.file)]
 
 

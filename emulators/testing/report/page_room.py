@@ -70,7 +70,7 @@ class PageRoom:
             case Part.TIMELINE:
                 return timeline.size if timeline else 0
             case Part.JOURNAL:
-                return sum(map(size_of, journal_texts(test)))
+                return size_of("".join(journal_texts(test)))
             case Part.TRACE:
                 return size_of(cut(test.trace, TRACE_BYTES)[0])
 

@@ -57,9 +57,9 @@ def test_requirements_stand_by_verdict_and_then_by_number() -> None:
 
 
 def test_files_stand_as_they_first_come_with_all_their_tests() -> None:
-    tests = reported(TestRecord(name, PASSED) for name in ("b::1", "a::1", "b::2", "c"))
+    tests = reported(TestRecord(name, PASSED) for name in ("b::1", "a::1", "b::2", "c", "b::1"))
     groups = [(file, [test.name for test in group]) for file, group in by_file(tests)]
-    assert groups == [("b", ["1", "2"]), ("a", ["1"]), ("c", ["c"])]
+    assert groups == [("b", ["1", "1", "2"]), ("a", ["1"]), ("c", ["c"])]
 
 
 def test_outcomes_are_counted_in_their_order() -> None:

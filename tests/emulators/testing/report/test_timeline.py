@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tickrig.emulators.testing.report.axis import Span
 from tickrig.emulators.testing.report.bench_report import (
     JournalLine,
     Outcome,
@@ -14,7 +15,8 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
     Value,
 )
-from tickrig.emulators.testing.report.timeline import Lane, Span, Timeline, timeline_of
+from tickrig.emulators.testing.report.lane import Lane
+from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 
 
 def line_of(
@@ -75,7 +77,15 @@ def test_a_fault_lasts_from_when_it_came_to_when_it_went() -> None:
     line = line_of(faults=faults)
     assert line.faults == (Span(25, 25, "cut"), Span(90, 10, "stays"))
     assert [span.place for span in line.faults] == ["inside", "before"]
-    assert line.waiting == faults[2:]
+
+
+def test_what_is_too_much_to_draw_is_counted() -> None:
+    faults = tuple(PlannedFault(f"f{n}", n) for n in range(50))
+    series = tuple(SignalSeries(f"s{n}", points=((0, "x" * 1_000),)) for n in range(41))
+    line = line_of(*series, faults=faults)
+    assert (len(line.faults), len(line.lanes)) == (40, 40)
+    assert line.left_out == ("10 faults", "1 signal")
+    assert line.lanes[0].words[0].text == "x" * 80
 
 
 def test_actions_and_misses_are_on_the_axis() -> None:
