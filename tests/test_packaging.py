@@ -92,7 +92,7 @@ def test_the_sdist_passes_its_own_tests(unpacked: Path) -> None:
     assert process.returncode == 0, process.stdout[-4_000:]
 
 
-def test_wheel_holds_one_top_level_name_and_all_modules(sdist: Path, tmp_path: Path) -> None:
+def test_wheel_holds_one_top_level_name_all_modules_and_templates(sdist: Path, tmp_path: Path) -> None:
     build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
     build += ["--no-build-isolation", "--wheel-dir", str(tmp_path), str(sdist)]
     subprocess.run(build, check=True)
@@ -100,11 +100,7 @@ def test_wheel_holds_one_top_level_name_and_all_modules(sdist: Path, tmp_path: P
     names = zipfile.ZipFile(wheel).namelist()
     packed = {name for name in names if ".dist-info/" not in name}
     assert {name.split("/")[0] for name in packed} == {"tickrig"}
-    sources = {
-        f"tickrig/{path.relative_to(ROOT).as_posix()}"
-        for folder in FOLDERS
-        for path in (ROOT / folder).rglob("*.py")
-    }
+    sources = {f"tickrig/{folder}/{name}" for folder in FOLDERS for name in files(ROOT / folder)}
     real = {path.removeprefix("src/") for path in files(ROOT) if path.startswith("src/")}
     assert packed == sources | real
 
