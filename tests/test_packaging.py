@@ -92,7 +92,9 @@ def test_the_sdist_passes_its_own_tests(unpacked: Path) -> None:
     assert process.returncode == 0, process.stdout[-4_000:]
 
 
-def test_wheel_holds_one_top_level_name_all_modules_and_templates(sdist: Path, tmp_path: Path) -> None:
+def test_wheel_holds_one_top_level_name_all_modules_and_templates(
+    sdist: Path, tmp_path: Path
+) -> None:
     build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
     build += ["--no-build-isolation", "--wheel-dir", str(tmp_path), str(sdist)]
     subprocess.run(build, check=True)
