@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import errno
 import os
+import socket
 import stat
 import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import serial
 
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.tcp import give_up_unanswered, tune
 
-NEGOTIATED: Final = ("rfc2217:",)
-"""URLs under which each change of a port setting is a dialogue of 100 ms with the other end."""
-
-NEGOTIATED_WAIT_S: Final = 0.002
+if TYPE_CHECKING:
+    from tickrig.host.links.rfc2217_serial import Rfc2217Serial
 
 UNCOUNTED: Final = ("socket:",)
 """URLs under which pyserial only knows whether bytes are waiting, not how many."""
@@ -41,20 +41,16 @@ class SerialLink:
     """
 
     def __init__(self, url: str, baud: int = 115_200, *, exclusive: bool = True) -> None:
-        self._url = url
-        self._negotiated, self._uncounted = url.startswith(NEGOTIATED), url.startswith(UNCOUNTED)
-        wait_s = NEGOTIATED_WAIT_S if self._negotiated else 0
-        write_timeout_s = None if self._negotiated else 1  # pyserial has none there
+        self._url, self._uncounted = url, url.startswith(UNCOUNTED)
         try:
-            self._port = serial.serial_for_url(
-                url,
-                baudrate=baud,
-                timeout=wait_s,
-                write_timeout=write_timeout_s,
-                exclusive=exclusive or None,
-            )
+            self._port = _open_port(url, baud, exclusive=exclusive)
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkClosed(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
+        connection = getattr(self._port, "_socket", None)
+        if isinstance(connection, socket.socket):
+            with suppress(OSError):  # gone already, as the first look will tell
+                tune(connection)
+                give_up_unanswered(connection)
 
     @property
     def now_us(self) -> int:
@@ -68,7 +64,7 @@ class SerialLink:
             traffic: the bytes.
 
         Raises:
-            LinkClosed: the port is gone, or takes none for 1 s.
+            LinkClosed: the port is gone, or takes none for 1 s (5 s of RFC 2217).
         """
         try:
             self._port.write(traffic)
@@ -88,7 +84,8 @@ class SerialLink:
             LinkClosed: the port is gone.
         """
         try:
-            first = self._wait_for_byte(timeout_us)
+            self._port.timeout = timeout_us / 1e6
+            first = self._port.read(1)
             return first + self._take_rest() if first else b""
         except (serial.SerialException, OSError, TypeError) as error:
             raise LinkClosed(f"cannot read from {self._url!r}: {error}") from error
@@ -97,15 +94,6 @@ class SerialLink:
         """Close the port."""
         self._port.close()
 
-    def _wait_for_byte(self, timeout_us: int) -> bytes:
-        if not self._negotiated:
-            self._port.timeout = timeout_us / 1e6
-            return self._port.read(1)
-        until_us = self.now_us + timeout_us
-        while not (first := self._port.read(1)) and self.now_us < until_us:
-            continue
-        return first
-
     def _take_rest(self) -> bytes:
         if not self._uncounted:
             return self._port.read(self._port.in_waiting)
@@ -113,6 +101,17 @@ class SerialLink:
         with suppress(serial.SerialException):  # the end of it, which the next look finds too
             return self._port.read(READ_BYTES)
         return b""
+
+
+def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | Rfc2217Serial:
+    """Open what pyserial knows under a URL; one of RFC 2217 with what pyserial's lacks."""
+    if not url.startswith("rfc2217:"):
+        return serial.serial_for_url(
+            url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
+        )
+    from tickrig.host.links.rfc2217_serial import Rfc2217Serial  # noqa: PLC0415 - seldom wanted
+
+    return Rfc2217Serial(url, baudrate=baud, timeout=0)
 
 
 LOCKS: Final = Path("/proc/locks")
@@ -126,13 +125,18 @@ def explain_open_error(url: str, error: Exception) -> str:
         url: the port, as it was asked for.
         error: what opening it raised.
     """
+    around = error.__context__ if error.__cause__ is None else None
+    if isinstance(around, OSError) and around.strerror:
+        error = around  # pyserial names the port again, around it
     number = error.errno if isinstance(error, OSError) else None
     if sys.platform != "win32":
         if number in (errno.EAGAIN, errno.EBUSY):
             return f"another program uses it{_holder(url)}"
         if number == errno.EACCES:
             return f"permission denied{_remedy(url)}"
-    return os.strerror(number) if number else str(error)
+    if number is None or number < 0:  # of getaddrinfo
+        return getattr(error, "strerror", None) or str(error)
+    return os.strerror(number)
 
 
 if sys.platform != "win32":

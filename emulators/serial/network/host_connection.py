@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import socket
-import sys
 from contextlib import suppress
 from typing import Final
+
+from tickrig.host.links.tcp import tune
 
 READ_BYTES: Final = 1_024
 SEND_BUFFER_BYTES: Final = 16_384
@@ -13,9 +14,6 @@ SEND_BUFFER_BYTES: Final = 16_384
 
 LAST_WORDS_US: Final = 1_000_000
 STUCK_US: Final = 30_000_000
-
-KEEP_ALIVE: Final = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
-"""A machine that vanished is noticed after 25 s without traffic."""
 
 
 class HostConnection:
@@ -30,14 +28,15 @@ class HostConnection:
         buffer_bytes: bytes kept for a host that does not read.
 
     Attributes:
-        over: the host has gone, or was left.
-        mistake: why it was left, if it did what cannot be understood.
+        connection: to the host.
+        over: the host has gone, or was hung up on.
+        mistake: why it has to be left, if it sent what cannot be understood.
         is_idle: nothing of it was waiting at the latest look.
         lost: bytes dropped because it did not read.
     """
 
     def __init__(self, connection: socket.socket, buffer_bytes: int) -> None:
-        self._connection, self._buffer_bytes = connection, buffer_bytes
+        self.connection, self._buffer_bytes = connection, buffer_bytes
         self._unsent = bytearray()
         self._stuck_us: int | None = None
         self._last_words_us: int | None = None
@@ -79,14 +78,10 @@ class HostConnection:
             self._unsent += self._give_out(traffic)
         self._flush(now_us)
 
-    def leave(self, reason: str = "") -> None:
-        """Hang up; a reason is told in a line of text."""
+    def close(self) -> None:
+        """Hang up."""
         self.over = True
-        with self._connection, suppress(OSError):
-            if reason:
-                self._connection.send(f"{reason}\r\n".encode())
-            self._connection.shutdown(socket.SHUT_WR)
-            self._connection.recv(READ_BYTES)  # what is left unread would reset it: no reason read
+        self.connection.close()
 
     @property
     def _may_read(self) -> bool:
@@ -103,7 +98,7 @@ class HostConnection:
 
     def _read(self, now_us: int) -> bytes:
         try:
-            data = self._connection.recv(READ_BYTES)
+            data = self.connection.recv(READ_BYTES)
         except BlockingIOError:
             return b""
         except OSError:
@@ -118,7 +113,7 @@ class HostConnection:
         sent = 0
         try:
             if self._unsent and not self.over:
-                sent = self._connection.send(self._unsent)
+                sent = self.connection.send(self._unsent)
         except BlockingIOError:
             pass
         except OSError:
@@ -132,8 +127,4 @@ class HostConnection:
 
 def _tune(connection: socket.socket) -> None:
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    if sys.platform == "linux":
-        for name, value in KEEP_ALIVE.items():
-            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+    tune(connection)

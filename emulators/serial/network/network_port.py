@@ -14,6 +14,7 @@ from typing import Final
 
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.serial.host_setting import HostSetting
+from tickrig.emulators.serial.network.dismissed_host import DismissedHost
 from tickrig.emulators.serial.network.host_connection import HostConnection
 from tickrig.emulators.serial.network.serve_url import LOOPBACK, ServeUrl
 from tickrig.wire.instant import NEVER
@@ -23,6 +24,8 @@ RECEIVE_BUFFER_BYTES: Final = 4_096
 
 MAX_BAUD: Final = 4_000_000
 """Above it no adapter goes: the device is on USB, and its host may set what it likes."""
+
+MAX_DISMISSED: Final = 8
 
 _log = logging.getLogger(__name__)
 
@@ -53,6 +56,7 @@ class NetworkPort(NonCopyable):
         self._listener = _listen(url)
         self._buffer_bytes, self._baud = buffer_bytes, 115_200
         self._host: HostConnection | None = None
+        self._dismissed: list[DismissedHost] = []
         self._lost, self._peer, self._has_refused = 0, "", False
         self._setting: HostSetting | None = None
         self.address, self.port = self._listener.getsockname()[:2]
@@ -94,9 +98,10 @@ class NetworkPort(NonCopyable):
         """Take some of what the host sent; let hosts come and go."""
         data = self._host.poll(now_us) if self._host else b""
         if self._host and self._host.mistake:
-            self._hang_up(self._host.mistake)
+            self._leave(self._host, now_us)
         elif self._host and self._host.over:
             self._hang_up()
+        self._dismissed = [host for host in self._dismissed if not host.is_gone(now_us)]
         if self._host is None or self._host.is_idle or self._host.has_ended(now_us):
             self._accept(now_us)
         if self._setting is not None:
@@ -111,6 +116,8 @@ class NetworkPort(NonCopyable):
     def close(self) -> None:
         """Hang up, and listen no more."""
         self._hang_up()
+        for host in self._dismissed:
+            host.close()
         self._listener.close()
         self._setting = None
 
@@ -125,7 +132,7 @@ class NetworkPort(NonCopyable):
             return
         peer = "{}:{}".format(*address[:2])
         if self._host is not None and not self._host.has_ended(now_us):
-            self._refuse(connection, peer)
+            self._refuse(connection, peer, now_us)
             return
         self._hang_up()
         self._host, self._peer = self._connected(connection), peer
@@ -141,21 +148,32 @@ class NetworkPort(NonCopyable):
 
         return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
 
-    def _refuse(self, connection: socket.socket, peer: str) -> None:
+    def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:
         """Send a second host away; people are told of the first such."""
         reason = f"{self.url} has a host already: {self._peer}"
-        HostConnection(connection, 0).leave(reason)
         if not self._has_refused:
             _log.warning("%s; %s was refused", reason, peer)
         self._has_refused = True
+        self._dismiss(connection, now_us, reason)
 
-    def _hang_up(self, mistake: str = "") -> None:
-        if self._host is None:
-            return
-        if mistake:
-            _log.warning("%s: host %s was left: %s", self.url, self._peer, mistake)
-        self._host.leave(mistake)
-        self._lost += self._host.lost
+    def _leave(self, host: HostConnection, now_us: int) -> None:
+        """Send a host away that cannot be understood."""
+        _log.warning("%s: host %s was left: %s", self.url, self._peer, host.mistake)
+        self._dismiss(host.connection, now_us, host.mistake)
+        self._forget(host)
+
+    def _dismiss(self, connection: socket.socket, now_us: int, reason: str) -> None:
+        self._dismissed.append(DismissedHost(connection, now_us, reason))
+        if len(self._dismissed) > MAX_DISMISSED:
+            self._dismissed.pop(0).close()
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._forget(self._host)
+
+    def _forget(self, host: HostConnection) -> None:
+        self._lost += host.lost
         self._host, self._has_refused = None, False
 
 

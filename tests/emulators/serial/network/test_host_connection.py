@@ -26,7 +26,7 @@ def ends() -> Iterator[Ends]:
     connection = HostConnection(ours, buffer_bytes=1_000)
     yield connection, theirs
     theirs.close()
-    connection.leave()
+    connection.close()
 
 
 def read_all(host: socket.socket) -> bytes:
@@ -111,12 +111,3 @@ def test_a_host_that_is_gone_is_over_and_sending_to_it_is_nothing(ends: Ends) ->
     assert connection.over
     connection.send(0, b"RRC\n")
     assert connection.poll(0) == b""
-
-
-def test_who_is_left_is_told_the_reason(ends: Ends) -> None:
-    connection, host = ends
-    host.send(b"unread")
-    connection.leave("the line is busy")
-    assert connection.over
-    assert host.recv(100) == b"the line is busy\r\n"
-    assert host.recv(100) == b""

@@ -60,7 +60,7 @@ def opened() -> Iterator[Bench]:
         yield bench
     finally:
         theirs.close()
-        bench.connection.leave()
+        bench.connection.close()
 
 
 @pytest.fixture

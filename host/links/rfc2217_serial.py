@@ -1,0 +1,51 @@
+"""pyserial's `rfc2217://` port, with time-outs that cost nothing and errors that say more."""
+
+from __future__ import annotations
+
+from queue import Queue
+
+from serial import SerialException, rfc2217
+
+
+class Rfc2217Serial(rfc2217.Serial):
+    """A serial port of another machine (RFC 2217).
+
+    pyserial agrees with the other end on all settings when one is changed, in 50 ms at least; it
+    does so even for a time-out, of which the other end knows nothing. And where the other end
+    refuses in a line of text, as ser2net and ours do, it passes the line over.
+
+    Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
+    """
+
+    _agreed: object = None
+
+    def open(self) -> None:
+        """Open the port.
+
+        Raises:
+            SerialException: nobody listens there, or nobody who knows RFC 2217; the text
+                has what was said instead.
+        """
+        self._agreed = None
+        try:
+            super().open()
+        except OSError as error:
+            if (queue := self._queue) is None:  # there was no connection
+                raise
+            received = b"".join(queue.get() or b"" for _ in range(queue.qsize()))
+            said = received.decode("ascii", "replace").strip()
+            instead = f"it said {said!r}" if said else "it said nothing"
+            raise SerialException(f"no serial server answers there: {instead}") from error
+
+    @property
+    def _queue(self) -> Queue[bytes | None] | None:
+        """What its reading thread has received, None if there was no connection yet."""
+        queue: Queue[bytes | None] | None = self._read_buffer  # type: ignore[attr-defined]
+        return queue
+
+    def _reconfigure_port(self) -> None:
+        framing = (self.baudrate, self.bytesize, self.parity, self.stopbits)
+        settings = (*framing, self.xonxoff, self.rtscts, self.dsrdtr, self.write_timeout)
+        if settings != self._agreed:
+            super()._reconfigure_port()  # type: ignore[misc] # not in typeshed
+            self._agreed = settings
