@@ -14,12 +14,12 @@ from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, 
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.journal import text_of
-from tickrig.emulators.testing.bench.mode import BenchMode
+from tickrig.emulators.testing.bench.modes.mode import BenchMode
+from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.plan_parts import begin_faults, parts_of
 from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
 from tickrig.emulators.testing.bench.triggers import Condition
-from tickrig.emulators.testing.bench.virtual_mode import VirtualMode
-from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
 from tickrig.host.text.values import Setting
@@ -28,7 +28,7 @@ from tickrig.wire.instant import NEVER
 T = TypeVar("T")
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.bench.real.outside import Outside
+    from tickrig.emulators.testing.bench.modes.real.outside import Outside
 
 VIRTUAL: Final = "virtual"
 REAL: Final = "real"
@@ -125,6 +125,11 @@ class Bench(BenchDevice):
     def mode(self) -> str:
         """`virtual`, `real` or `hardware`."""
         return self._mode.name
+
+    @property
+    def tolerance(self) -> Tolerances:
+        """How far times, and what a hand does, may be off on this bench."""
+        return self._mode.tolerance
 
     @property
     def devices(self) -> tuple[str, ...]:
@@ -226,6 +231,14 @@ class Bench(BenchDevice):
         """
         return run_body(self._mode, body)
 
+    def meanwhile(self, host: Callable[[int], object]) -> None:
+        """Let a host go on while a human takes his time, so that no watchdog bites.
+
+        Args:
+            host: is called again and again with microseconds, as `client.run_for`.
+        """
+        self._mode.meanwhile(host)
+
     def transcript(self) -> str:
         """Return the latest lines and frames, and what was done: time, where, direction, text."""
         return text_of(self._mode.journal())
@@ -285,7 +298,9 @@ def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
         return VirtualMode(_rig(parts, plan))
     if mode != REAL:
         raise ValueError(f"a bench of emulated devices is in mode virtual or real, not {mode!r}")
-    from tickrig.emulators.testing.bench.real.real_mode import RealMode  # noqa: PLC0415 - POSIX
+    from tickrig.emulators.testing.bench.modes.real.real_mode import (  # noqa: PLC0415 - POSIX
+        RealMode,
+    )
 
     return RealMode.open(parts.mounts, plan.real, lambda outside: _rig(parts, plan, outside))
 

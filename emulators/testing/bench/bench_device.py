@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.mode import BenchMode
-from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger, when
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.testing.bench.modes.mode import BenchMode
+from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger
 from tickrig.host.text.values import Setting, parse_time_us
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ Duration = int | str
 """Microseconds, or a text as `"100ms"`."""
 
 PRESS: Final = "100ms"
+SOON: Final = "100ms"
 
 
 def us_of(duration: Duration) -> int:
@@ -102,9 +102,8 @@ class BenchDevice:
             ValueError: there is no such fault, or it cannot be like this.
             NotOnThisBench: it cannot be made here.
         """
-        wanted = parse_fault_spec(spec)
-        wanted = FaultSpec(self._fault(wanted.name), wanted.rate, wanted.from_us, wanted.to_us)
-        self._mode.act(lambda rig: _arm(rig, wanted, when, None if for_ is None else us_of(for_)))
+        for_us = None if for_ is None else us_of(for_)
+        self._mode.fault(self.name, parse_fault_spec(spec), when, for_us)
 
     def clear(self, name: str) -> None:
         """Let a fault go, and its future too.
@@ -115,7 +114,33 @@ class BenchDevice:
         Raises:
             ValueError: there is none.
         """
-        self._mode.request("clear", name=self._fault(name))
+        self._mode.clear(self.name, name)
+
+    def switch_off(self) -> None:
+        """Take the supply of the device away, of all devices if this is the whole bench.
+
+        Raises:
+            NotOnThisBench: it has no switch.
+        """
+        self._mode.switch_power(self.name, on=False)
+
+    def switch_on(self) -> None:
+        """Give the device its supply again.
+
+        Raises:
+            NotOnThisBench: it has no switch.
+        """
+        self._mode.switch_power(self.name, on=True)
+
+    def observe(self, text: str, seen: Condition, within: Duration = SOON) -> bool:
+        """Look whether something is seen at the device: in an emulator, or by who sits there.
+
+        Args:
+            text: what, as `the motors drive forward at 30 %`; a human is asked whether it is so.
+            seen: says it of an emulator; not asked where a human looks.
+            within: how long it may take, beside the tolerance of the bench.
+        """
+        return self._mode.observe(self.name, text, seen, us_of(within))
 
     def on_line(self, pattern: str, nth: int = 1) -> LineTrigger:
         """Return what is true as soon as a line, or a frame in candump's notation, has passed.
@@ -127,7 +152,7 @@ class BenchDevice:
         """
         source = self._mode.wire_of(self.name) if self.name else ""
         trigger = LineTrigger(pattern, nth, source)
-        self._mode.act(lambda rig: rig.journal.listeners.append(trigger.hear))
+        self._mode.hear(trigger.hear)
         return trigger
 
     @property
@@ -167,24 +192,3 @@ class BenchDevice:
     def _full(self, name: str) -> str:
         alone = not self.name or len(self._mode.devices) == 1
         return name if alone else f"{self.name}/{name}"
-
-    def _fault(self, name: str) -> str:
-        """Return the full name of a fault of this device, or of its wire."""
-        if not self.name:
-            return name
-        return self._mode.act(lambda rig: rig.state.fault_name(self.name, name))
-
-
-def _arm(rig: BenchRig, spec: FaultSpec, condition: Condition | None, for_us: int | None) -> None:
-    """Let a fault come, or note that it shall."""
-
-    def begin() -> None:
-        now_us = rig.effective_us
-        end_us = spec.to_us if for_us is None else max(now_us, spec.from_us) + for_us
-        rig.operator.fault(now_us, FaultSpec(spec.name, spec.rate, spec.from_us, end_us))
-
-    rig.operator.check_fault(spec)
-    if condition is None:
-        begin()
-    else:
-        when(rig, condition, begin)

@@ -160,3 +160,22 @@ def test_a_run_is_saved(tmp_path: Path) -> None:
     assert '"power_on_ticks": 5' in text
     assert " left ! power_off=1" in text
     assert " rrc ~ flip=0.01" in text
+
+
+def test_power_is_switched_whatever_its_input_is_called() -> None:
+    with Bench(drive=make_epos(1), panel=Rrc(), range="urg") as bench:
+        bench.run_for("100ms")
+        bench.switch_off()
+        bench.run_for("20ms")
+        assert (bench["drive"].get("state"), bench["panel"].get("state")) == ("Off", "Off")
+        assert bench["range"].get("power_cut") == 1
+        bench["drive"].switch_on()
+        assert bench.wait_until(lambda: bench["drive"].get("state") == "Pre-operational", "1s")
+        assert bench["panel"].get("rrc_power") == 0
+
+
+def test_what_is_seen_is_looked_for_as_long_as_it_may_take() -> None:
+    with Bench(Rrc()) as bench:
+        assert bench.observe("the RRC waits", lambda: bench.get("state") == "WaitPowerOn")
+        assert not bench.observe("VR2 runs", lambda: bench.get("vr2_power") == 1, within="20ms")
+        assert bench.tolerance.time_us == bench.tolerance.stick_pct == 0

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.triggers import Condition
+from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import Object
 
 if TYPE_CHECKING:
@@ -49,6 +52,11 @@ class BenchMode(Protocol):
         """Return the name of the wire that a device is on."""
         ...
 
+    @property
+    def tolerance(self) -> Tolerances:
+        """What is still right."""
+        ...
+
     def request(self, do: str, **fields: object) -> Object:
         """Ask as the control socket is asked; ValueError if it is refused."""
         ...
@@ -56,6 +64,27 @@ class BenchMode(Protocol):
     def act(self, action: Callable[[BenchRig], T]) -> T:
         """Do something to the rig between two ticks."""
         ...
+
+    def fault(
+        self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
+    ) -> None:
+        """Let a fault of a device, a wire or (empty) any come, or note that it shall."""
+
+    def clear(self, owner: str, fault: str) -> None:
+        """Let a fault go, and its future too."""
+
+    def switch_power(self, owner: str, *, on: bool) -> None:
+        """Give or take the supply of a device, of all if it is empty."""
+
+    def hear(self, listener: Callable[[WireLine], None]) -> None:
+        """Tell of each line and frame from now on."""
+
+    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
+        """Say whether something is seen at a device, or by a human who is asked the text."""
+        ...
+
+    def meanwhile(self, host: Callable[[int], object]) -> None:
+        """Let a host go on, so many microseconds at a time, while a human is asked."""
 
     def run_for(self, duration_us: int) -> None:
         """Let time pass."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.emulators.testing.bench.real.cpu_waits import CpuWaits
+from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 
 
 def count(tasks: Path, thread: str, waited_ns: int) -> None:

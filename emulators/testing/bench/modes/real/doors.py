@@ -7,8 +7,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.testing.bench.real.door_watch import DoorWatch
-from tickrig.emulators.testing.bench.real.watched_link import (
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
+from tickrig.emulators.testing.bench.modes.real.watched_link import (
     LinkGone,
     WatchedFrameLink,
     WatchedLink,
@@ -69,7 +69,7 @@ class Doors:
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a line by pyserial; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.real.watched_serial import (  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.bench.modes.real.watched_serial import (  # noqa: PLC0415 - slow
             open_watched,
         )
 
@@ -84,7 +84,7 @@ class Doors:
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.real.watched_bus import (  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415 - slow
             open_watched,
         )
 
@@ -123,7 +123,7 @@ def _line_link(place: LinePlace) -> Link[bytes]:
 
 def _frame_link(place: BusPlan) -> StampedLink:
     from tickrig.emulators.can.outside.bus_port import ECHOING  # noqa: PLC0415 - slow
-    from tickrig.emulators.testing.bench.real.watched_bus import (  # noqa: PLC0415 - slow
+    from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415 - slow
         name_of,
         open_bus,
     )

@@ -11,8 +11,8 @@ from tickrig.emulators.serial.network.network_port import NetworkPort
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_hub import SerialHub
+from tickrig.emulators.testing.bench.modes.real.doors import LinePlace
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
-from tickrig.emulators.testing.bench.real.doors import LinePlace
 from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
 from tickrig.host.control.clock import ServingClock
 
@@ -71,7 +71,7 @@ class Outside:
     def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
         from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
         from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.bench.real.watched_bus import open_bus  # noqa: PLC0415
+        from tickrig.emulators.testing.bench.modes.real.watched_bus import open_bus  # noqa: PLC0415
 
         bus = open_bus(plan, {})
         self._stack.callback(bus.shutdown)

@@ -8,7 +8,7 @@ from typing import Any
 import can
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.real.door_watch import DoorWatch
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links.can_link import keep_to_group
 from tickrig.host.links.can_message import to_frame

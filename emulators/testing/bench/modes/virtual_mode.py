@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.device.twin import twin
-from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
-from tickrig.host.control.requests import VERSION, Object
+from tickrig.emulators.testing.rig_file.plan import Tolerances
 
 if TYPE_CHECKING:
     import can
@@ -23,8 +22,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
-class VirtualMode:
+
+class VirtualMode(EmulatedMode):
     """A `BenchMode` whose time is that of its rig, stepped by whoever waits.
 
     Args:
@@ -34,31 +35,13 @@ class VirtualMode:
     name = "virtual"
 
     def __init__(self, rig: BenchRig) -> None:
-        self._rig, self._control = rig, EmulatorControl(rig)
-
-    @property
-    def devices(self) -> tuple[str, ...]:
-        """The names of all devices."""
-        return tuple(self._rig.state.assembly.parts)
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """The names of all wires."""
-        return tuple(self._rig.state.mounts)
+        super().__init__(rig, EXACT)
 
     @property
     def now_us(self) -> int:
         """The rig's time."""
         rig = self._rig.rig
         return rig.now_us if rig.acting_us is None else rig.acting_us
-
-    def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on."""
-        return self._rig.state.wire_of(device)
-
-    def request(self, do: str, **fields: object) -> Object:
-        """Ask as the control socket is asked; ValueError if it is refused."""
-        return answer_of(self._control.answer({"v": VERSION, "do": do, **fields}))
 
     def act(self, action: Callable[[BenchRig], T]) -> T:
         """Do something to the rig between two ticks."""
@@ -102,10 +85,6 @@ class VirtualMode:
 
         return SimNetwork(self._rig.rig, bus_of(self._rig, wire).open_end())
 
-    def journal(self) -> tuple[WireLine, ...]:
-        """Return the latest lines and frames, and what was done."""
-        return self._rig.journal.lines()
-
     def too_slow(self) -> str:
         """Say nothing: virtual time is always kept."""
         return ""
@@ -116,13 +95,6 @@ class VirtualMode:
 
     def close(self) -> None:
         """Give everything back."""
-
-
-def answer_of(answer: Object) -> Object:
-    """Return an answer; ValueError with its text if it is a refusal."""
-    if not answer["ok"]:
-        raise ValueError(str(answer["error"]))
-    return answer
 
 
 def bus_of(rig: BenchRig, wire: str) -> BusMount:

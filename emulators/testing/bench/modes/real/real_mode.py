@@ -9,21 +9,18 @@ from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
 
-from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
+from tickrig.emulators.testing.bench.modes.real.control_thread import ControlThread
+from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
+from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.real.doors import Doors
+from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
+from tickrig.emulators.testing.bench.modes.real.outside import Outside
+from tickrig.emulators.testing.bench.modes.real.rig_thread import RigThread
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
-from tickrig.emulators.testing.bench.real.control_thread import ControlThread
-from tickrig.emulators.testing.bench.real.cpu_waits import CpuWaits
-from tickrig.emulators.testing.bench.real.door_watch import HostPace
-from tickrig.emulators.testing.bench.real.doors import Doors
-from tickrig.emulators.testing.bench.real.lateness import too_slow
-from tickrig.emulators.testing.bench.real.outside import Outside
-from tickrig.emulators.testing.bench.real.rig_thread import RigThread
-from tickrig.emulators.testing.bench.virtual_mode import answer_of
-from tickrig.emulators.testing.rig_file.plan import RealPlan
-from tickrig.host.control.requests import VERSION, Object
+from tickrig.emulators.testing.rig_file.plan import RealPlan, Tolerances
 from tickrig.host.text.trace import Mark
 
 if TYPE_CHECKING:
@@ -35,6 +32,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
 SWITCH_S: Final = 0.0005
 """A thread that computes lets the rig come to its turn after this time (Python: 5 ms)."""
 
@@ -58,7 +56,7 @@ class _Watch(HostPace):
         """The rig hears it itself."""
 
 
-class RealMode:
+class RealMode(EmulatedMode):
     """A `BenchMode` whose time is that of this machine; it begins with the first door or wait.
 
     Args:
@@ -69,9 +67,9 @@ class RealMode:
     name = "real"
 
     def __init__(self, rig: BenchRig, outside: Outside) -> None:
-        self._rig, self._clock, self._stack = rig, outside.clock, ExitStack()
+        super().__init__(rig, IN_REAL_TIME)
+        self._clock, self._stack, self._begun = outside.clock, ExitStack(), False
         self._thread = RigThread(rig, outside.clock)
-        self._control, self._begun = EmulatorControl(rig), False
         self._pace, self._waits = _Watch(self._thread), CpuWaits()
         self._doors = Doors(outside.places, lambda wire: self._pace)
         rig.rig.watchers.append(self._waits.look)
@@ -105,35 +103,18 @@ class RealMode:
         return mode
 
     @property
-    def devices(self) -> tuple[str, ...]:
-        """The names of all devices."""
-        return tuple(self._rig.state.assembly.parts)
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """The names of all wires."""
-        return tuple(self._rig.state.mounts)
-
-    @property
     def now_us(self) -> int:
         """The time of the rig; between two ticks that of this machine."""
-        now_us = self._rig.rig.now_us
+        rig = self._rig.rig
+        if self._thread.here and rig.acting_us is not None:
+            return rig.acting_us
         if not self._thread.running:
-            return now_us
-        return min(self._clock.now_us, now_us + self._tick_us)
+            return rig.now_us
+        return min(self._clock.now_us, rig.now_us + self._tick_us)
 
     @property
     def _tick_us(self) -> int:
         return self._rig.state.assembly.tick_us
-
-    def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on."""
-        return self._rig.state.wire_of(device)
-
-    def request(self, do: str, **fields: object) -> Object:
-        """Ask as the control socket is asked; ValueError if it is refused."""
-        request = {"v": VERSION, "do": do, **fields}
-        return answer_of(self._thread.call(partial(self._control.answer, request)))
 
     def act(self, action: Callable[[BenchRig], T]) -> T:
         """Do something to the rig between two ticks."""
@@ -202,10 +183,6 @@ class RealMode:
         network = self._doors.canopen_network(wire)
         self._begin()
         return network
-
-    def journal(self) -> tuple[WireLine, ...]:
-        """Return the latest lines and frames, and what was done."""
-        return self._thread.call(self._rig.journal.lines)
 
     def too_slow(self) -> str:
         """Say why no failure is to be believed: real time was not kept; empty if it was."""

@@ -8,7 +8,7 @@ from typing import Any
 import serial
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.real.door_watch import DoorWatch
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
 from tickrig.host.links.serial_link import explain_open_error
 from tickrig.host.text.trace import Mark
 

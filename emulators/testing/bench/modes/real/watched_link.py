@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Generic
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.real.door_watch import DoorWatch
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import Link, StampedFrames, StampedLink, W
 from tickrig.host.text.trace import Mark

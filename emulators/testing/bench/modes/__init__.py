@@ -1,0 +1,1 @@
+"""Where the devices of a bench are, and how time passes for them."""

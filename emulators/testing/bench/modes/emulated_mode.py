@@ -1,0 +1,125 @@
+"""What benches of emulated devices have in common, in virtual and in real time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.triggers import Condition, when
+from tickrig.emulators.testing.rig_file.plan import Tolerances
+from tickrig.host.control.requests import VERSION, Object
+
+T = TypeVar("T")
+
+POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
+"""Inputs that are the supply of a device, each with its value while that is there."""
+
+
+class EmulatedMode(ABC):
+    """The part of a `BenchMode` that does not ask what time it is.
+
+    Args:
+        rig: the rig.
+        tolerance: what is still right.
+    """
+
+    def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
+        self._rig, self._control = rig, EmulatorControl(rig)
+        self.tolerance = tolerance
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        return tuple(self._rig.state.assembly.parts)
+
+    @property
+    def wires(self) -> tuple[str, ...]:
+        """The names of all wires."""
+        return tuple(self._rig.state.mounts)
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on."""
+        return self._rig.state.wire_of(device)
+
+    @abstractmethod
+    def act(self, action: Callable[[BenchRig], T]) -> T:
+        """Do something to the rig between two ticks."""
+
+    @abstractmethod
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time."""
+
+    def request(self, do: str, **fields: object) -> Object:
+        """Ask as the control socket is asked; ValueError if it is refused."""
+        request = {"v": VERSION, "do": do, **fields}
+        return answer_of(self.act(lambda rig: self._control.answer(request)))
+
+    def fault(
+        self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
+    ) -> None:
+        """Let a fault come, or note that it shall."""
+        self.act(lambda rig: _arm(rig, _named(rig, owner, spec), condition, for_us))
+
+    def clear(self, owner: str, fault: str) -> None:
+        """Let a fault go, and its future too."""
+        spec = FaultSpec(fault)
+        self.act(lambda rig: rig.operator.clear(_named(rig, owner, spec).name))
+
+    def hear(self, listener: Callable[[WireLine], None]) -> None:
+        """Tell of each line and frame from now on."""
+        self.act(lambda rig: rig.journal.listeners.append(listener))
+
+    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
+        """Say whether something is seen; False if it was not in time."""
+        return self.wait_until(seen, within_us + self.tolerance.time_us)
+
+    def switch_power(self, owner: str, *, on: bool) -> None:
+        """Give or take the supply of a device, of all if it is empty."""
+        for name in [owner] if owner else self.devices:
+            inputs = self._rig.state.assembly.parts[name].inputs
+            found = next((item for item in POWER if item in inputs.table), None)
+            if found is None:
+                raise NotOnThisBench(f"{name} has no input that is its supply")
+            full = self._rig.state.assembly.full_name(name, found)
+            self.request("set", name=full, value=POWER[found] if on else 1 - POWER[found])
+
+    def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
+        """Nothing: nobody is asked who takes his time."""
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return the latest lines and frames, and what was done."""
+        return self.act(lambda rig: rig.journal.lines())
+
+
+def answer_of(answer: Object) -> Object:
+    """Return an answer; ValueError with its text if it is a refusal."""
+    if not answer["ok"]:
+        raise ValueError(str(answer["error"]))
+    return answer
+
+
+def _named(rig: BenchRig, owner: str, spec: FaultSpec) -> FaultSpec:
+    """Return a fault under its full name."""
+    name = rig.state.fault_name(owner, spec.name) if owner else spec.name
+    return FaultSpec(name, spec.rate, spec.from_us, spec.to_us)
+
+
+def _arm(rig: BenchRig, spec: FaultSpec, condition: Condition | None, for_us: int | None) -> None:
+    """Let a fault come, or note that it shall."""
+
+    def begin() -> None:
+        now_us = rig.effective_us
+        end_us = spec.to_us if for_us is None else max(now_us, spec.from_us) + for_us
+        rig.operator.fault(now_us, FaultSpec(spec.name, spec.rate, spec.from_us, end_us))
+
+    rig.operator.check_fault(spec)
+    if condition is None:
+        begin()
+    else:
+        when(rig, condition, begin)
