@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.hil.rig_file import RIG, BadRigFile, read_rig_file
+from tests.hil.rrc.rig_file import RIG, BadRigFile, read_rig_file
 from tickrig.emulators.testing.plugin import pytest_plugin
 
 collect_ignore = ["tests/stranger"]  # of somebody else: `tests/test_stranger.py` installs it

@@ -103,6 +103,7 @@ class Rig(Copyable):
         now_us: time since the start of the rig.
         worst_late_us: by how much the worst step was late.
         late_ticks: how many steps began more than `LATE_US` late.
+        hosts: ends at which something that arrives is a step by itself; a watcher takes it.
         watchers: called with the time after each step, in the order of entering.
     """
 
@@ -118,6 +119,7 @@ class Rig(Copyable):
         self.now_us = self.worst_late_us = self.late_ticks = 0
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
+        self.hosts: Listeners[Host] = Listeners()
         self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
@@ -288,12 +290,13 @@ class Rig(Copyable):
 
     def _go_on(self, until_us: int, host: Host | None) -> int:
         """Let frames end up to the next tick with work, or one at a host; return its time."""
+        hosts = [*self.hosts] if host is None else [*self.hosts, host]
         while True:
             next_us = self._planned_us
             if not self._wires:
                 return next_us
-            if host is not None and host.arrived_us < next_us:
-                return max(self.now_us, host.arrived_us)
+            if hosts and (arrived_us := min(each.arrived_us for each in hosts)) < next_us:
+                return max(self.now_us, arrived_us)
             limit_us = end_us = min(next_us - 1, until_us)
             if len(self._wires) > 1:  # what ends on one may let a station send on another
                 end_us = min(limit_us, self._wires_due_us)

@@ -58,7 +58,8 @@ class SimNetwork(canopen.Network):
         super().__init__()
         self._adopt(self.time)
         rig.watchers.append(self._hear)
-        self._rig = rig
+        rig.hosts.append(end)
+        self._rig, self._end = rig, end
 
     @property
     def time_s(self) -> float:
@@ -74,6 +75,7 @@ class SimNetwork(canopen.Network):
         super().disconnect()
         if self._hear in self._rig.watchers:
             self._rig.watchers.remove(self._hear)
+            self._rig.hosts.remove(self._end)
         self.host.close()
 
     def run_for(self, duration_us: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hil.bench import Bench
+from tests.hil.rrc.bench import Bench
 
 BENCH = pytest.StashKey[Bench]()
 """The bench of a test, from the moment at which it is there."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from tests.hil.bench import sim_bench
-from tests.hil.lateness import EmulatorPace, PacedLink, too_slow
-from tests.hil.verdict import judge
+from tests.hil.rrc.bench import sim_bench
+from tests.hil.rrc.lateness import EmulatorPace, PacedLink, too_slow
+from tests.hil.rrc.verdict import judge
 
 
 class Stumbling:
@@ -131,7 +131,7 @@ def test_virtual_time_is_never_late() -> None:
 def failed(when: str = "call") -> pytest.TestReport:
     with pytest.raises(AssertionError) as caught:
         raise AssertionError("the motors run")
-    place = ("tests/hil/test_safety.py", 1, "test_it")
+    place = ("tests/hil/rrc/test_safety.py", 1, "test_it")
     return pytest.TestReport("test_it", place, {}, "failed", caught.getrepr(), when)  # type: ignore[arg-type]
 
 

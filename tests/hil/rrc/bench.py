@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from tests.hil.emulator_operator import EmulatorOperator
-from tests.hil.lateness import EmulatorPace, Lateness, PacedLink, too_slow
-from tests.hil.operator import Operator
-from tests.hil.rig_file import RigFile
-from tests.hil.terminal_operator import Terminal, TerminalOperator
+from tests.hil.rrc.emulator_operator import EmulatorOperator
+from tests.hil.rrc.lateness import EmulatorPace, Lateness, PacedLink, too_slow
+from tests.hil.rrc.operator import Operator
+from tests.hil.rrc.rig_file import RigFile
+from tests.hil.rrc.terminal_operator import Terminal, TerminalOperator
 from tests.host.live import live_rrc, pty
 from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.config import RrcConfig

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hil.rig_file import BadRigFile, RigFile, read_rig_file
+from tests.hil.rrc.rig_file import BadRigFile, RigFile, read_rig_file
 
 PORT = '[dut.rrc]\nport = "/dev/ttyACM0"\n'
 

@@ -14,7 +14,7 @@ import pytest
 
 from tickrig.host.control.client import ControlClient
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
 EMULATOR = "from tickrig.emulators.rrc.cli import main; main()"
 TIMEOUT_S = 30
@@ -50,7 +50,7 @@ def hardware(tmp_path: Path) -> Iterator[Hardware]:
 
 def hil_command(rig_toml: str, chosen: str) -> list[str]:
     options = ["-q", "-p", "no:cacheprovider", "--hil", rig_toml, "-k", chosen]
-    return [sys.executable, "-m", "pytest", "tests/hil", *options]
+    return [sys.executable, "-m", "pytest", "tests/hil/rrc", *options]
 
 
 def run(rig_toml: str, chosen: str) -> subprocess.CompletedProcess[str]:

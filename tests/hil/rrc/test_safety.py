@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hil.bench import PATIENCE_US, Bench
+from tests.hil.rrc.bench import PATIENCE_US, Bench
 from tickrig.host.rrc import RrcRefused, RrcStopped
 from tickrig.wire.rrc.replies import RrcEvent
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 
-from tests.hil.lateness import Ask
-from tests.hil.operator import PRESS_US
+from tests.hil.rrc.lateness import Ask
+from tests.hil.rrc.operator import PRESS_US
 from tickrig.host.rrc import RrcClient
 
 OFF_STATE = "WaitPowerOn"
