@@ -45,6 +45,8 @@ def read_rig(path: Path) -> RigFile:
     except ValueError as error:
         raise Refused(f"rig {path}: {error}") from None
     tables, body = content.pop("node", None), content.pop("body", None)
+    if "device" in content:
+        raise Refused(f"rig {path}: it describes a bench: tickrig run {path}")
     if content or not isinstance(tables, list):
         extra = f", not [{next(iter(content))}]" if content else ""
         raise Refused(f"rig {path}: {TABLES}{extra}")

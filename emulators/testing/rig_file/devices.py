@@ -51,7 +51,8 @@ class DeviceReader:
             self.plans[name] = None
             if table is not None:
                 self.sections[name] = table
-                self._check_name(name, table)
+                if not table.notes.names:
+                    self._check_name(name, table)
                 self.plans[name] = self._read(name, table)
 
     def put_on_wires(self) -> None:
@@ -80,7 +81,7 @@ class DeviceReader:
             except ValueError as error:
                 section.wrong(str(error), "type")
         schema = {None: EVERYTHING, DeviceKind.SERIAL: SERIAL_DEVICE}.get(kind, CANOPEN_DEVICE)
-        values = section.read(schema, READ_LATER, elsewhere=EVERYTHING)
+        values = section.read(schema, READ_LATER)
         if (wire := values.get("wire", "")) and wire not in self._given:
             section.unknown(f"no wire {wire!r}; {near(wire, list(self._given))}", "wire")
         if kind is None:

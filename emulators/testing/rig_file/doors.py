@@ -76,7 +76,7 @@ class DoorReader:
         power: dict[str, PowerPlan] = {}
         for name, wire, table in self._tables(section, CONTROL, TOLERANCE_TABLE):
             schema = _hardware_schema(wire, is_device=name in self._devices)
-            found = table.read(schema, elsewhere=_ALL_HARDWARE)
+            found = table.read(schema)
             if wire is not None and "port" in found:
                 ports[wire.name] = PortPlan(port=found["port"], baud=found.get("baud"))
             if wire is not None and "interface" in found:
@@ -120,9 +120,9 @@ class DoorReader:
 
     def _door(self, wire: WirePlan, section: Section) -> DoorPlan:
         if wire.type is WireType.CAN:
-            found = section.read(REAL_BUS, elsewhere=REAL_LINE)
+            found = section.read(REAL_BUS)
             return DoorPlan(bus=_bus(found) if "interface" in found else None)
-        found = section.read(REAL_LINE, elsewhere=REAL_BUS)
+        found = section.read(REAL_LINE)
         serve = found.get("serve", ())
         for url in serve:
             try:
@@ -154,9 +154,6 @@ def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:
     if wire.type is WireType.CAN:
         return {**HARDWARE_BUS, **of_device}
     return {**HARDWARE_LINE, **of_device}
-
-
-_ALL_HARDWARE: Schema = {**HARDWARE_BUS, **HARDWARE_LINE, **HARDWARE_DEVICE}
 
 
 def _bus(found: Mapping[str, Any]) -> BusPlan:

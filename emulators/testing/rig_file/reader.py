@@ -16,6 +16,7 @@ from tickrig.emulators.testing.rig_file.body import read_body
 from tickrig.emulators.testing.rig_file.devices import DeviceReader
 from tickrig.emulators.testing.rig_file.doors import DoorReader
 from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
+from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
 from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan, WirePlan, WireType
 from tickrig.emulators.testing.rig_file.probe import Probe, check_wire_fault, probe
 from tickrig.emulators.testing.rig_file.schema import TOP
@@ -59,11 +60,13 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
         text: the whole.
         path: of the file, which need not be there.
     """
+    if reason := no_rig_file(text):
+        raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    notes = Notes(document)
-    plan = _Reader(Section(notes, (), document.values), path).read()
-    if notes.all:
-        raise RigFileError(str(path), notes.all)
+    top = in_new_words(Section(Notes(document), (), document.values))
+    plan = _Reader(top, path).read()
+    if top.notes.all:
+        raise RigFileError(str(path), top.notes.all)
     return plan
 
 
@@ -96,7 +99,7 @@ class _Reader:
         fault, body, real, hardware = map(top.sub, ("fault", "body", "real", "hardware"))
         return RigPlan(
             seed=seed,
-            wires={name: wire for name, wire in self._wires.items() if wire},
+            wires={name: self._with_rate(wire) for name, wire in self._wires.items() if wire},
             devices=devices,
             signals=signals,
             faults=tuple(read_faults(fault, self._fault_owners())) if fault else (),
@@ -144,6 +147,15 @@ class _Reader:
                     section.wrong(f"node-ID {each.node_id} is that of {first!r} already", "node_id")
                 names.setdefault(each.node_id, name)
         return names
+
+    def _with_rate(self, wire: WirePlan) -> WirePlan:
+        """Return a bus with the bit rate of a DCF, if the file gives none."""
+        nodes = [
+            name for name, each in self._devices.plans.items() if each and each.wire == wire.name
+        ]
+        probes = [found for name in nodes if (found := self._probes[name])]
+        rates = [each.bit_rate for each in probes if each.bit_rate]
+        return replace(wire, bit_rate=rates[0]) if rates and wire.bit_rate is None else wire
 
     def _wire_faults(self, wire: WirePlan | None) -> CheckFault | None:
         """Return what judges faults of a wire, None if nobody can."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -51,16 +51,21 @@ class Notes:
     Attributes:
         document: as it was read.
         mistakes: so far.
+        names: of values that the file calls otherwise; empty where it is a rig file.
     """
 
     document: TomlDocument
     mistakes: list[Mistake] = field(default_factory=list)
+    names: Mapping[TomlPath, str] = field(default_factory=dict)
 
     def wrong(self, keys: TomlPath, reason: str) -> None:
         """Note what is wrong with the value at these keys."""
         line = self.document.line_of(keys)
-        place = f"{dotted(keys)}: " if keys else ""
-        self.mistakes.append(Mistake(line, f"{place}{' '.join(reason.split())}"))
+        self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
+
+    def place(self, keys: TomlPath) -> str:
+        """Return how a mistake begins: with the keys as the file has them."""
+        return f"{self.names.get(keys) or dotted(keys)}: " if keys else ""
 
     @property
     def all(self) -> tuple[Mistake, ...]:
@@ -91,20 +96,19 @@ class Section:
         if self.notes.document.whole:
             self.wrong(reason, *keys)
 
-    def read(self, schema: Schema, *others: str, elsewhere: Schema | None = None) -> dict[str, Any]:
+    def read(self, schema: Schema, *others: str) -> dict[str, Any]:
         """Take the values that the schema names; a wrong one is noted, and left out.
 
         Args:
             schema: the keys.
             others: keys that somebody else reads.
-            elsewhere: keys that another such table could have, and this one cannot.
         """
         found: dict[str, Any] = {}
         for key, value in self.values.items():
             if key in others or is_broken(value):
                 continue
             if key not in schema:
-                self._unknown(key, list(dict.fromkeys([*schema, *others])), elsewhere or {})
+                self.no_key(key, [*schema, *others])
                 continue
             try:
                 found[key] = schema[key].field(value)
@@ -116,13 +120,11 @@ class Section:
                 self.wrong(f"no key {key!r}: {each.text}, {each.values}")
         return found
 
-    def _unknown(self, key: str, names: list[str], elsewhere: Schema) -> None:
-        if key in elsewhere:
-            self.wrong(f"no such key here; known: {', '.join(names) or 'none'}", key)
-            return
+    def no_key(self, key: str, known: Iterable[str]) -> None:
+        """Note a key that the table cannot have, in its own line."""
         line = self.notes.document.line_of((*self.keys, key))
-        place = f"{dotted(self.keys)}: " if self.keys else ""
-        self.notes.mistakes.append(Mistake(line, f"{place}no key {key!r}; {near(key, names)}"))
+        reason = f"no key {key!r}; {near(key, list(dict.fromkeys(known)))}"
+        self.notes.mistakes.append(Mistake(line, f"{self.notes.place(self.keys)}{reason}"))
 
     def sub(self, key: str) -> Section | None:
         """Return the table of a key; None if there is none, or something else, which is noted."""

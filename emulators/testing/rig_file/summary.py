@@ -55,6 +55,7 @@ def wire_text(wire: WirePlan) -> str:
 def device_text(device: DevicePlan) -> str:
     """Say what a device is.
 
+    >>> from tickrig.emulators.testing.rig_file.plan import DeviceKind
     >>> device_text(DevicePlan(name="left", kind=DeviceKind.MODEL, type="epos", wire="a"))
     'left (epos)'
     """

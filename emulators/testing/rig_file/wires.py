@@ -33,7 +33,7 @@ def _read(name: str, section: Section) -> WirePlan | None:
     if wire_type is None:
         section.read(EVERYTHING)
         return None
-    values: Mapping[str, Any] = section.read(WIRES[wire_type], elsewhere=EVERYTHING)
+    values: Mapping[str, Any] = section.read(WIRES[wire_type])
     return WirePlan(
         name=name,
         type=wire_type,

@@ -179,6 +179,7 @@ def test_a_rig_file_names_the_nodes(tmp_path: Path) -> None:
         ("[[node]]\neds = 'x'\nprofile = 401", "node 1: profile 401 is not one of auto, none"),
         ("[[node]]\nid = 0\neds = 'x'", "node 1: id 0: a node-ID is 1..127"),
         ("[[node", "rig.toml: "),
+        ("[device.a]", "rig.toml: it describes a bench: tickrig run"),
     ],
 )
 def test_a_wrong_rig_file_is_one_line(tmp_path: Path, text: str, error: str) -> None:

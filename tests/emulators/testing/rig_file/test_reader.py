@@ -249,10 +249,10 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         ("device.a = 5", ["1: device.a: it is a table [device.a], not 5"]),
         ('[device.a-b]\ntype = "rrc"', ["1: .*a name is letters, digits and _.*, as a_b"]),
         ('[device.can]\ntype = "rrc"', ["1: device.can: control, .* are no names of devices"]),
-        (RRC + "node_id = 5", ["3: device.rrc.node_id: no such key here; known: type, wire,"]),
-        (RRC + 'profile = "402"', ["3: device.rrc.profile: no such key here"]),
+        (RRC + "node_id = 5", ["3: device.rrc: no key 'node_id'; known: type, wire,"]),
+        (RRC + 'profile = "402"', ["3: device.rrc: no key 'profile'; "]),
         (NODE + 'profile = "402"', ["4: device.node.profile: it belongs to an EDS or DCF"]),
-        (NODE + "config = {}", ["4: device.node.config: no such key here"]),
+        (NODE + "config = {}", ["4: device.node: no key 'config'; "]),
         (NODE.replace("5", "0"), ["3: device.node.node_id: it takes 1..127, or lss"]),
         (NODE + NODE.replace("node]", "b]"), ["6: .*node-ID 5 is that of 'node' already"]),
         ('[device.a]\ntype = "x.eds"', ["2: .*x.eds: No such file"]),
@@ -268,7 +268,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         (NODE + "wire = 'l'\n[wire.l]\ntype = 'serial'", ["4: .*'l' is of type serial, .*CANopen"]),
         (RRC + "[wire.l]\ntype = 'can'", ["3: wire.l: no device is on it"]),
         ("[wire.l]\ntype = 'cna'\n" + RRC, ["2: wire.l.type: it takes serial, rs485, can, not"]),
-        ("[wire.l]\ntype = 'can'\nbaud = 5\n" + NODE, ["3: wire.l.baud: no such key here"]),
+        ("[wire.l]\ntype = 'can'\nbaud = 5\n" + NODE, ["3: wire.l: no key 'baud'; "]),
         ("[wire.l]\ntype = 'can'\nbitrate = 5\n" + NODE, ["3: .*10000..1000000, not 5"]),
         ("[wire.l]\ntype = 'can'\n[wire.m]\ntype = 'can'\n" + NODE, ["5: .*l and m"]),
         ("[wire.rrc]\ntype = 'serial'\n" + RRC, ["3: .*a wire of this name"]),
@@ -310,7 +310,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         ),
         (RRC + "[real]\nrcr.link = 'x'", ["4: real.rcr: no device or wire 'rcr'; did you mean"]),
         (RRC + "[real.rrc]\nserve = 'http://x'", ["4: real.rrc.serve: 'http://x' is not rfc2217"]),
-        (RRC + "[real.rrc]\nchannel = 'x'", ["4: real.rrc.channel: no such key here"]),
+        (RRC + "[real.rrc]\nchannel = 'x'", ["4: real.rrc: no key 'channel'; "]),
         (NODE + "[real.node]\nlink = 'x'", ["4: real.node: 'node' shares its wire"]),
         (
             RRC + "[device.b]\ntype='rrc'\n[real]\nrrc.link = 'x'\nb.link = 'x'",
@@ -365,3 +365,14 @@ def test_what_an_eds_has_wrong_is_told(tmp_path: Path) -> None:
         parse_rig_file('\n[device.a]\ntype = "a.eds"\nnode_id = 1', tmp_path / "rig.toml")
     assert {line for line, _ in caught.value.mistakes} == {3}
     assert any("[1000]" in reason for _, reason in caught.value.mistakes)
+
+
+def test_a_rig_takes_the_bit_rate_of_its_dcf(tmp_path: Path) -> None:
+    text = (ROOT / "examples" / "io_module.eds").read_text("utf-8")
+    text += "\n[DeviceComissioning]\nNodeID=0x09\nBaudrate=250\n"
+    (tmp_path / "module.dcf").write_text(text)
+    rig = '[device.module]\ntype = "module.dcf"\n'
+    plan = parse_rig_file(rig, tmp_path / "rig.toml")
+    assert plan.wires["can"].bit_rate == 250_000
+    given = parse_rig_file('[wire.a]\ntype = "can"\nbitrate = 50000\n' + rig, tmp_path / "b.toml")
+    assert given.wires["a"].bit_rate == 50_000
