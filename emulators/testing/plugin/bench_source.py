@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from copy import deepcopy
+from dataclasses import replace
+from functools import lru_cache
+from os.path import relpath
 from pathlib import Path
 from types import FunctionType
 from typing import Any, Final, NamedTuple
@@ -15,11 +18,14 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.build import BenchedDevice, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
 Source = BenchedDevice | Mapping[str, Any] | Path
 BenchSource = Source | Callable[[], Source] | None
 """A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`)."""
 
+HARDWARE: Final = "hardware"
 SUFFIX: Final = ".toml"
 
 NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
@@ -63,13 +69,22 @@ class Wanted(NamedTuple):
     seed: int | None
     folder: Path
 
-    @property
-    def rig_file(self) -> Path | None:
-        """The rig file, if it is one."""
-        is_file = isinstance(self.source, Path) or (
-            isinstance(self.source, str) and self.source.endswith(SUFFIX)
-        )
-        return self.folder / self.source if is_file else None  # type: ignore[operator] # a path
+    def settled(self, item: pytest.Item) -> Wanted:
+        """Return it with what is on the bench of this test itself: made, and of a whole path.
+
+        Raises:
+            ValueError: nothing is, or what another test has used.
+        """
+        source = fresh(item, self.source)
+        made = source() if callable(source) else source
+        if made is None:
+            raise ValueError(
+                "nobody says what is on the bench: write a fixture bench_config, or give "
+                "--bench RIG.TOML"
+            )
+        if isinstance(made, Path) or (isinstance(made, str) and made.endswith(SUFFIX)):
+            made = self.folder / made
+        return self._replace(source=made)
 
     def open(self) -> Bench:
         """Make the bench.
@@ -78,40 +93,49 @@ class Wanted(NamedTuple):
             ValueError: it cannot be made of that.
             NotOnThisBench: not in this mode.
             BenchBlocked: a port is not there, or somebody said no.
+            OSError: a file cannot be read.
         """
-        source = self.source() if callable(self.source) else self.source
-        wanted = self._replace(source=source)
-        if source is None:
-            raise ValueError("nobody says what is on the bench: write a fixture bench_config")
-        return wanted.open_devices()
-
-    def open_devices(self) -> Bench:
-        """Put devices on a bench."""
-        if self.mode != "virtual":
-            raise NotOnThisBench(f"a {self.mode} bench wants a rig file")
-        given = self.source if isinstance(self.source, Mapping) else {"": self.source}
-        options = dict(given)
-        if self.seed is not None:
-            options["seed"] = self.seed
-        alone = options.pop("", None)
-        return Bench(alone, **options)
+        if isinstance(self.source, Path):
+            plan = plan_of(self.source)
+            return Bench.of_plan(replace(plan, seed=self.seed_used), self.mode)
+        if self.mode == HARDWARE:
+            raise NotOnThisBench("where the hardware is stands in a rig file: --bench RIG.TOML")
+        options = {"mode": self.mode, **self._options, "seed": self.seed_used}
+        return Bench(options.pop("", None), **options)
 
     @property
     def seed_used(self) -> int:
         """The seed of all chance."""
         if self.seed is not None:
             return self.seed
-        return self.source.get("seed", 0) if isinstance(self.source, Mapping) else 0
+        if isinstance(self.source, Path):
+            return plan_of(self.source).seed
+        return int(self._options.get("seed", 0))
 
     @property
     def text(self) -> str:
         """What is on the bench, for people."""
         if isinstance(self.source, Path):
-            return str(self.source)
-        if isinstance(self.source, Mapping):
-            return ", ".join(self.source)
-        if callable(self.source):
-            return getattr(self.source, "__name__", "devices of bench_config")
-        if self.source is None or self.rig_file:
-            return str(self.source or "nothing")
-        return name_of(self.source)
+            return relpath(self.source)
+        names = [name for name in self._options if name not in ("seed", "line", "mode")]
+        return ", ".join(name or name_of(self._options[name]) for name in names)
+
+    @property
+    def _options(self) -> Mapping[str, Any]:
+        """The arguments of `Bench`; a lone device has no name."""
+        return self.source if isinstance(self.source, Mapping) else {"": self.source}
+
+
+def plan_of(path: Path) -> RigPlan:
+    """Return what a rig file says; it is read once, unless it has changed.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: all that is wrong with it, a line each.
+    """
+    return _plan_of(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _plan_of(path: Path, changed_ns: int) -> RigPlan:
+    return read_rig_file(path)

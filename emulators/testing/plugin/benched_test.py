@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted, fresh
+from tickrig.emulators.testing.plugin.artifacts import keep
+from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.failure_report import sections_of
+from tickrig.emulators.testing.plugin.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
 from tickrig.emulators.testing.plugin.safe_state import SafeState, unsafe
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.verdict import blocked, make_error
+from tickrig.host.cli.refused import Refused
 
 
 class BenchedTest:
@@ -29,13 +33,20 @@ class BenchedTest:
 
     Attributes:
         bench: its bench, from the moment at which it is open.
+        fingerprint: what happens on it, if that is compared.
+        kept: files that were kept of it.
+        not_kept: why other files were not, each in a line.
     """
 
     def __init__(self, item: pytest.Item, wanted: Wanted, safe: SafeState) -> None:
         self.item, self.wanted, self._safe = item, wanted, safe
+        self._settings = item.config.stash[SETTINGS]
         self.bench: Bench | None = None
+        self.fingerprint: Fingerprint | None = None
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
+        self.kept: list[Path] = []
+        self.not_kept: list[str] = []
 
     def open(self) -> Bench:
         """Open the bench.
@@ -46,17 +57,32 @@ class BenchedTest:
         """
         needs, self._allowed = needs_of(self.item), allowed_of(self.item)
         check_mode(needs, self.wanted.mode)
-        self.wanted = self.wanted._replace(source=fresh(self.item, self.wanted.source))
+        self.wanted = self.wanted.settled(self.item)
         bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
         with suppress(NotOnThisBench):
             self._health = bench._mode.act(Health)
+        if self._settings.compare and bench.mode == VIRTUAL:
+            self.fingerprint = bench._mode.act(Fingerprint)
         return bench
 
     def close(self) -> None:
-        """Give everything back."""
-        if self.bench is not None:
+        """Keep what is to be kept of a passed test too; give everything back."""
+        if self.bench is None:
+            return
+        try:
+            if self.fingerprint is not None:
+                self.fingerprint.end()
+            if self._settings.every:
+                self._keep()
+        finally:
             self.bench.close()
+
+    def _keep(self) -> None:
+        """Keep what is to be kept, once."""
+        folder = self._settings.artifacts
+        if folder and self.bench and not (self.kept or self.not_kept):
+            self.kept, self.not_kept = keep(self.bench, folder, str(self.item.nodeid))
 
     def run_body(self, function: pytest.Function) -> None:
         """Run an async test: time of the bench passes while it waits."""
@@ -77,6 +103,7 @@ class BenchedTest:
         if reason := blocked(report, call, self.bench):
             make_error(report, reason)
         if report.failed:
+            self._keep()
             report.sections += sections_of(self)
 
 
@@ -86,6 +113,8 @@ def benched(
 ) -> Iterator[Bench]:
     """Give a test its bench."""
     settings = request.config.stash[SETTINGS]
+    if settings.rig_file and (settings.ordered or source is None):
+        source = settings.rig_file
     wanted = Wanted(source, mode, settings.seed, request.path.parent)
     test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe)
     try:
@@ -98,5 +127,5 @@ def _opened(test: BenchedTest) -> Bench:
     """Open the bench; what is wrong with what was asked needs no traceback."""
     try:
         return test.open()
-    except ValueError as error:
+    except (ValueError, OSError, Refused) as error:
         raise pytest.fail.Exception(f"no bench: {error}", pytrace=False) from None

@@ -15,6 +15,7 @@ from tickrig.host.text.values import format_time
 if TYPE_CHECKING:
     from tickrig.emulators.testing.plugin.benched_test import BenchedTest
 
+TRACE: Final = ".trace"
 LINES: Final = 20
 """So many lines and frames are told."""
 
@@ -23,9 +24,12 @@ def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
     """Return the sections of a report, each with its title."""
     command = ("bench: repeat it with", repeat_command(test.item))
     if test.bench is None:
-        return [("bench", test.wanted.text), command]
+        return [("bench", f"none was opened; {test.wanted.mode}"), command]
     last = last_lines(test.bench, LINES) or "nothing happened"
-    return [("bench", _wanted(test)), ("bench: what happened last", last), command]
+    sections = [("bench", _wanted(test)), ("bench: what happened last", last), command]
+    if test.kept or test.not_kept:
+        sections.append(("bench: what was kept", _kept(test)))
+    return sections
 
 
 def repeat_command(item: pytest.Item) -> str:
@@ -38,6 +42,7 @@ def repeat_command(item: pytest.Item) -> str:
         "::".join([relpath(config.rootpath / file, config.invocation_params.dir), *names]),
     ]
     for flag, value in (
+        ("--bench", config.getoption("bench")),
         ("--bench-mode", config.getoption("bench_mode")),
         ("--bench-seed", None if seed is None else str(seed)),
     ):
@@ -52,3 +57,10 @@ def _wanted(test: BenchedTest) -> str:
     devices = ", ".join(bench.devices)
     named = what if what == devices else f"{what} with {devices}"
     return f"{named}; {bench.mode}, seed {test.wanted.seed_used}, {format_time(bench.now_us)} s old"
+
+
+def _kept(test: BenchedTest) -> str:
+    """Return the files that were kept; a trace is a command."""
+    paths = [shlex.quote(relpath(path)) for path in test.kept]
+    lines = [f"tickrig replay {path}" if path.endswith(TRACE) else path for path in paths]
+    return "\n".join([*lines, *test.not_kept])

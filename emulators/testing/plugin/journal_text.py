@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from tickrig.emulators.record.wire_log import WireLine
@@ -12,6 +13,9 @@ from tickrig.emulators.testing.bench.mounts import BusMount
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.errors import FramingError
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoder import Decoder
@@ -51,16 +55,15 @@ def last_lines(bench: Bench, count: int) -> str:
     )
 
 
+def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
+    """Return the frame that a line of a CAN bus says."""
+    text = line.data.decode()
+    with suppress(FramingError):
+        return ErrorFrame.parse(text)
+    return CanFrame.parse(text)
+
+
 def _meaning(decoder: Decoder, line: WireLine) -> str:
     from tickrig.host.monitor.frames.record import Record  # noqa: PLC0415 - as the decoder
-    from tickrig.wire.can import CanFrame  # noqa: PLC0415
-    from tickrig.wire.can_error import ErrorFrame  # noqa: PLC0415
-    from tickrig.wire.errors import FramingError  # noqa: PLC0415
 
-    text = line.data.decode()
-    frame: CanFrame | ErrorFrame
-    try:
-        frame = ErrorFrame.parse(text)
-    except FramingError:
-        frame = CanFrame.parse(text)
-    return decoder.take(Record(line.at_us, line.source, frame)).text
+    return decoder.take(Record(line.at_us, line.source, frame_of(line))).text

@@ -51,6 +51,10 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.bench_seed = _any_seed()  # so the workers of pytest-xdist get it too
     settings = config.stash[SETTINGS] = Settings.of(config)
     config.pluginmanager.register(_mode_fixture(settings.modes), "tickrig-bench-mode")
+    if settings != Settings():
+        from tickrig.emulators.testing.plugin.preparation import prepare  # noqa: PLC0415
+
+        prepare(config, settings)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:

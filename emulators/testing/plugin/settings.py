@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import pytest
 
 MODES: Final = ("virtual", "real", "hardware")
 RANDOM: Final = "random"
+FAILED: Final = "failed"
+EVERY: Final = "every"
 
 
 class Option(NamedTuple):
@@ -30,8 +33,13 @@ class Option(NamedTuple):
 
 
 OPTIONS: Final = (
+    Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
     Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
     Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
+    Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
+    Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
+    Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
+    Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
 )
 
 
@@ -39,20 +47,38 @@ class Settings(NamedTuple):
     """What was asked for.
 
     Attributes:
+        rig_file: of the bench, None if tests say themselves what is on it.
+        ordered: whether the command line names the rig file.
         modes: each test runs in each of them.
         seed: of all chance, None if what is on the bench says it.
+        artifacts: folder for what is kept, None if nothing is.
+        every: whether passed tests are kept too.
+        compare: whether each test runs twice.
+        report: file for the report, None if there is none.
     """
 
+    rig_file: Path | None = None
+    ordered: bool = False
     modes: tuple[str, ...] = MODES[:1]
     seed: int | None = None
+    artifacts: Path | None = None
+    every: bool = False
+    compare: bool = False
+    report: Path | None = None
 
     @classmethod
     def of(cls, config: pytest.Config) -> Settings:
         """Return those of a test run; UsageError if one is wrong."""
         wanted = {option.name: _wanted(config, option) for option in OPTIONS}
         return cls(
+            _path(config, "bench", wanted["bench"]),
+            config.getoption("bench") is not None,
             _modes(wanted["bench_mode"] or MODES[0]),
             _seed(wanted["bench_seed"]),
+            _path(config, "bench_artifacts", wanted["bench_artifacts"]),
+            _every(wanted["bench_artifacts_of"] or FAILED),
+            wanted["bench_compare"].lower() in {"true", "1", "yes", "on"},
+            _path(config, "bench_report", wanted["bench_report"]),
         )
 
     @property
@@ -61,7 +87,7 @@ class Settings(NamedTuple):
         if self == Settings():
             return ""
         seed = "" if self.seed is None else f", seed {self.seed}"
-        return f"bench: {', '.join(self.modes)}{seed}"
+        return f"bench: {self.rig_file or 'of each test'}, {', '.join(self.modes)}{seed}"
 
 
 SETTINGS: Final = pytest.StashKey[Settings]()
@@ -70,6 +96,15 @@ SETTINGS: Final = pytest.StashKey[Settings]()
 def _wanted(config: pytest.Config, option: Option) -> str:
     given = config.getoption(option.name)
     return str(config.getini(option.name) if given is None else given).strip()
+
+
+def _path(config: pytest.Config, name: str, text: str) -> Path | None:
+    """Return where a file is: from here on the command line, else from the configuration file."""
+    if not text:
+        return None
+    if config.getoption(name) is not None:
+        return config.invocation_params.dir / text
+    return (config.inipath.parent if config.inipath else config.rootpath) / text
 
 
 def _modes(text: str) -> tuple[str, ...]:
@@ -86,3 +121,9 @@ def _seed(text: str) -> int | None:
     if not text.isdecimal():
         raise pytest.UsageError(f"--bench-seed {text}: it is a number from 0 on, or {RANDOM}")
     return int(text)
+
+
+def _every(text: str) -> bool:
+    if text not in (FAILED, EVERY):
+        raise pytest.UsageError(f"--bench-artifacts-of {text}: it is {FAILED} or {EVERY}")
+    return text == EVERY

@@ -1,0 +1,84 @@
+"""What is kept of a test: its trace, the frames of its buses, its transcript."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+from typing import Final
+
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.plugin.journal_text import buses_of, frame_of
+from tickrig.host.text.trace import Mark
+from tickrig.wire.candump import LogLine
+
+MOST: Final = 80
+"""Characters of a name that are of the test."""
+
+
+def stem_of(nodeid: str) -> str:
+    """Return what files of a test are called: no path, and no two tests have the same.
+
+    >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
+    'tests_test_stop.py_test_it_stops_fast-24cfca'
+    """
+    words = re.sub(r"[^A-Za-z0-9.-]+", "_", nodeid.replace("..", "")).strip("._-")
+    return f"{words[-MOST:].lstrip('._-') or 'test'}-{sha256(nodeid.encode()).hexdigest()[:6]}"
+
+
+def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]]:
+    """Write what is kept of a test.
+
+    Args:
+        bench: its bench, still open.
+        folder: where to; it is made.
+        nodeid: of the test.
+
+    Returns:
+        The files, and why others are not there, each in a line.
+    """
+    kept: list[Path] = []
+    failed: list[str] = []
+    for suffix, write in WRITERS.items():
+        path = folder / f"{stem_of(nodeid)}{suffix}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if write(bench, path):
+                kept.append(path)
+        except NotOnThisBench:
+            continue
+        except OSError as error:
+            failed.append(f"{path} was not written: {error.strerror or error}")
+    return kept, failed
+
+
+def _trace(bench: Bench, path: Path) -> bool:
+    bench.save_trace(path)
+    return True
+
+
+def _candump(bench: Bench, path: Path) -> bool:
+    buses = buses_of(bench)
+    lines = [
+        f"{LogLine(line.at_us, line.source, frame_of(line))}\n"
+        for line in bench._mode.journal()
+        if line.source in buses and line.mark is not Mark.PHYSICAL
+    ]
+    if lines:
+        path.write_text("".join(lines), "utf-8")
+    return bool(lines)
+
+
+def _transcript(bench: Bench, path: Path) -> bool:
+    path.write_text(f"{bench.transcript()}\n", "utf-8")
+    return True
+
+
+WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
+    ".trace": _trace,
+    ".log": _candump,
+    ".txt": _transcript,
+}
+"""By suffix; each says whether there was something to write."""

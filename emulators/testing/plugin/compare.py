@@ -1,0 +1,100 @@
+"""Each test that has a bench, run twice: what differs between the two is a failure."""
+
+from __future__ import annotations
+
+from functools import partial
+from hashlib import sha256
+from typing import TYPE_CHECKING, Final
+
+import pytest
+from _pytest.runner import runtestprotocol
+
+from tickrig.emulators.testing.plugin.stash import BENCHED
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.plugin.fingerprint import Fingerprint
+
+HASH: Final = "bench_hash"
+"""The property of a test that has the hash of all that happened on its bench."""
+
+Reports = list[pytest.TestReport]
+
+
+class Compare:
+    """The plug-in of `--bench-compare`."""
+
+    def __init__(self) -> None:
+        self._hashes: dict[str, str] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(
+        self, item: pytest.Item, nextitem: pytest.Item | None
+    ) -> bool | None:
+        """Run a test twice, unless the first run says enough."""
+        if "bench" not in getattr(item, "fixturenames", ()):
+            return None
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        for report in run_twice(item, nextitem):
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        return True
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note the hash of a test, of whatever process."""
+        if report.when == "call":
+            properties = dict(report.user_properties)
+            if HASH in properties:
+                self._hashes[str(report.nodeid)] = str(properties[HASH])
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say how many tests were compared, and the hash of all."""
+        lines = [f"{nodeid} {digest}\n" for nodeid, digest in sorted(self._hashes.items())]
+        digest = sha256("".join(lines).encode()).hexdigest()
+        terminalreporter.write_line(
+            f"bench: {len(lines)} tests were the same in both runs; hash of all {digest[:16]}"
+        )
+
+
+def run_twice(item: pytest.Item, nextitem: pytest.Item | None) -> Reports:
+    """Run a test, and again if it passed; return the reports of the run that counts."""
+    properties = list(item.user_properties)
+    first = _run(item, item.parent)  # what it shares with others stays
+    before = _fingerprint(item)
+    if before is None or not all(report.passed for report in first):
+        return [*first, *_end(item, nextitem)]
+    item.user_properties[:] = properties
+    second = _run(item, nextitem)
+    after = _fingerprint(item)
+    difference = before.difference(after) if after else "the second run had no bench"
+    for report in second:
+        if not difference and after is not None:
+            report.user_properties.append((HASH, after.digest))
+        elif report.when == "call":
+            _fail(report, difference)
+    return second
+
+
+def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> Reports:
+    return runtestprotocol(item, log=False, nextitem=nextitem)  # type: ignore[arg-type]
+
+
+def _end(item: pytest.Item, nextitem: pytest.Item | None) -> Reports:
+    """Give back what a test shared with others, which there are none of."""
+    end = partial(item.session._setupstate.teardown_exact, nextitem)
+    call = pytest.CallInfo.from_call(end, when="teardown")
+    if call.excinfo is None:
+        return []
+    return [item.ihook.pytest_runtest_makereport(item=item, call=call)]
+
+
+def _fingerprint(item: pytest.Item) -> Fingerprint | None:
+    test = item.stash.get(BENCHED, None)
+    return test.fingerprint if test else None
+
+
+def _fail(report: pytest.TestReport, difference: str) -> None:
+    """Fail a test whose runs differ."""
+    report.sections.append(("bench: the second run differs from the first", difference))
+    if report.passed:
+        report.outcome = "failed"
+        report.longrepr = f"the second run differs from the first at {difference}"
