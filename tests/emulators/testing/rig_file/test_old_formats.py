@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.hil.rig_file import read_rig_file as read_hil
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, RigPlan
@@ -55,13 +54,13 @@ def test_where_a_real_rrc_is_is_hardware(tmp_path: Path) -> None:
         '[dut.rrc]\nport = "/dev/ttyACM0"\n[tolerance]\nstick_pct = 5\ntime_ms = 20\n'
         f'[operator]\ncontrol = "{tmp_path}/rrc.ctl"\n'
     )
-    old, plan = read_hil(str(file)), read_rig_file(file)
+    plan = read_rig_file(file)
     assert [each.type for each in plan.devices.values()] == ["rrc"]
     assert plan.hardware is not None
-    assert plan.hardware.ports["rrc"].port == old.port
-    assert plan.hardware.control["rrc"] == old.control
+    assert plan.hardware.ports["rrc"].port == "/dev/ttyACM0"
+    assert plan.hardware.control["rrc"] == tmp_path / "rrc.ctl"
     tolerance = plan.hardware.tolerance
-    assert (tolerance.stick_pct, tolerance.time_us) == (old.stick_pct, old.time_us)
+    assert (tolerance.stick_pct, tolerance.time_us) == (5, 20_000)
 
 
 @pytest.mark.parametrize(
