@@ -28,7 +28,7 @@ def test_dtr_and_rts_are_on_while_the_port_is_open() -> None:
     assert (lines.dtr, lines.rts) == (True, True)
     bench.port.dtr = False
     assert (lines.dtr, lines.rts, bench.port.dtr) == (False, True, False)
-    bench.port.rts = 0  # type: ignore[assignment] - as hosts write it
+    bench.port.rts = False
     assert (lines.dtr, lines.rts) == (False, False)
     bench.port.dtr = True
     bench.port.close()
