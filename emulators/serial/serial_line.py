@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import gcd
 
 from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
@@ -107,12 +108,13 @@ class _Direction:
     """One direction of the line: only the latest burst can still be on its way."""
 
     __slots__ = (
-        *("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "_held"),
+        *("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "_held", "_whole_bytes"),
         *("first_us", "last_us", "lost"),
     )
 
     def __init__(self, baud: int, byte_cost: int, buffer_bytes: int) -> None:
         self._baud, self._byte_cost, self._buffer_bytes = baud, byte_cost, buffer_bytes
+        self._whole_bytes = baud // gcd(baud, byte_cost)  # they take a whole number of us
         self._bursts: deque[_Burst] = deque()
         self._held = 0  # bytes in all bursts that are not taken
         self.first_us = self.last_us = NEVER
@@ -140,6 +142,7 @@ class _Direction:
             taken.append(burst.data[burst.taken : arrived])
             burst.taken = arrived
             if arrived < len(burst.data):
+                self._forget_taken(burst)
                 break
             self._bursts.popleft()
         data = b"".join(taken)
@@ -166,6 +169,13 @@ class _Direction:
             burst.data = burst.data[:-dropped]
             self._held -= dropped
             self._note_due()
+
+    def _forget_taken(self, burst: _Burst) -> None:
+        """Drop what was taken of a burst that goes on for long, without moving a time."""
+        if burst.taken >= self._buffer_bytes:
+            count = burst.taken - burst.taken % self._whole_bytes
+            burst.data, burst.taken = burst.data[count:], burst.taken - count
+            burst.start_us += count * self._byte_cost // self._baud
 
     def _arrived(self, burst: _Burst, now_us: int) -> int:
         return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import pickle
+from math import gcd
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -153,3 +156,18 @@ def test_the_slowest_and_smallest_line_carries_a_byte() -> None:
 def test_an_impossible_line_cannot_be_built(wrong: dict[str, int]) -> None:
     with pytest.raises(ValueError, match="at least 1"):
         SerialLine(**wrong)
+
+
+@pytest.mark.parametrize("baud", [9_600, 57_601, 115_200])
+def test_a_line_that_is_never_idle_keeps_its_times_and_little_of_what_passed(baud: int) -> None:
+    line, total, sent = SerialLine(baud, buffer_bytes=64), 0, 0
+    for now_us in range(0, 10_000_000, 977):
+        room = line.a.room(now_us)
+        line.a.send(now_us, bytes((sent + n) % 251 for n in range(room)))
+        sent += room
+        received = line.b.poll(now_us)
+        assert received == bytes((total + n) % 251 for n in range(len(received)))
+        total += len(received)
+        assert total == now_us * baud // 10_000_000
+        assert line.b.due_us == -(-(total + 1) * 10_000_000 // baud)
+    assert len(pickle.dumps(line)) < 2_000 + baud // gcd(baud, 10_000_000)
