@@ -9,15 +9,21 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import Any, Final
+from typing import Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tickrig.emulators.testing.report import page_room, page_text
-from tickrig.emulators.testing.report.bench_report import BenchReport, JournalLine, Outcome
+from tickrig.emulators.testing.report import page_text
+from tickrig.emulators.testing.report.bench_report import (
+    BenchReport,
+    JournalLine,
+    Outcome,
+    TestRecord,
+)
 from tickrig.emulators.testing.report.overview import (
     UNWELL,
     ReportedTest,
@@ -27,7 +33,15 @@ from tickrig.emulators.testing.report.overview import (
     requirement_rows,
     slowest,
 )
-from tickrig.emulators.testing.report.page_room import PAGE_BYTES, PageRoom, Part
+from tickrig.emulators.testing.report.page_room import (
+    JOURNAL_LINES,
+    PAGE_BYTES,
+    TEXT_BYTES,
+    TRACE_BYTES,
+    PageRoom,
+    Part,
+    cut,
+)
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 from tickrig.host.text.values import format_time
 
@@ -70,31 +84,27 @@ def html_page(report: BenchReport, room_bytes: int = PAGE_BYTES) -> str:
         room_bytes: how much tests may bring to the page; what has no room is named on it.
     """
     places = reported(report.tests)
-    shown = {test.place.anchor: test for test in _on_page(places, room_bytes)}
     style, script = (_resource(name) for name in ("page.css", "page.js"))
-    return (
-        _environment()
-        .get_template("page.html")
-        .render(
-            report=report,
-            tests=places,
-            shown=shown,
-            counts=counts(report.tests),
-            unwell=sorted(
-                (place for place in places if place.record.outcome in UNWELL),
-                key=lambda place: UNWELL.index(place.record.outcome),
-            ),
-            requirements=requirement_rows(report, places),
-            slowest=slowest(places),
-            files=by_file(places),
-            style=Markup(style),
-            script=Markup(script),
-            policy=_policy(style, script),
-        )
+    unwell = [place for place in places if place.record.outcome in UNWELL]
+    template = _environment().get_template("page.html")
+    return template.render(
+        report=report,
+        tests=places,
+        shown={test.place.anchor: test for test in _on_page(places, room_bytes)},
+        counts=counts(report.tests),
+        unwell=sorted(unwell, key=lambda place: UNWELL.index(place.record.outcome)),
+        requirements=requirement_rows(report, places),
+        slowest=slowest(places),
+        files=by_file(places),
+        style=Markup(style),
+        script=Markup(script),
+        policy=_policy(style, script),
     )
 
 
+@cache
 def _environment() -> Environment:
+    """Return what has the templates; they are compiled once."""
     environment = Environment(
         loader=PackageLoader(PACKAGE, FOLDER),
         autoescape=True,
@@ -142,28 +152,32 @@ def _on_page(places: Sequence[ReportedTest], room_bytes: int) -> Iterator[TestOn
 def _test_on_page(
     place: ReportedTest, timeline: Timeline | None, parts: set[Part], opened: bool
 ) -> TestOnPage:
-    test, left_out = place.record, list[str]()
-    longrepr, text_cut = page_room.cut(test.longrepr, page_room.TEXT_BYTES)
-    trace, trace_cut = page_room.cut(test.trace, page_room.TRACE_BYTES)
-    lines = test.journal[-page_room.JOURNAL_LINES :]
-    everything: dict[Part, tuple[Any, str]] = {
-        Part.TEXT: (longrepr, f"{page_text.size(len(longrepr))} of text"),
-        Part.TIMELINE: (timeline, "the plots"),
-        Part.JOURNAL: (lines, page_text.counted(len(lines), "journal line")),
-        Part.TRACE: (trace, f"the trace, {page_text.size(len(trace))}"),
-    }
-    left_out += [name for part, (what, name) in everything.items() if what and part not in parts]
-    if text_cut and Part.TEXT in parts:
-        left_out.append(f"the last {page_text.size(text_cut)} of the text")
-    if trace_cut and Part.TRACE in parts:
-        left_out.append(f"the last {page_text.size(trace_cut)} of the trace")
+    test = place.record
+    lines = test.journal[-JOURNAL_LINES:]
     return TestOnPage(
         place,
         timeline if Part.TIMELINE in parts else None,
-        longrepr if Part.TEXT in parts else "",
+        cut(test.longrepr, TEXT_BYTES)[0] if Part.TEXT in parts else "",
         lines if Part.JOURNAL in parts else (),
         test.journal_left_out + len(test.journal) - len(lines),
-        trace if Part.TRACE in parts else "",
-        tuple(left_out),
+        cut(test.trace, TRACE_BYTES)[0] if Part.TRACE in parts else "",
+        tuple(_left_out(test, timeline, parts)),
         opened,
     )
+
+
+def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[Part]) -> Iterator[str]:
+    """Yield what of a test is not on the page, for people."""
+    texts = (
+        (Part.TEXT, "the text", test.longrepr, TEXT_BYTES),
+        (Part.TRACE, "the trace", test.trace, TRACE_BYTES),
+    )
+    for part, name, text, most in texts:
+        if text and part not in parts:
+            yield f"{name}, {page_text.size(len(text))}"
+        elif missing := cut(text, most)[1]:
+            yield f"the last {page_text.size(missing)} of {name}"
+    if timeline and Part.TIMELINE not in parts:
+        yield "the plots"
+    if test.journal and Part.JOURNAL not in parts:
+        yield page_text.counted(len(test.journal), "journal line")

@@ -60,8 +60,14 @@ def seconds(us: int) -> str:
 
 
 def size(characters: int) -> str:
-    """Write how long a text is."""
-    return f"{characters} bytes" if characters < 1_000 else f"{characters / 1_000:.3g} kB"
+    """Write how long a text is.
+
+    >>> size(999), size(3_600), size(1_100_000)
+    ('999 bytes', '3.6 kB', '1.1 MB')
+    """
+    if characters < 1_000:
+        return f"{characters} bytes"
+    return f"{characters / 1e3:.3g} kB" if characters < 999_500 else f"{characters / 1e6:.3g} MB"
 
 
 def counted(number: int, noun: str) -> str:

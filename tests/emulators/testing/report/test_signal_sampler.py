@@ -6,6 +6,9 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank
+from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.report.bench_report import SignalSeries, Value
 from tickrig.emulators.testing.report.signal_sampler import SignalSampler
 from tickrig.emulators.testing.report.thinning import thinned
@@ -65,6 +68,25 @@ def test_a_long_run_keeps_its_spikes_and_takes_bounded_room() -> None:
 def test_a_signal_that_is_not_there_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="no input 'stat'"):
         SignalSampler(Lamp(), ["stat"])
+
+
+def test_signals_of_a_bench_are_called_as_there() -> None:
+    """As the plug-in takes them: after each step of the rig, whoever makes time pass."""
+    with Bench(chair=Rrc(), spare=Rrc()) as bench:
+        taken: list[SignalSampler] = []
+
+        def begin(rig: BenchRig) -> None:
+            sampler = SignalSampler(rig.device, ["chair/state", "spare/out_v_pct"])
+            rig.rig.watchers.append(sampler.take)
+            taken.append(sampler)
+
+        bench._mode.act(begin)
+        bench.run_for("100ms")
+        bench["chair"].press("power_button")
+        assert bench.wait_until(lambda: bench["chair"].get("state") == "Standby", within="1s")
+    state, speed = taken[0].series()
+    assert [word for _, word in state.points] == ["WaitPowerOn", "Standby"]
+    assert (state.name, speed.name, speed.unit) == ("chair/state", "spare/out_v_pct", "%")
 
 
 def test_nothing_was_taken() -> None:
