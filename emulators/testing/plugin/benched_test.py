@@ -10,10 +10,10 @@ import pytest
 
 from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.artifacts import keep
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
-from tickrig.emulators.testing.plugin.failure_report import sections_of
-from tickrig.emulators.testing.plugin.fingerprint import Fingerprint
+from tickrig.emulators.testing.plugin.evidence.artifacts import keep
+from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
+from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
 from tickrig.emulators.testing.plugin.safe_state import SafeState, unsafe

@@ -12,7 +12,7 @@ from _pytest.runner import runtestprotocol
 from tickrig.emulators.testing.plugin.stash import BENCHED
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.fingerprint import Fingerprint
+    from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 
 HASH: Final = "bench_hash"
 """The property of a test that has the hash of all that happened on its bench."""

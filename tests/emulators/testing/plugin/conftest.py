@@ -9,7 +9,8 @@ import canopen
 import pytest
 import serial
 
-from tickrig.emulators.testing.plugin import benched_test, journal_text, pytest_plugin
+from tickrig.emulators.testing.plugin import benched_test, pytest_plugin
+from tickrig.emulators.testing.plugin.evidence import journal_text
 from tickrig.host.monitor.decode import decoder
 
 Run = Callable[..., pytest.RunResult]

@@ -7,7 +7,7 @@ import pytest
 
 from tests.emulators.testing.plugin.conftest import Run
 from tests.emulators.testing.plugin.test_verdicts import BUS
-from tickrig.emulators.testing.plugin.artifacts import stem_of
+from tickrig.emulators.testing.plugin.evidence.artifacts import stem_of
 from tickrig.wire.candump import parse_log
 
 pytest_plugins = ("pytester",)

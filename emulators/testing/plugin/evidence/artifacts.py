@@ -10,7 +10,7 @@ from typing import Final
 
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.journal_text import buses_of, frame_of
+from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of, frame_of
 from tickrig.host.text.trace import Mark
 from tickrig.wire.candump import LogLine
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
-from tickrig.emulators.testing.plugin.journal_text import last_lines
+from tickrig.emulators.testing.plugin.evidence.journal_text import last_lines
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.host.text.values import format_time
 

@@ -8,7 +8,7 @@ from itertools import zip_longest
 
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.mounts import LineMount
-from tickrig.emulators.testing.plugin.signal_names import signals_of
+from tickrig.emulators.testing.plugin.evidence.signal_names import signals_of
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
