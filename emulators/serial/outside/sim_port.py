@@ -94,7 +94,7 @@ class SimPort(SerialBase):
             raise ValueError("Invalid baud rate: 0")
         parity = cast(Parity, self.parity)  # pyserial has checked it
         setting = UartSetting(self.baudrate, self.bytesize, parity, self.stopbits)
-        if setting != side.setting:
+        if setting != side.setting or not side.in_use:
             self._input += side.receiver.poll(side.rig.now_us)
             side.use(str(self.port), setting, self.mismatch)
         side.transmitter.waits_for_cts = bool(self.rtscts)

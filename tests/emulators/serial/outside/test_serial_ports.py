@@ -84,6 +84,8 @@ def test_a_setting_that_differs_is_refused_if_the_url_says_so(url: str, side: Se
     serial.serial_for_url(f"{url}?mismatch=refuse", baudrate=BAUD).close()
     side.mismatch = "refuse"
     serial.serial_for_url(f"{url}?mismatch=errors").close()
+    with pytest.raises(serial.SerialException, match="is set to 9600 8N1"):
+        serial.serial_for_url(url)
 
 
 @pytest.mark.parametrize("name", ["", "a b", "a?b", "a#b", "a\nb"])

@@ -1,0 +1,15 @@
+"""The section "pyserial" of docs/hosts.md, program by program."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+TEXT = (Path(__file__).parents[4] / "docs/hosts.md").read_text("utf-8")
+SECTION = TEXT.partition("\n## pyserial\n")[2].partition("\n## ")[0]
+
+
+def test_its_programs_run() -> None:
+    programs = re.findall(r"^```python\n(.*?)^```", SECTION, re.DOTALL | re.MULTILINE)
+    assert len(programs) == 3
+    exec(compile("".join(programs), "docs/hosts.md", "exec"), {"__name__": "page"})
