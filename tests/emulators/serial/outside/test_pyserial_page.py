@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+import serial
+
 TEXT = (Path(__file__).parents[4] / "docs/hosts.md").read_text("utf-8")
 SECTION = TEXT.partition("\n## pyserial\n")[2].partition("\n## ")[0]
 
 
-def test_its_programs_run() -> None:
+def test_its_programs_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial, "protocol_handler_packages", ["serial.urlhandler"])
     programs = re.findall(r"^```python\n(.*?)^```", SECTION, re.DOTALL | re.MULTILINE)
     assert len(programs) == 3
     exec(compile("".join(programs), "docs/hosts.md", "exec"), {"__name__": "page"})
