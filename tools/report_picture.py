@@ -1,6 +1,6 @@
 """Write a report of two runs in virtual time, and photograph it where there is a Chromium.
 
-`python tools/report_picture.py docs/report.png`; without Chromium only `docs/report.html` is written.
+`python tools/report_picture.py docs/report.png`; without one only `docs/report.html` is written.
 """
 
 from __future__ import annotations
@@ -51,14 +51,15 @@ def pulled_bus() -> TestRecord:
         bench.run_for("100ms")
         bench.press("power_button")
         bench.run_for("400ms")
-        bench.serial().write(b"limit3232ffffff\n")
+        bench.link.send(b"limit3232ffffff\n")
         bench.run_for("100ms")
         bench.set("stick", 100, -20)
         bench.run_for("200ms")
         stopped = bench.wait_until(lambda: bench.get("state") == "PowerOffByOthers", "200ms")
         bench.run_for("400ms")
         fault = PlannedFault("bus_unplugged", 800_000, 1_200_000)
-        return told(bench, samplers, f"{CHAIR}test_a_pulled_bus_stops_it", stopped, "SAF-12", fault)
+        name = f"{CHAIR}test_a_pulled_bus_stops_it"
+        return told(bench, samplers, name, passed=stopped, requirement="SAF-12", fault=fault)
 
 
 def blocked_shaft() -> TestRecord:
@@ -82,12 +83,12 @@ def blocked_shaft() -> TestRecord:
             sent = bytes([command, index & 0xFF, index >> 8, 0]) + data
             network.send_message(0x601, sent.ljust(8, b"\0"))
             bench.run_for("10ms")
-        bench.wait_until(lambda: bench.now_us >= 400_000, "1s")
+        bench.run_for(400_000 - bench.now_us)
         said = bench.wait_until(emergency, "50ms")
-        bench.wait_until(lambda: bench.now_us >= 1_200_000, "1s")
+        bench.run_for(1_200_000 - bench.now_us)
         fault = PlannedFault("shaft_blocked", 400_000, 900_000)
         name = f"{WHEEL}test_a_blocked_shaft_is_told"
-        return told(bench, samplers, name, said, "SAF-9", fault)
+        return told(bench, samplers, name, passed=said, requirement="SAF-9", fault=fault)
 
 
 def watch(bench: Bench, *names: str) -> list[SignalSampler]:
@@ -105,12 +106,14 @@ def told(  # noqa: PLR0913 - a picture
     bench: Bench,
     samplers: list[SignalSampler],
     nodeid: str,
+    *,
     passed: bool,
     requirement: str,
     fault: PlannedFault,
 ) -> TestRecord:
     """Return the record of a test."""
     lines = bench._mode.journal()
+    samplers[0].take(bench.now_us)
     return TestRecord(
         nodeid,
         Outcome.PASSED if passed else Outcome.FAILED,

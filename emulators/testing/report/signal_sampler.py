@@ -34,7 +34,11 @@ class SignalSampler:
             self._find(name)
 
     def take(self, now_us: int) -> None:
-        """Look at the device; to be called after each step, with times that do not run back."""
+        """Look at the device: after each step (`Rig.watchers`), and once at the end.
+
+        Args:
+            now_us: the time, not before that of the last call.
+        """
         for name, points in self._points.items():
             value = read_signal(self._device, name)
             before = self._latest.get(name)
