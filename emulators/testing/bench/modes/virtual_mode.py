@@ -12,6 +12,7 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.rig_file.plan import Tolerances
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     import can
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from tickrig.host.links.link import Link
 
 T = TypeVar("T")
+
+LOOK_US: Final = 1_000
+LOOKS: Final = 10_000
+"""A condition is looked at each millisecond, in long waits so often."""
 
 EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
@@ -52,8 +57,17 @@ class VirtualMode(EmulatedMode):
         self._rig.rig.run_for(duration_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time."""
-        return self._rig.rig.run_until(done, within_us)
+        """Let time pass until something is so; False if it was not in time.
+
+        It is looked at after each step, and now and then between: a host that is polled in it
+        may have something to do.
+        """
+        rig, look_us = self._rig.rig, max(LOOK_US, within_us // LOOKS)
+        until_us = rig.now_us + within_us
+        while not rig.run_until(done, min(look_us, until_us - rig.now_us)):
+            if rig.now_us >= until_us or (until_us >= NEVER and rig.next_us == NEVER):
+                return False
+        return True
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a host: bytes on a serial line, frames on a bus."""
