@@ -68,7 +68,8 @@ class RealMode(EmulatedMode):
 
     def __init__(self, rig: BenchRig, outside: Outside) -> None:
         super().__init__(rig, IN_REAL_TIME)
-        self._clock, self._stack, self._begun = outside.clock, ExitStack(), False
+        self._clock, self._stack = outside.clock, ExitStack()
+        self._begun = self._judging = False
         self._thread = RigThread(rig, outside.clock)
         self._pace, self._waits = _Watch(self._thread), CpuWaits()
         self._doors = Doors(outside.places, lambda wire: self._pace)
@@ -130,15 +131,26 @@ class RealMode(EmulatedMode):
         It is asked between the ticks. If it wants to hear a device it is asked in the thread of
         the caller instead, once a tick.
         """
+        if self._judging and self._thread.here:
+            raise HostInCondition
         self._begin()
         until_us = self.now_us + within_us
+        ask = partial(self._judge, done)
         try:
-            if self._thread.wait_until(done, until_us - self._tick_us):
+            if self._thread.wait_until(ask, until_us - self._tick_us):
                 return True
             self._sleep_until(until_us)
-            return self._thread.call(done)
+            return self._thread.call(ask)
         except HostInCondition:
             return self._ask_until(done, until_us)
+
+    def _judge(self, done: Callable[[], bool]) -> bool:
+        """Ask a condition in the thread of the rig, where it cannot wait."""
+        self._judging = True
+        try:
+            return done()
+        finally:
+            self._judging = False
 
     def _ask_until(self, done: Callable[[], bool], until_us: int) -> bool:
         while not done():
