@@ -35,7 +35,6 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
-from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.values import Setting
 
@@ -73,26 +72,18 @@ def parts_of(plan: RigPlan) -> Parts:
     )
 
 
-def _settings_of(start: Mapping[str, object]) -> dict[str, Setting]:
-    return {key: value for key, value in start.items() if isinstance(value, int | float | str)}
+def _settings_of(start: Mapping[str, Setting | SignalSpec]) -> dict[str, Setting]:
+    return {key: value for key, value in start.items() if not isinstance(value, SignalSpec)}
 
 
 def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
     """Return the signals by what they drive, `DEVICE/INPUT`, or by their names."""
-    tables = {**plan.signals} | {
+    return {**plan.signals} | {
         f"{device.name}/{name}": value
         for device in plan.devices.values()
         for name, value in device.start.items()
-        if not isinstance(value, int | float | str)
+        if isinstance(value, SignalSpec)
     }
-    return {name: _signal(name, table, plan.path) for name, table in tables.items()}
-
-
-def _signal(name: str, table: object, file: Path | None) -> SignalSpec:
-    spec = read_signal_spec(table, (name,), file.parent if file else Path())
-    if isinstance(spec, list):
-        raise ValueError("; ".join(map(str, spec)))
-    return spec
 
 
 def begin_faults(plan: RigPlan, state: RigState) -> None:

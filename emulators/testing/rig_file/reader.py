@@ -43,7 +43,11 @@ def read_rig_file(path: Path) -> RigPlan:
         OSError: it cannot be read.
         RigFileError: all that is wrong with it.
     """
-    data = path.read_bytes()
+    return decode_rig_file(path.read_bytes(), path)
+
+
+def decode_rig_file(data: bytes, path: Path) -> RigPlan:
+    """Read the bytes of a rig file; see `read_rig_file`."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -1,0 +1,144 @@
+"""Rig files with chance in them: characters, lines, keys, values, tables, cut off, binary."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from random import Random
+
+from tests.emulators.testing.rig_file.test_reader import WHOLE
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.rig_file.reader import decode_rig_file
+from tickrig.emulators.testing.rig_file.section import RigFileError
+
+RIGS = Path(__file__).parents[4] / "examples" / "rigs"
+PLACE = RIGS / "mutated.toml"
+"""Where the files would be, for those that they name."""
+
+SEEDS = [WHOLE, *(file.read_text("utf-8") for file in sorted(RIGS.glob("*.toml")))]
+SEEDS.append(
+    '[dut.rrc]\nport = "/dev/ttyACM0"\n[tolerance]\nstick_pct = 5\ntime_ms = 20\n'
+    '[operator]\ncontrol = "rrc.ctl"\n'
+)
+
+PIECES = ["[", "]", "{", "}", "=", ",", '"', "'", '"""', "\n", "#", ".", "\\", "\x00", "\r", "é"]
+PIECES += ["\u2028", "\ufeff", "-", "0", "9" * 400, " ", "\t", "[[node]]\n", "[device.b]\n"]
+
+VALUES = ["0", "-1", "1e400", "nan", "-inf", "9" * 30, "1.5", "true", '""', '"x"', "[]", "{}"]
+VALUES += ["[[]]", "[1, 2]", "{a = 1}", "1979-05-27", "07:32:00", '"lss"', '"../io_module.eds"']
+VALUES += [
+    '"epos"',
+    '"rrc"',
+    '"rh3-base"',
+    '"nowhere.py:A"',
+    '"a\\u0000b"',
+    '"cut@2s-1s"',
+    "'''x'''",
+]
+VALUES += [
+    '"can0"',
+    '"rfc2217://7000"',
+    "{formula = 'left.load_nm'}",
+    "{ramp = [0, 1], over = '1s'}",
+]
+VALUES += ["{table = 'morning.csv'}", "{lag = 'load', tau = '1s'}", "127", "[true, 'x', {}]"]
+
+TABLES = ["wire", "wire.can0", "device", "device.left", "device.vr2.start", "signal", "fault"]
+TABLES += ["body", "real", "real.vr2", "hardware", "hardware.tolerance", "x", "device.x", "[node]"]
+
+_KEY_VALUE = re.compile(r"^([^=\[#\n]+)=(.*)$", re.MULTILINE)
+
+
+def mutated(chance: Random) -> bytes:
+    """Return a rig file with a few things done to it."""
+    text = chance.choice(SEEDS)
+    for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
+        text = chance.choice([_character, _line, _key, _value, _table, _value])(text, chance)
+    data = text.encode("utf-8", "surrogatepass")
+    match chance.randrange(20):
+        case 0:
+            return data[: chance.randrange(len(data) + 1)]
+        case 1:
+            at = chance.randrange(len(data) + 1)
+            return data[:at] + chance.randbytes(chance.choice([1, 2, 40])) + data[at:]
+        case 2:
+            return data.replace(b"\n", b"\r\n")
+    return data
+
+
+def _character(text: str, chance: Random) -> str:
+    at = chance.randrange(len(text) + 1)
+    return text[:at] + chance.choice([chance.choice(PIECES), ""]) + text[at + chance.randrange(3) :]
+
+
+def _line(text: str, chance: Random) -> str:
+    lines = text.split("\n")
+    line = lines.pop(chance.randrange(len(lines)))
+    if chance.random() < 0.6:
+        for _ in range(chance.choice([1, 2])):
+            lines.insert(chance.randrange(len(lines) + 1), line)
+    return "\n".join(lines)
+
+
+def _key(text: str, chance: Random) -> str:
+    found = list(_KEY_VALUE.finditer(text))
+    if not found:
+        return text
+    one, other = chance.choice(found), chance.choice(found)
+    name = one[1].strip()
+    at = chance.randrange(len(name) + 1)
+    new = chance.choice(
+        [other[1], name[:at] + name[at + 1 :], f"{name}s", f"x.{name}", f'"{name}"']
+    )
+    return text[: one.start(1)] + new + text[one.end(1) :]
+
+
+def _value(text: str, chance: Random) -> str:
+    found = list(_KEY_VALUE.finditer(text))
+    if not found:
+        return text
+    one, other = chance.choice(found), chance.choice(found)
+    new = chance.choice([chance.choice(VALUES), other[2]])
+    return f"{text[: one.start(2)]} {new}{text[one.end(2) :]}"
+
+
+def _table(text: str, chance: Random) -> str:
+    lines = text.split("\n")
+    headers = [at for at, line in enumerate(lines) if line.startswith("[")]
+    if headers and chance.random() < 0.5:
+        lines[chance.choice(headers)] = f"[{chance.choice(TABLES)}]"
+    else:
+        lines.insert(chance.randrange(len(lines) + 1), f"[{chance.choice(TABLES)}]")
+    return "\n".join(lines)
+
+
+def judge(data: bytes, *, opens: bool = True) -> str:
+    """Read a file; AssertionError unless it opens as a bench, or is told to be wrong as it should.
+
+    Args:
+        data: the file.
+        opens: whether a bench is opened of what is right.
+
+    Returns:
+        `ok` or `mistakes`.
+    """
+    try:
+        plan = decode_rig_file(data, PLACE)
+    except RigFileError as error:
+        _check(error, data.count(b"\n") + 1)
+        return "mistakes"
+    if opens:
+        Bench.of_plan(plan, "virtual").close()
+    return "ok"
+
+
+def _check(error: RigFileError, lines: int) -> None:
+    assert error.mistakes
+    assert list(error.mistakes) == sorted(set(error.mistakes))
+    for line, reason in error.mistakes:
+        assert 1 <= line <= lines, (line, reason)
+        assert reason.strip(), line
+    shown = str(error).split("\n")
+    assert len(shown) == len(error.mistakes), shown
+    assert all(each.isprintable() for each in shown), shown
+    assert max(map(len, shown)) < 1_000, shown
