@@ -12,6 +12,10 @@ from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
+from tickrig.emulators.testing.plugin.evidence.bench_evidence import (
+    BenchEvidence,
+    BenchWitness,
+)
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
 from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.health import Health
@@ -34,6 +38,8 @@ class BenchedTest:
     Attributes:
         bench: its bench, from the moment at which it is open.
         fingerprint: what happens on it, if that is compared.
+        evidence: what a report shows of it, when it is closed.
+        blocked: why the test came to no verdict, empty if it did.
         kept: files that were kept of it.
         not_kept: why other files were not, each in a line.
     """
@@ -43,6 +49,9 @@ class BenchedTest:
         self._settings = item.config.stash[SETTINGS]
         self.bench: Bench | None = None
         self.fingerprint: Fingerprint | None = None
+        self._witness: BenchWitness | None = None
+        self.evidence: BenchEvidence | None = None
+        self.blocked = ""
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
         self.kept: list[Path] = []
@@ -62,6 +71,8 @@ class BenchedTest:
         check_needs(needs, bench)
         with suppress(NotOnThisBench):
             self._health = bench._mode.act(Health)
+        if self._settings.report:
+            self._witness = BenchWitness(bench)
         if self._settings.compare and bench.mode == VIRTUAL:
             self.fingerprint = bench._mode.act(Fingerprint)
         return bench
@@ -75,6 +86,8 @@ class BenchedTest:
                 self.fingerprint.end()
             if self._settings.every:
                 self._keep()
+            if self._witness is not None:
+                self.evidence = self._witness.evidence()
         finally:
             self.bench.close()
 
@@ -101,6 +114,7 @@ class BenchedTest:
     def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         """Say what blocked a phase of the test, and tell with a failure what there is to know."""
         if reason := blocked(report, call, self.bench):
+            self.blocked = reason
             make_error(report, reason)
         if report.failed:
             self._keep()

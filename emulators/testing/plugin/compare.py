@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from functools import partial
 from hashlib import sha256
 from typing import TYPE_CHECKING, Final
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 
 HASH: Final = "bench_hash"
 """The property of a test that has the hash of all that happened on its bench."""
+
+FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
+"""Of the first run, while a test runs for the second time."""
+
+CALL: Final = pytest.StashKey[pytest.TestReport]()
 
 Reports = list[pytest.TestReport]
 
@@ -39,6 +45,18 @@ class Compare:
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
         return True
 
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_makereport(
+        self, item: pytest.Item, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Judge a test when its second run is over."""
+        report = yield
+        if call.when == "call":
+            item.stash[CALL] = report
+        elif call.when == "teardown" and (first := item.stash.get(FIRST, None)):
+            _judge(item, first, report)
+        return report
+
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Note the hash of a test, of whatever process."""
         if report.when == "call":
@@ -58,20 +76,12 @@ class Compare:
 def run_twice(item: pytest.Item, nextitem: pytest.Item | None) -> Reports:
     """Run a test, and again if it passed; return the reports of the run that counts."""
     properties = list(item.user_properties)
-    first = _run(item, item.parent)  # what it shares with others stays
+    reports = _run(item, item.parent)  # what it shares with others stays
     before = _fingerprint(item)
-    if before is None or not all(report.passed for report in first):
-        return [*first, *_end(item, nextitem)]
-    item.user_properties[:] = properties
-    second = _run(item, nextitem)
-    after = _fingerprint(item)
-    difference = before.difference(after) if after else "the second run had no bench"
-    for report in second:
-        if not difference and after is not None:
-            report.user_properties.append((HASH, after.digest))
-        elif report.when == "call":
-            _fail(report, difference)
-    return second
+    if before is None or not all(report.passed for report in reports):
+        return [*reports, *_end(item, nextitem)]
+    item.user_properties[:], item.stash[FIRST] = properties, before
+    return _run(item, nextitem)
 
 
 def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> Reports:
@@ -92,9 +102,17 @@ def _fingerprint(item: pytest.Item) -> Fingerprint | None:
     return test.fingerprint if test else None
 
 
-def _fail(report: pytest.TestReport, difference: str) -> None:
-    """Fail a test whose runs differ."""
-    report.sections.append(("bench: the second run differs from the first", difference))
+def _judge(item: pytest.Item, first: Fingerprint, last: pytest.TestReport) -> None:
+    """Fail a test whose runs differ; note the hash of one whose runs are the same."""
+    second, report = _fingerprint(item), item.stash.get(CALL, None)
+    if second is None or report is None:
+        return
+    if not (difference := first.difference(second)):
+        for one in (report, last):
+            one.user_properties.append((HASH, second.digest))
+        return
     if report.passed:
         report.outcome = "failed"
         report.longrepr = f"the second run differs from the first at {difference}"
+    else:
+        report.sections.append(("bench: the second run differs from the first", difference))

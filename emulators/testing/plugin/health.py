@@ -56,7 +56,9 @@ class Health:
             for name, on in mounts.items()
             if on.lost and name in self._spoken - self._faulty
         ]
-        return (*errors, *lost)
+        recorder = self._rig.state.recorder
+        trace = [f"the trace: {recorder.error}"] if recorder and recorder.error else []
+        return (*errors, *lost, *trace)
 
     def _pass(self, wire: str, at_us: int, mark: Mark, data: bytes) -> None:
         """Note that a host spoke."""

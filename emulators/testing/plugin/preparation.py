@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import pytest
 
 from tickrig.emulators.testing.plugin.settings import Settings
@@ -28,3 +30,11 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
         if settings.modes != ("virtual",):
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
+    if settings.report:
+        if settings.report.suffix != ".json" and find_spec("jinja2") is None:
+            raise pytest.UsageError("--bench-report needs Jinja2: pip install 'tickrig[report]'")
+        from tickrig.emulators.testing.plugin.report_plugin import (  # noqa: PLC0415 - asked for
+            ReportPlugin,
+        )
+
+        config.pluginmanager.register(ReportPlugin(config, settings), "tickrig-bench-report")

@@ -1,0 +1,177 @@
+"""Records of tests for a report: made where they run, gathered where the report is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator
+from dataclasses import replace
+from datetime import datetime
+from typing import Final
+
+import pytest
+
+from tickrig.emulators.testing.plugin.evidence.failure_report import repeat_command
+from tickrig.emulators.testing.plugin.settings import Settings
+from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.report.bench_report import (
+    BenchReport,
+    Outcome,
+    Requirement,
+    RunEnvironment,
+    TestRecord,
+)
+from tickrig.emulators.testing.report.report_file import write_report, write_run
+from tickrig.emulators.testing.report.report_json import from_data, to_data
+
+RECORD: Final = "tickrig_record"
+"""The attribute of the last report of a test that has its record as JSON."""
+
+JSON: Final = ".json"
+OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
+REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
+
+
+class ReportPlugin:
+    """The plug-in of `--bench-report`.
+
+    Args:
+        config: of pytest.
+        settings: what was asked for; a report is.
+    """
+
+    def __init__(self, config: pytest.Config, settings: Settings) -> None:
+        self._config, self._settings = config, settings
+        self._records: dict[str, TestRecord] = {}
+        self._begun = datetime.now().astimezone()
+        self._error = ""
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_makereport(
+        self, item: pytest.Item, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """Add the record of a test to its last report."""
+        report = yield
+        if call.when == "setup":
+            item.stash[REPORTS] = []
+        reports = item.stash.setdefault(REPORTS, [])
+        reports.append(report)
+        if call.when == "teardown" and is_reported(item):
+            setattr(report, RECORD, json.dumps(to_data(record_of(item, reports))))
+        return report
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Take the record of a test, of whatever process."""
+        if data := getattr(report, RECORD, None):
+            self._records[str(report.nodeid)] = from_data(TestRecord, json.loads(data))
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Write the report, in the process that has all records."""
+        path = self._settings.report
+        if path is None or hasattr(self._config, "workerinput"):
+            return
+        write = write_run if path.suffix == JSON else write_report
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(self._report(), path)
+        except OSError as error:
+            self._error = f"bench: {path} was not written: {error.strerror}"
+            session.exitstatus = session.exitstatus or pytest.ExitCode.INTERNAL_ERROR
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say where the report is."""
+        count = len(self._records)
+        tests = "1 test" if count == 1 else f"{count} tests"
+        done = f"bench: {self._settings.report} tells of {tests}"
+        terminalreporter.write_line(self._error or done, red=bool(self._error))
+
+    def _report(self) -> BenchReport:
+        tests = tuple(self._records.values())
+        names = dict.fromkeys(name for test in tests for name in test.requirements)
+        return BenchReport(
+            runs=(self._environment(),),
+            tests=tests,
+            requirements=tuple(Requirement(name) for name in names),
+        )
+
+    def _environment(self) -> RunEnvironment:
+        settings = self._settings
+        rig_file = settings.rig_file
+        return RunEnvironment(
+            date=self._begun.strftime("%Y-%m-%d %H:%M:%S %z"),
+            mode=", ".join(settings.modes),
+            seed=settings.seed,
+            rig_file=rig_file.name if rig_file else "",
+            rig_text=rig_file.read_text("utf-8", "replace") if rig_file else "",
+        ).of_this_machine()
+
+
+def is_reported(item: pytest.Item) -> bool:
+    """Say whether a report tells of a test: it has a bench, or shows a requirement."""
+    return BENCHED in item.stash or item.get_closest_marker("req") is not None
+
+
+def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord:
+    """Return the record of a test.
+
+    Args:
+        item: the test.
+        reports: of all its phases.
+    """
+    outcome, reason, longrepr = _verdict(item, reports)
+    record = TestRecord(
+        str(item.nodeid),
+        outcome,
+        wall_us=sum(round(report.duration * 1e6) for report in reports),
+        requirements=tuple(str(value) for name, value in item.user_properties if name == "req"),
+        markers=tuple(dict.fromkeys(m.name for m in item.iter_markers() if m.name not in OWN)),
+        reason=reason,
+        longrepr=longrepr,
+        command=repeat_command(item),
+    )
+    return _with_bench(item, record)
+
+
+def _verdict(item: pytest.Item, reports: list[pytest.TestReport]) -> tuple[Outcome, str, str]:
+    """Return how a test ended, why in a line, and what pytest says of it."""
+    test = item.stash.get(BENCHED, None)
+    for report in reports:
+        if report.failed:
+            crash = getattr(report.longrepr, "reprcrash", None)
+            reason = crash.message if crash else report.longreprtext
+            if test is not None and test.blocked:
+                return Outcome.BLOCKED, test.blocked, report.longreprtext
+            outcome = Outcome.FAILED if report.when == "call" else Outcome.ERROR
+            return outcome, reason.partition("\n")[0], report.longreprtext
+        if report.skipped:
+            return Outcome.SKIPPED, _why_skipped(report), ""
+    return Outcome.PASSED, "", ""
+
+
+def _why_skipped(report: pytest.TestReport) -> str:
+    if hasattr(report, "wasxfail"):
+        return f"expected to fail: {report.wasxfail}".rstrip(": ")
+    if isinstance(report.longrepr, tuple):
+        return report.longrepr[2].removeprefix("Skipped: ")
+    return report.longreprtext
+
+
+def _with_bench(item: pytest.Item, record: TestRecord) -> TestRecord:
+    """Add what there is to say of the bench of a test."""
+    test = item.stash.get(BENCHED, None)
+    if test is None:
+        return record
+    record = replace(record, mode=test.wanted.mode, artefacts=tuple(p.name for p in test.kept))
+    if (seen := test.evidence) is None:
+        return record
+    return replace(
+        record,
+        mode=seen.mode,
+        virtual_us=seen.now_us,
+        seed=test.wanted.seed_used,
+        faults=seen.faults,
+        journal=seen.journal,
+        journal_left_out=seen.left_out,
+        series=seen.series,
+        trace=seen.trace,
+    )
