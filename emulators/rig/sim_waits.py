@@ -7,6 +7,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Generic, Protocol, TypeVar
 
+EPOCH_S: Final = 946_684_800
+"""The clock of hosts at the start of a rig: 2000-01-01."""
+
 LOOK_US: Final = 100
 """What a look at the clock costs: a loop that does nothing else then ends some day."""
 
@@ -83,9 +86,16 @@ class SimTime:
         self.sleep(LOOK_US / 1e6)
         return self._passing.time_s
 
+    def time_ns(self) -> int:
+        """Return the time since 1970 in nanoseconds, to the microsecond."""
+        return round(self.time() * 1e6) * 1_000
+
     def monotonic(self) -> float:
         """Return a time in seconds of which only differences mean anything."""
         return self.time()
+
+    perf_counter = monotonic
+    monotonic_ns = perf_counter_ns = time_ns
 
     def sleep(self, seconds: float) -> None:
         """Let time pass."""

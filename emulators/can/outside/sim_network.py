@@ -15,12 +15,9 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.host import CanHost, Repeat
 from tickrig.emulators.rig.retimed import retime, retimed
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.sim_waits import SimCondition, SimQueue, SimQueues, SimTime
+from tickrig.emulators.rig.sim_waits import EPOCH_S, SimCondition, SimQueue, SimQueues, SimTime
 from tickrig.host.links.can_message import to_message
 from tickrig.wire.can import STANDARD_MAX, CanFrame
-
-EPOCH_S: Final = 946_684_800
-"""The library's clock at the start of a rig: 2000-01-01."""
 
 LIBRARY: Final = "canopen"
 

@@ -1,0 +1,65 @@
+"""Which code is a host's: that of users and of libraries, not Python, pytest, pyserial or ours."""
+
+from __future__ import annotations
+
+import os
+import sysconfig
+from functools import cache
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+KEPT: Final = frozenset(
+    {
+        *("tickrig", "serial", "can", "canopen"),
+        *("pytest", "_pytest", "pluggy", "iniconfig", "xdist", "execnet"),
+        *("hypothesis", "coverage", "debugpy", "IPython", "ipykernel"),
+    }
+)
+"""Packages that keep the clock of this machine.
+
+pyserial, python-can and canopen are on a rig by objects of ours (`SimSerial`, the interface
+`tickrig`, `SimNetwork`), which wait on it by themselves; on a real port they need real time.
+"""
+
+KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
+
+INSTALLED: Final = ("site-packages", "dist-packages")
+PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
+
+
+@cache
+def is_host(module: str, file: str) -> bool:
+    """Return whether code is a host's.
+
+    Args:
+        module: name of its module.
+        file: where it is, as its code object says.
+
+    >>> is_host("my_robot.link", "/home/me/my_robot/link.py"), is_host("queue", "<frozen queue>")
+    (True, False)
+    """
+    package = module.partition(".")[0]
+    if package in KEPT or package.startswith(KEPT_BEGINNINGS) or file.startswith("<frozen"):
+        return False
+    return is_installed(file) or not file.startswith(PYTHON)
+
+
+@cache
+def is_installed(file: str) -> bool:
+    """Return whether a file is of an installed package."""
+    return any(folder in Path(file).parts for folder in INSTALLED)
+
+
+def package_of(frame: FrameType) -> str:
+    """Return the name of the package that is running."""
+    name: str = frame.f_globals.get("__name__") or ""
+    return name.partition(".")[0]
+
+
+def place_of(frame: FrameType) -> str:
+    """Return the file and line that are running, for people."""
+    file = Path(frame.f_code.co_filename)
+    if file.is_relative_to(Path.cwd()):
+        file = file.relative_to(Path.cwd())
+    return f"{file}:{frame.f_lineno}"

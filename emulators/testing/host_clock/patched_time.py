@@ -1,0 +1,38 @@
+"""Hosts that call `time.sleep` and `time.monotonic`, in the time of a rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tickrig.emulators.rig.sim_waits import Passing, SimTime
+from tickrig.emulators.testing.host_clock.host_waits import HostWaits
+from tickrig.emulators.testing.host_clock.switches import Switches
+
+
+@contextmanager
+def patched_time(passing: Passing) -> Iterator[SimTime]:
+    """Let hosts live in the time of a rig.
+
+    What their code calls of `time` (`sleep`, `time`, `monotonic`, `perf_counter`, and in
+    nanoseconds) is on the clock of `passing`; so are `wait` and `wait_for` of threading's events
+    and conditions, `get` and `put` of queues, and a `select` of nothing with a timeout. Each look
+    at the clock takes 100 us, so that a loop that only looks comes to its end.
+
+    Code of a host is all that is not Python's own, pytest's, Hypothesis's, coverage's, pyserial's,
+    python-can's, canopen's or ours. It is found in its modules whatever it has kept: names
+    (`from time import sleep`), attributes of classes, defaults of arguments. Threads that run
+    already keep their time. Of the others, only that of the caller can wait.
+
+    Not patched: what an object has kept before, `datetime`, `asyncio`, `socket`, `Thread.join`,
+    semaphores, `threading.Timer`, `queue.SimpleQueue`.
+
+    Args:
+        passing: a `RigPassing`, or a `SimNetwork`.
+
+    Yields:
+        The clock.
+    """
+    clock = SimTime(passing)
+    with Switches(HostWaits(passing, clock).acts()):
+        yield clock

@@ -1,0 +1,73 @@
+"""The time of a rig, for hosts that look at a clock."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Final
+
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US
+
+LONGEST_US: Final = 3_600_000_000
+"""Who waits without a timeout waits an hour at most."""
+
+
+class RigPassing:
+    """A `Passing` that is a rig's time.
+
+    What is called back in the middle of a step may look at the clock, but not wait.
+
+    Args:
+        rig: stepped while somebody waits.
+        deliver: called between its steps; hands hosts what has arrived, as a thread of theirs
+            would do: `partial(network.run_for, 0)` of a `SimNetwork`.
+    """
+
+    def __init__(self, rig: Rig, deliver: Sequence[Callable[[], None]] = ()) -> None:
+        self._rig, self._deliver, self._delivering = rig, deliver, False
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since 1970: a rig begins with the year 2000."""
+        return EPOCH_S + self._rig.now_us / 1e6
+
+    def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Let time pass until `done()`; False if the timeout was first.
+
+        Without a timeout it is False once nothing happens any more, or after an hour.
+
+        Raises:
+            RuntimeError: it is the rig that has called, in the middle of a step.
+        """
+        timeout_us = LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
+        if _in_a_step():
+            if timeout_us > LOOK_US:
+                raise RuntimeError("what is called back while time passes cannot wait itself")
+            return done()
+
+        def handled() -> bool:
+            self._deliver_all()
+            return done()
+
+        return self._rig.run_until(handled if self._deliver else done, timeout_us)
+
+    def _deliver_all(self) -> None:
+        if self._delivering:  # a callback waits: the next one has to
+            return
+        self._delivering = True
+        try:
+            for deliver in self._deliver:
+                deliver()
+        finally:
+            self._delivering = False
+
+
+def _in_a_step() -> bool:
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        if frame.f_code is Rig._happen.__code__:
+            return True
+        frame = frame.f_back
+    return False

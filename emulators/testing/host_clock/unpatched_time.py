@@ -1,0 +1,58 @@
+"""Hosts that look at the clock of this machine while their bench is in virtual time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from functools import partial
+from types import FrameType
+from typing import Any, Final
+
+from tickrig.emulators.testing.host_clock.host_code import is_installed, package_of, place_of
+from tickrig.emulators.testing.host_clock.switches import Switches
+
+WAITS: Final = ("sleep", "monotonic", "monotonic_ns")
+"""What nobody calls but who waits."""
+
+STAMPS: Final = ("time", "time_ns")
+"""What installed packages may call: they stamp what they write."""
+
+WHAT_TO_DO: Final = (
+    "in virtual time the clock of this machine means nothing: use the fixture bench_time"
+    " (time.perf_counter measures this machine)"
+)
+
+
+class UnpatchedTimeError(RuntimeError):
+    """A host has looked at the clock of this machine."""
+
+
+@contextmanager
+def unpatched_time_fails(allowed: Collection[str] = ()) -> Iterator[None]:
+    """Raise UnpatchedTimeError where a host sleeps, or looks at a clock that does not pass.
+
+    It is raised at the first such call with its file and line, and once more at the end if the
+    host has swallowed it. Whose code it is that counts, `patched_time` says; within it nothing is
+    refused. `perf_counter` is let through, and where packages are installed `time.time`, too.
+
+    Args:
+        allowed: names of packages that may do so.
+    """
+    refusals: list[str] = []
+    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+
+    def refuse(
+        name: str, original: Callable[..., Any], frame: FrameType, *args: Any, **kwargs: Any
+    ) -> Any:
+        stamped = name in STAMPS and is_installed(frame.f_code.co_filename)
+        if stamped or package_of(frame) in allowed or threading.get_ident() in others:
+            return original(*args, **kwargs)
+        refusals.append(f"{place_of(frame)}: time.{name} is called, but {WHAT_TO_DO}")
+        raise UnpatchedTimeError(refusals[-1])
+
+    with Switches({(time, name): partial(refuse, name) for name in (*WAITS, *STAMPS)}):
+        yield
+    if refusals:
+        raise UnpatchedTimeError(refusals[0])
