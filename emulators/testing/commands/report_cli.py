@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,9 @@ if TYPE_CHECKING:
 
 @click.command("report")
 @click.argument("runs", metavar="RUN.json...", nargs=-1, required=True, type=PATH)
-@click.option("-o", "--output", metavar="FILE", required=True, type=PATH, help="The page.")
+@click.option(
+    "-o", "--output", metavar="FILE", required=True, type=PATH, help="The page; JSON as FILE.json."
+)
 @click.option("--title", default="", help="Of the page; that of the first run unless given.")
 def report_command(runs: tuple[Path, ...], output: Path, title: str) -> None:
     """Make one HTML page of test runs that were kept as JSON.
@@ -27,15 +28,21 @@ def report_command(runs: tuple[Path, ...], output: Path, title: str) -> None:
     \b
     tickrig report virtual.json -o bench.html
     tickrig report virtual.json real.json hardware.json -o bench.html --title "Friday"
+    tickrig report virtual.json real.json -o both.json
     """  # noqa: D301 - click wants the backspace
-    if find_spec("jinja2") is None:
-        raise Refused("a report needs Jinja2: pip install 'tickrig[report]'")
     with loading():
         from tickrig.emulators.testing.report.bench_report import (  # noqa: PLC0415 - slow
             merge_reports,
         )
-        from tickrig.emulators.testing.report.report_file import write_report  # noqa: PLC0415
+        from tickrig.emulators.testing.report.report_file import (  # noqa: PLC0415
+            check_report,
+            write_report,
+        )
 
+    try:
+        check_report(output)
+    except ValueError as error:
+        raise Refused(str(error)) from None
     report = merge_reports([_read(path) for path in runs], title)
     try:
         write_report(report, output)

@@ -63,7 +63,7 @@ def lane_of(series: SignalSeries, axis: Axis) -> Lane:
         return _constant(series, axis)
     low, high = widened(min(numbers), max(numbers))
     path = _path(series.points, axis, (low, high), series.steps)
-    zero = round(high / (high - low) * 100, 2) if low < 0 < high else None
+    zero = round(_height(0, (low, high)), 2) if low < 0 < high else None
     least, greatest = text_of(min(numbers)), text_of(max(numbers))
     rows = _row(series.points, numbers)
     return Lane(series.name, series.unit, path, (), least, greatest, (low, high), zero, rows)
@@ -104,7 +104,6 @@ def _words(points: Sequence[Point], axis: Axis) -> Iterator[Span]:
 
 
 def _path(points: Sequence[Point], axis: Axis, scale: tuple[float, float], steps: bool) -> str:
-    low, high = scale
     parts: list[str] = []
     down = False
     for at_us, value in thinned(points, MOST_POINTS):
@@ -112,12 +111,18 @@ def _path(points: Sequence[Point], axis: Axis, scale: tuple[float, float], steps
         if steps and down:
             parts.append(f"H{x}")
         if isinstance(value, int | float):
-            y = f"{(high - value) / (high - low) * HEIGHT:.4g}"
+            y = f"{_height(value, scale):.4g}"
             parts.append((f"V{y}" if steps else f"L{x} {y}") if down else f"M{x} {y}")
         down = isinstance(value, int | float)
     if steps and down:
         parts.append(f"H{WIDTH}")
     return "".join(_merged(parts))
+
+
+def _height(value: float, scale: tuple[float, float]) -> float:
+    """Return how far a value is from the top; halves, for their difference is never infinite."""
+    low, high = scale
+    return (high / 2 - value / 2) / (high / 2 - low / 2) * HEIGHT
 
 
 def _merged(parts: Iterable[str]) -> Iterator[str]:

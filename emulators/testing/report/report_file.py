@@ -3,21 +3,41 @@
 from __future__ import annotations
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Final
 
 from tickrig.emulators.testing.report.bench_report import BenchReport
 from tickrig.emulators.testing.report.report_json import from_json, to_json
 
+JSON: Final = ".json"
+"""Ends the name of a report that is kept as JSON."""
+
+
+def check_report(path: Path) -> None:
+    """See before a run whether its report could be written after it.
+
+    Raises:
+        ValueError: Jinja2 is not there, or the folder is not.
+    """
+    if path.suffix.lower() != JSON and find_spec("jinja2") is None:
+        raise ValueError("a report needs Jinja2: pip install 'tickrig[report]'")
+    if not path.parent.is_dir():
+        raise ValueError(f"report {path}: no directory {path.parent}")
+
 
 def write_report(report: BenchReport, path: Path) -> None:
-    """Write the page of a report; needs Jinja2 (extra `report`).
+    """Write the page of a report; JSON, as `write_run`, if the name ends in `.json`.
 
     A file of this name is replaced when the new one is whole, else it stays as it is.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`.
-        ImportError: Jinja2 is not there.
+        ImportError: Jinja2 (extra `report`) is not there.
     """
+    if path.suffix.lower() == JSON:
+        write_run(report, path)
+        return
     from tickrig.emulators.testing.report.page import html_page  # noqa: PLC0415 - an extra
 
     write_whole(path, html_page(report))

@@ -19,6 +19,9 @@ from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport
 
 VERSION_KEY: Final = "tickrig-report"
 
+MOST: Final = 2**63 - 1
+"""Of whole numbers: of times in microseconds 292,000 years."""
+
 T = TypeVar("T")
 
 Reader = Callable[[Any], Any]
@@ -107,6 +110,8 @@ def _plain_reader(kinds: tuple[type, ...]) -> Reader:
     def read(data: Any) -> Any:
         if type(data) not in allowed:  # bool is an int
             raise ReportError(f": {data!r:.40} is not {names}")
+        if type(data) is int and not -MOST <= data <= MOST:
+            raise ReportError(f": a number of {data.bit_length()} bits is too large")
         return data
 
     return read

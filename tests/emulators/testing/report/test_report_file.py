@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from tests.emulators.testing.report.real_runs import DRIVE, run_rrc
 from tests.emulators.testing.report.test_report_json import REPORT
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.testing.report.bench_report import BenchReport
+from tickrig.emulators.testing.report.bench_report import BenchReport, merge_reports
 from tickrig.emulators.testing.report.report_file import read_run, write_report, write_run
 
 ROOT = Path(__file__).parents[4]
@@ -50,6 +50,13 @@ def test_several_runs_are_one_page(kept: Path, tmp_path: Path) -> None:
     text = (tmp_path / "bench.html").read_text("utf-8")
     assert "<h1>Friday &amp; all</h1>" in text
     assert "test_it_stops[fast]" in text
+
+
+def test_runs_are_merged_into_one_that_is_kept(kept: Path, tmp_path: Path) -> None:
+    other, both = tmp_path / "other.json", tmp_path / "both.JSON"
+    write_run(REPORT, other)
+    assert run(kept, other, "-o", both).exit_code == 0
+    assert read_run(both) == merge_reports([read_run(kept), REPORT])
 
 
 def test_a_page_does_not_depend_on_the_process(kept: Path, tmp_path: Path) -> None:
@@ -102,7 +109,7 @@ def test_a_folder_that_is_not_there_is_refused(kept: Path, tmp_path: Path) -> No
     result = run(kept, "-o", page)
     assert (result.exit_code, result.stderr) == (
         2,
-        f"Error: report {page}: No such file or directory\n",
+        f"Error: report {page}: no directory {page.parent}\n",
     )
 
 
@@ -113,6 +120,7 @@ def test_without_jinja_it_says_what_to_install(
     result = run(kept, "-o", tmp_path / "bench.html")
     said = "Error: a report needs Jinja2: pip install 'tickrig[report]'\n"
     assert (result.exit_code, result.stderr) == (2, said)
+    assert run(kept, "-o", tmp_path / "again.json").exit_code == 0
 
 
 def test_a_full_disk_leaves_the_file_of_before(kept: Path, tmp_path: Path) -> None:

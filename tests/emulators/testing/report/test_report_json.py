@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tickrig.emulators.testing.report.bench_report import (
@@ -18,6 +18,7 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
     merge_reports,
 )
+from tickrig.emulators.testing.report.page import html_page
 from tickrig.emulators.testing.report.report_json import (
     ReportError,
     from_data,
@@ -81,6 +82,10 @@ def test_what_is_left_out_has_its_default() -> None:
             ".tests[0].series[0].points[1][1]: {} is not a number or a text or null",
         ),
         (to_json(REPORT).replace("[0,0],", "[0,0,0],"), "points[0]: [0, 0, 0] is no list of 2"),
+        (
+            to_json(REPORT).replace("[10000,", f"[{10**400},"),
+            ".tests[0].journal[0][0]: a number of 1329 bits is too large",
+        ),
         (to_json(REPORT).replace("[0,0],", "[9,0],"), "series[0]: v: 1 us comes after 9 us"),
         (to_json(REPORT).replace('"run":0', '"run":1'), "test_it_stops[fast]: there is no run 1"),
     ],
@@ -99,6 +104,7 @@ ANYTHING = st.recursive(
 )
 
 
+@settings(deadline=None)
 @given(st.data())
 def test_a_report_with_anything_in_it_is_read_or_refused(data: st.DataObject) -> None:
     changed = json.loads(to_json(REPORT))
@@ -115,6 +121,7 @@ def test_a_report_with_anything_in_it_is_read_or_refused(data: st.DataObject) ->
     except ReportError:
         return
     assert from_json(to_json(report)) == report
+    assert html_page(report)
 
 
 def test_a_value_that_is_no_number_is_unknown() -> None:
