@@ -125,10 +125,14 @@ class SerialRun(EmulatorRun):
         return ports
 
     def _open_pty(self, stack: ExitStack) -> PtyPort:
-        from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
-
         try:
+            from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
+
             pty = PtyPort(self._options.link)
+        except ModuleNotFoundError:
+            raise Refused(
+                "this system has no ptys: serve the line, as --serve rfc2217://7000"
+            ) from None
         except OSError as error:
             refuse_path("link", error)
         stack.callback(pty.close)

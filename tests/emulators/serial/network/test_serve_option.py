@@ -25,6 +25,7 @@ from tickrig.emulators.rtc_lite.cli import main as rtc_lite_emu
 from tickrig.emulators.urg.cli import main as urg_emu
 from tickrig.host.rrc import RrcClient
 
+ROOT = Path(__file__).parents[4]
 PROGRAM = "from tickrig.emulators.rrc.cli import main; main()"
 PATIENCE_S = 20.0
 
@@ -95,6 +96,16 @@ def test_a_port_open_to_others_is_warned_of_in_a_line() -> None:
         f"Whoever reaches port {number} of 0.0.0.0 can drive this device: there is no password."
         " Leave out the host to serve this machine alone."
     )
+
+
+@pytest.mark.realtime
+def test_a_system_without_ptys_serves_all_the_same() -> None:
+    words = [sys.executable, "-m", "tests.emulators.serial.network.without_ptys"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    refusal = "2 Error: this system has no ptys: serve the line, as --serve rfc2217://7000 2"
+    served, refused = said.splitlines()[::2], said.splitlines()[1::2]
+    assert [line.partition(" s; late")[0] for line in served] == ["0 ran 0.020"] * 4
+    assert refused == [refusal] * 4
 
 
 class Served:
