@@ -11,6 +11,8 @@ from tests.hil.node import PATIENCE, NodeUnderTest
 from tests.hil.rigs import RIGS
 from tickrig import Bench
 
+pytestmark = pytest.mark.needs("device:epos")
+
 ENABLED, QUICK_STOP, FAULT, NOT_READY = 0x27, 0x07, 0x08, 0x40
 STATE_MASK = 0x6F
 TARGET_REACHED = 0x0400

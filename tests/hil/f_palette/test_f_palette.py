@@ -11,6 +11,8 @@ from tests.hil.node import PATIENCE, NodeUnderTest
 from tests.hil.rigs import RIGS
 from tickrig import Bench
 
+pytestmark = pytest.mark.needs("device:f_palette")
+
 NODE_ID = 16
 RPDO1, TPDO1, TPDO2 = 0x200 + NODE_ID, 0x180 + NODE_ID, 0x280 + NODE_ID
 

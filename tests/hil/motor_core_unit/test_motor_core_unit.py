@@ -10,6 +10,8 @@ from tests.hil.node import PATIENCE, NodeUnderTest
 from tests.hil.rigs import RIGS
 from tickrig import Bench
 
+pytestmark = pytest.mark.needs("device:motor_core_unit")
+
 NODE_ID = 32
 FREE, CURRENT, VELOCITY, ANGLE = range(4)
 FULL_DEG, FULL_DEG_S = 180.0, 360.0

@@ -14,6 +14,8 @@ from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
 from tickrig.wire.modbus.rtu import encode_frame, parse_frame
 from tickrig.wire.rh3 import DEVICE_ID, Address, Command, Mode
 
+pytestmark = pytest.mark.needs("device:rh3_base")
+
 ADDRESS = 1
 ENABLED, MOVING, FAULT, WATCHDOG = 1, 2, 4, 8
 SPEED = 20_000

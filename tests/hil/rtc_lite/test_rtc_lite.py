@@ -16,6 +16,8 @@ from tickrig.wire.rtc_lite.layout import REPLIES
 from tickrig.wire.rtc_lite.messages import LitePortData, LiteReply, parse_reply
 from tickrig.wire.rtc_lite.values import LONG
 
+pytestmark = pytest.mark.needs("device:rtc_lite")
+
 
 @pytest.fixture
 def bench_config() -> Path:

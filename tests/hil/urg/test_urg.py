@@ -12,6 +12,8 @@ from tests.hil.rigs import RIGS
 from tickrig import Bench
 from tickrig.host import DeviceRefused, UrgClient
 
+pytestmark = pytest.mark.needs("device:urg")
+
 
 @pytest.fixture
 def bench_config() -> Path:
