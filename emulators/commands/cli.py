@@ -16,6 +16,10 @@ COMMANDS: Final = {
         f"{TESTING}.check_cli:check",
         "Check rig files: say what is on the bench, or all that is wrong.",
     ),
+    "compare": (
+        f"{TESTING}.compare_cli:compare_command",
+        "Let the host of a recorded run talk to an emulator; say where it answers otherwise.",
+    ),
     "ctl": (
         f"{HERE}.ctl_cli:ctl",
         "Operate and watch the emulator whose control socket is SOCKET.",
@@ -54,6 +58,7 @@ def main() -> None:
     tickrig init                                  write a rig file to begin with
     tickrig check rig.toml                        see what is wrong with a rig file
     tickrig new device lamp                       begin a device of your own
+    tickrig compare run.trace                     compare a recording with the emulator
     tickrig record /dev/ttyUSB0 -o run.trace      record a real device and its host
     tickrig replay run.trace                      replay a recorded run
     tickrig report run.json -o bench.html         see a test run as a page

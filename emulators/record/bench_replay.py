@@ -8,9 +8,18 @@ from itertools import groupby
 from typing import Any
 
 from tickrig.device.core import Device
+from tickrig.emulators.record.replay import Recording, read_recording
 from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.text.bench_header import BenchHeader, Place, parse_bench_header
+from tickrig.host.text.bench_header import (
+    PREFIX,
+    BenchHeader,
+    DeviceEntry,
+    Place,
+    WireEntry,
+    WireType,
+    parse_bench_header,
+)
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
 from tickrig.host.text.trace import RESET, Mark, TraceError
 from tickrig.wire.can import Frames
@@ -59,6 +68,8 @@ def read_bench_recording(data: bytes) -> BenchRecording:
     Raises:
         TraceError: not a trace of this version, or a line of it is damaged.
     """
+    if not data.startswith(PREFIX.encode()):
+        return as_bench(read_recording(data))
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError as error:
@@ -70,6 +81,17 @@ def read_bench_recording(data: bytes) -> BenchRecording:
     if not ended:
         records = tuple(r for r in records if r.at_us < records[-1].at_us)
     return BenchRecording(header, records, ended)
+
+
+def as_bench(recording: Recording) -> BenchRecording:
+    """Return the recording of one device on a serial line as that of a bench."""
+    name, wires = recording.header.device, {"line": WireEntry(WireType.SERIAL)}
+    entry = DeviceEntry("line", name, recording.header.config)
+    records = tuple(
+        BenchRecord(x.at_us, "" if x.mark is Mark.END else name, x.mark, x.data, x.text, x.line)
+        for x in recording.records
+    )
+    return BenchRecording(BenchHeader({name: entry}, wires), records, recording.ended)
 
 
 def replay_device(
@@ -86,6 +108,17 @@ def replay_device(
         TraceError: the trace names an input that the device does not have.
     """
     nothing: Traffic = () if recording.header.on_can(name) else b""
+    said = [*traffic_of(recording.of(name), Mark.FROM_DEVICE)]
+    return first_difference(said, play_device(recording, name, device), nothing)
+
+
+def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
+    """Feed a fresh device what one of the bench met; return what it says, with its ticks.
+
+    Raises:
+        TraceError: the trace names an input that the device does not have.
+    """
+    nothing: Traffic = () if recording.header.on_can(name) else b""
     records = recording.of(name)
     received = ((at, what) for at, what, _ in traffic_of(records, Mark.TO_DEVICE))
     port = ReplayPort[Any](received, nothing)
@@ -95,8 +128,7 @@ def replay_device(
             rig.run_to(record.at_us - 1)
             do(device, record)
     rig.run_to(recording.until_us)
-    said = [*traffic_of(records, Mark.FROM_DEVICE)]
-    return first_difference(said, port.sent, nothing)
+    return port.sent
 
 
 def traffic_of(records: Sequence[BenchRecord], mark: Mark) -> Iterator[tuple[int, Traffic, int]]:

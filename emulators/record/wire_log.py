@@ -33,7 +33,8 @@ Splitter = Callable[[int, bytes], list[bytes]]
 """Told when bytes were heard; gives what has become whole."""
 
 
-def _line_splitter(mark: Mark) -> Splitter:
+def line_splitter(mark: Mark) -> Splitter:
+    """Return what cuts one direction into lines."""
     splitter = LineSplitter()
     return lambda at_us, data: splitter.push(data)
 
@@ -50,7 +51,7 @@ class WireLog:
     """
 
     def __init__(
-        self, keep: int = 500, splitter: Callable[[Mark], Splitter] = _line_splitter
+        self, keep: int = 500, splitter: Callable[[Mark], Splitter] = line_splitter
     ) -> None:
         self.listeners: list[Callable[[WireLine], None]] = []
         self._lines: deque[WireLine] = deque(maxlen=keep)

@@ -7,13 +7,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from tests.host.live import LiveRrc, live_rrc, pty
+from tickrig.device.rrc.config import RrcConfig
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.record.bench_replay import read_bench_recording
 from tickrig.emulators.serial.pty_port import PtyPort
@@ -31,6 +33,7 @@ class Recorder:
 
     def __init__(self, port: str, out: Path, link: Path) -> None:
         self.out, self.link = out, link
+        self._ended: tuple[int, str] | None = None
         words = ["record", port, "--out", str(out), "--type", "rrc", "--link", str(link)]
         self.process = subprocess.Popen(
             [sys.executable, "-c", PROGRAM, *words],
@@ -54,10 +57,29 @@ class Recorder:
             time.sleep(0.01)
 
     def end(self) -> tuple[int, str]:
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        _, err = self.process.communicate(timeout=PATIENCE_S)
-        return self.process.returncode, err
+        """Interrupt it, and return its exit status and what it said."""
+        if self._ended is None:
+            if self.process.poll() is None:
+                self.process.send_signal(signal.SIGINT)
+            _, err = self.process.communicate(timeout=PATIENCE_S)
+            self._ended = (self.process.returncode, err)
+        return self._ended
+
+
+Start = Callable[..., Recorder]
+
+
+@pytest.fixture
+def record() -> Iterator[Start]:
+    """Return what starts recorders; they end with the test."""
+    with ExitStack() as stack:
+
+        def start(port: str, out: Path, link: Path) -> Recorder:
+            recorder = Recorder(port, out, link)
+            stack.callback(recorder.end)
+            return recorder
+
+        yield start
 
 
 @pytest.fixture
@@ -87,8 +109,10 @@ def passed(path: Path, mark: Mark) -> bytes:
     return b"".join(x.traffic for x in records if x.mark is mark and isinstance(x.traffic, bytes))
 
 
-def test_a_host_and_its_device_are_recorded(port: PtyPort, rrc: LiveRrc, tmp_path: Path) -> None:
-    recorder = Recorder(port.path, tmp_path / "run.trace", tmp_path / "tty")
+def test_a_host_and_its_device_are_recorded(
+    port: PtyPort, rrc: LiveRrc, record: Start, tmp_path: Path
+) -> None:
+    recorder = record(port.path, tmp_path / "run.trace", tmp_path / "tty")
     host = SerialLink(str(recorder.link))
     said = answer(host, b"version\n", b"Version 1.0\n")
     recorder.type("power_button=1")
@@ -119,10 +143,42 @@ def test_a_host_and_its_device_are_recorded(port: PtyPort, rrc: LiveRrc, tmp_pat
     assert not recorder.link.exists()
 
 
-def test_a_port_that_goes_ends_the_recording(tmp_path: Path) -> None:
+JITTER = ("--tolerance", "200ms")  # a busy machine is no difference
+
+
+@pytest.mark.parametrize(
+    ("config", "code", "found"),
+    [
+        (RrcConfig(), 0, "\nsame: "),
+        (RrcConfig(power_on_ticks=130), 1, "ms earlier\n  recorded < EV:PowerOnSuccess "),
+        (RrcConfig(version="Version 1.1"), 1, "something else\n  recorded < Version 1.1 "),
+    ],
+)
+def test_what_was_recorded_of_a_pty_is_compared(
+    record: Start, tmp_path: Path, config: RrcConfig, code: int, found: str
+) -> None:
+    with pty() as port, live_rrc(port, config) as rrc:
+        rrc.await_output("state", "WaitPowerOn")
+        recorder = record(port.path, tmp_path / "run.trace", tmp_path / "tty")
+        host = SerialLink(str(recorder.link))
+        answer(host, b"version\n", config.version.encode() + b"\n")
+        rrc.set("power_button", 1)
+        recorder.type("power_button=1")
+        answer(host, b"", b"EV:PowerOnSuccess\n")
+        rrc.set("power_button", 0)
+        recorder.type("power_button=0")
+        answer(host, b"watchdog32\n", b"OK:watchdog\n")
+        answer(host, b"output1e00\n", b"OK:output\n")
+        answer(host, b"", b"EV:PowerOffWaitByWatchdog\n")
+        assert recorder.end()[0] == 0
+    result = CliRunner().invoke(main, ["compare", str(recorder.out), *JITTER])
+    assert (result.exit_code, found in result.output) == (code, True), result.output
+
+
+def test_a_port_that_goes_ends_the_recording(record: Start, tmp_path: Path) -> None:
     with pty() as port, live_rrc(port) as rrc:
         rrc.await_output("state", "WaitPowerOn")
-        recorder = Recorder(port.path, tmp_path / "run.trace", tmp_path / "tty")
+        recorder = record(port.path, tmp_path / "run.trace", tmp_path / "tty")
         answer(SerialLink(str(recorder.link)), b"version\n", b"Version 1.0\n")
     assert recorder.process.wait(PATIENCE_S) == 1
     _, err = recorder.end()
@@ -131,8 +187,10 @@ def test_a_port_that_goes_ends_the_recording(tmp_path: Path) -> None:
     assert read_bench_recording(recorder.out.read_bytes()).ended
 
 
-def test_a_full_disk_ends_the_recording_alone(port: PtyPort, rrc: LiveRrc, tmp_path: Path) -> None:
-    recorder = Recorder(port.path, Path("/dev/full"), tmp_path / "tty")
+def test_a_full_disk_ends_the_recording_alone(
+    port: PtyPort, rrc: LiveRrc, record: Start, tmp_path: Path
+) -> None:
+    recorder = record(port.path, Path("/dev/full"), tmp_path / "tty")
     answer(SerialLink(str(recorder.link)), b"version\n", b"Version 1.0\n")
     code, err = recorder.end()
     assert code == 3
@@ -140,9 +198,9 @@ def test_a_full_disk_ends_the_recording_alone(port: PtyPort, rrc: LiveRrc, tmp_p
 
 
 def test_a_stopped_recorder_loses_nothing_and_says_so(
-    port: PtyPort, rrc: LiveRrc, tmp_path: Path
+    port: PtyPort, rrc: LiveRrc, record: Start, tmp_path: Path
 ) -> None:
-    recorder = Recorder(port.path, tmp_path / "run.trace", tmp_path / "tty")
+    recorder = record(port.path, tmp_path / "run.trace", tmp_path / "tty")
     host = SerialLink(str(recorder.link))
     answer(host, b"version\n", b"Version 1.0\n")
     recorder.process.send_signal(signal.SIGSTOP)
