@@ -28,10 +28,12 @@ from tickrig.wire.instant import NEVER
 T = TypeVar("T")
 
 if TYPE_CHECKING:
+    from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
     from tickrig.emulators.testing.bench.modes.real.outside import Outside
 
 VIRTUAL: Final = "virtual"
 REAL: Final = "real"
+HARDWARE: Final = "hardware"
 
 
 class Bench(BenchDevice):
@@ -80,19 +82,27 @@ class Bench(BenchDevice):
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
 
     @classmethod
-    def of_plan(cls, plan: RigPlan, mode: str = VIRTUAL) -> Self:
+    def of_plan(cls, plan: RigPlan, mode: str = VIRTUAL, terminal: Terminal | None = None) -> Self:
         """Return the bench of a rig file.
 
         Args:
             plan: what the file says.
-            mode: `virtual`, or `real`: where its hosts are then is in the plan.
+            mode: `virtual`; `real`: where its hosts are is in the plan; or `hardware`: where its
+                devices are is in the plan.
+            terminal: where the operator of real devices is; standard input and output unless given.
 
         Raises:
             Refused: a device cannot be made.
             ValueError: an option, input, fault or mode that there is not.
-            PortGone: a bus cannot be opened.
+            PortGone: a bus cannot be opened, or an emulator that plays a device is not there.
             OSError: no port is to be had, or no link or socket can be made.
         """
+        if mode == HARDWARE:
+            from tickrig.emulators.testing.bench.modes.hardware.hardware_mode import (  # noqa: PLC0415 - POSIX
+                HardwareMode,
+            )
+
+            return cls.of_mode(HardwareMode(plan, terminal))
         return cls.of_mode(_emulated(mode, parts_of(plan), plan))
 
     @classmethod
@@ -297,7 +307,7 @@ def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
     if mode == VIRTUAL:
         return VirtualMode(_rig(parts, plan))
     if mode != REAL:
-        raise ValueError(f"a bench of emulated devices is in mode virtual or real, not {mode!r}")
+        raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
     from tickrig.emulators.testing.bench.modes.real.real_mode import (  # noqa: PLC0415 - POSIX
         RealMode,
     )

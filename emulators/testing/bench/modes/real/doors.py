@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
 from tickrig.emulators.testing.bench.modes.real.watched_link import (
     LinkGone,
@@ -58,7 +59,7 @@ class Doors:
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a link; see `BenchMode`."""
-        place, watch = self._places[wire], self._watch_of(wire)
+        place, watch = self._place(wire), self._watch_of(wire)
         link: WatchedLink[Any]
         if isinstance(place, BusPlan):
             link = WatchedFrameLink(_frame_link(place), watch)
@@ -73,7 +74,7 @@ class Doors:
             open_watched,
         )
 
-        place = self._places[wire]
+        place = self._place(wire)
         if isinstance(place, BusPlan):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
         data, parity, stop = int(place.framing[0]), place.framing[1], float(place.framing[2:])
@@ -105,8 +106,13 @@ class Doors:
         """Close what is still open."""
         self._opened.close()
 
+    def _place(self, wire: str) -> LinePlace | BusPlan:
+        if wire not in self._places:
+            raise NotOnThisBench(f"nobody has said where {wire} is")
+        return self._places[wire]
+
     def _bus(self, wire: str) -> BusPlan:
-        place = self._places[wire]
+        place = self._place(wire)
         if isinstance(place, LinePlace):
             raise ValueError(f"{wire} is a serial line, not a CAN bus")
         return place

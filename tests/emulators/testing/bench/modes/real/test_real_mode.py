@@ -126,8 +126,7 @@ def test_what_a_condition_raises_is_raised_where_it_is_waited_for() -> None:
     with Bench(Rrc(), mode="real") as bench:
         with pytest.raises(ValueError, match="no input or output"):
             bench.wait_until(lambda: bench.get("nothing") == 1, within="1s")
-        with pytest.raises(BenchError, match="no time passes"):
-            bench.wait_until(lambda: bench.wait_until(lambda: True, "1s"), within="1s")
+        assert bench.wait_until(lambda: bench.wait_until(lambda: True, "1s"), within="1s")
         assert bench.wait_until(lambda: True, within="1s")
 
 
@@ -181,7 +180,7 @@ def test_what_real_time_cannot_do_is_told() -> None:
             bench.fork()
         with pytest.raises(ValueError, match="rrc is a serial line, not a CAN bus"):
             bench.can_bus()
-    with pytest.raises(ValueError, match="in mode virtual or real, not 'unreal'"):
+    with pytest.raises(ValueError, match="is virtual or real, not 'unreal'"):
         Bench(Rrc(), mode="unreal")
 
 

@@ -1,0 +1,187 @@
+"""Who is at which real device, and what is asked of whom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.names import known
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.emulated_mode import answer_of
+from tickrig.emulators.testing.bench.modes.hardware.device_operator import DeviceOperator
+from tickrig.emulators.testing.bench.modes.hardware.door_journal import DoorJournal
+from tickrig.emulators.testing.bench.modes.hardware.emulator_operator import EmulatorOperator
+from tickrig.emulators.testing.bench.modes.hardware.human_operator import HumanOperator
+from tickrig.emulators.testing.bench.modes.hardware.power_switch import PowerSwitch
+from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
+from tickrig.emulators.testing.rig_file.plan import HardwarePlan, RigPlan
+from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.text.values import Setting
+
+
+class Operators:
+    """The operators of a bench, with their devices by name.
+
+    Args:
+        plan: the rig file.
+        where: what it says of real devices.
+        like: such devices, for their tables; nothing runs there.
+        terminal: where the human is.
+        journal: gets what is done.
+
+    Raises:
+        PortGone: an emulator that plays a device is not there.
+    """
+
+    def __init__(
+        self,
+        plan: RigPlan,
+        where: HardwarePlan,
+        like: BenchRig,
+        terminal: Terminal,
+        journal: DoorJournal,
+    ) -> None:
+        self._plan, self._where, self._like = plan, where, like
+        self._terminal, self._journal = terminal, journal
+        self._operators: dict[str, DeviceOperator] = {}
+        with ExitStack() as undo:
+            undo.callback(self.close)
+            for name in plan.devices:
+                self._operators[name] = self._operator_of(name)
+            undo.pop_all()
+
+    @property
+    def said_no(self) -> bool:
+        """Whether a human saw what should not be."""
+        return any(operator.said_no for operator in self._operators.values())
+
+    @property
+    def late_us(self) -> int:
+        """How late the worst of the devices was."""
+        return max((operator.late_us for operator in self._operators.values()), default=0)
+
+    def close(self) -> None:
+        """Let all go."""
+        for operator in self._operators.values():
+            operator.close()
+
+    def request(self, do: str, fields: dict[str, Any]) -> Object:
+        """Have done what a control socket would; ValueError if it is refused."""
+        match do:
+            case "set":
+                self._set(fields["name"], fields["value"])
+            case "press":
+                self._press(fields["name"], fields["duration_us"])
+            case "get":
+                return {"values": {name: self._get(name) for name in fields["names"]}}
+            case "describe":
+                request: Object = {"v": VERSION, "do": do}
+                return answer_of(EmulatorControl(self._like).answer(request))
+            case _:
+                raise NotOnThisBench(f"real devices do not answer {do!r}")
+        return {}
+
+    def _set(self, name: str, values: list[Setting]) -> None:
+        self._like.operator.check_set(name, *values)
+        device, signal = self._owner(name)
+        self._operator_at(device).set(signal, tuple(values))
+        self._journal.note(device, f"{signal}={' '.join(map(str, values))}")
+
+    def _press(self, name: str, duration_us: int) -> None:
+        self._like.operator.check_press(name, duration_us)
+        device, button = self._owner(name)
+        self._operator_at(device).press(button, duration_us)
+        self._journal.note(device, f"{button} pressed for {duration_us / 1e6:g} s")
+
+    def _get(self, name: str) -> Setting:
+        device, signal = self._owner(name)
+        return self._operator_at(device).get(signal)
+
+    def fault(
+        self, owner: str, spec: FaultSpec, for_us: int | None, *, at_once: bool
+    ) -> Callable[[int], None]:
+        """Return what has a fault made, at a time of the bench.
+
+        Args:
+            owner: a device or wire, empty for any.
+            spec: the fault.
+            for_us: how long it stays.
+            at_once: it is no good a moment later.
+        """
+        name = self._fault_name(owner, spec.name)
+        self._like.operator.check_fault(replace(spec, name=name))
+        device, fault = self._fault_owner(name)
+        operator, wanted = self._operator_at(device), replace(spec, name=fault)
+        if at_once and not operator.quick:
+            raise NotOnThisBench(f"no hand makes {fault} the moment that something is so")
+
+        def begin(now_us: int) -> None:
+            operator.fault(wanted, now_us, for_us)
+            self._journal.note(device, fault if spec.rate is None else f"{fault}={spec.rate:g}")
+
+        return begin
+
+    def clear(self, owner: str, fault: str) -> None:
+        """Have a fault mended."""
+        name = self._fault_name(owner, fault)
+        self._like.operator.check_clear(name)
+        device, bare = self._fault_owner(name)
+        self._operator_at(device).clear(bare)
+        self._journal.note(device, f"{bare}=0")
+
+    def switch_power(self, owner: str, *, on: bool) -> None:
+        """Have the supply of a device switched, of all if it is empty."""
+        for device in [owner] if owner else self._plan.devices:
+            self._operator_at(device).switch_power(on=on)
+            self._journal.note(device, f"switched {'on' if on else 'off'}")
+
+    def sees(self, owner: str, text: str) -> bool | None:
+        """Ask the human at a device, or at the first that has one; None if there is none."""
+        for device in [owner] if owner else self._plan.devices:
+            answer = self._operator_at(device).sees(text)
+            if answer is not None:
+                self._journal.note(device, f"{'seen' if answer else 'not seen'}: {text}")
+                return answer
+        return None
+
+    def _operator_of(self, device: str) -> DeviceOperator:
+        if path := self._where.control.get(device):
+            return EmulatorOperator(path, self._plan.devices[device])
+        power = self._where.power.get(device)
+        switch = PowerSwitch(device, power) if power else None
+        return HumanOperator(
+            device, self._like.state.assembly.parts[device], self._terminal, switch
+        )
+
+    def _owner(self, name: str) -> tuple[str, str]:
+        """Return the device of a signal, and its name there; ValueError if there is none."""
+        assembly = self._like.state.assembly
+        groups = assembly.inputs.groups
+        if not (name in assembly.inputs.table or name in assembly.outputs or name in groups):
+            names = known([*assembly.inputs.table, *assembly.outputs])
+            raise ValueError(f"no input or output {name!r}; known: {names}")
+        alone = len(assembly.parts) == 1
+        device = next(iter(self._plan.devices)) if alone else name.partition("/")[0]
+        return device, name.removeprefix(f"{device}/")
+
+    def _fault_name(self, owner: str, fault: str) -> str:
+        return self._like.state.fault_name(owner, fault) if owner else fault
+
+    def _fault_owner(self, name: str) -> tuple[str, str]:
+        """Return who can make a fault, and its name there."""
+        if name not in self._like.state.faults.fault_types:
+            return self._owner(name)
+        wire, _, bare = name.rpartition("/")
+        on_wire = self._plan.devices_on(wire or next(iter(self._plan.wires)))
+        quick = [device.name for device in on_wire if self._operators[device.name].quick]
+        return (quick or [on_wire[0].name])[0], bare
+
+    def _operator_at(self, device: str) -> DeviceOperator:
+        if device not in self._operators:
+            raise NotOnThisBench(f"nobody here is at {device}")
+        return self._operators[device]
