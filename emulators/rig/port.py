@@ -33,6 +33,15 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     @property
+    def coming(self) -> bytes:
+        """What is on its way here and was not taken, as far as it is known to arrive."""
+        ...
+
+    def arrival_us(self, count: int) -> int:
+        """Return when so many bytes will have arrived, or when to look again; `NEVER` for none."""
+        ...
+
+    @property
     def lost(self) -> int:
         """Bytes that found a buffer full."""
         ...

@@ -76,6 +76,15 @@ class HostEnd:
         return self._end.idle_us
 
     @property
+    def coming(self) -> bytes:
+        """What is on its way here and was not taken, as far as it is known to arrive."""
+        return self._end.coming
+
+    def arrival_us(self, count: int) -> int:
+        """Return when so many bytes will have arrived, or when to look again; `NEVER` for none."""
+        return self._end.arrival_us(count)
+
+    @property
     def lost(self) -> int:
         """Bytes that found a buffer full."""
         return self._end.lost

@@ -87,11 +87,12 @@ class Rs485Line(Copyable):
         """The second end."""
         return self.ends[1]
 
-    def put(self, sender: Rs485End, start_us: int, data: bytes) -> int:
+    def put(self, sender: Rs485End, now_us: int, start_us: int, data: bytes) -> int:
         """Put bytes on the wires back to back; an end does so.
 
         Args:
             sender: the end.
+            now_us: the present.
             start_us: when the first begins.
             data: the bytes.
 
@@ -100,7 +101,7 @@ class Rs485Line(Copyable):
         """
         end_us = start_us + self.after(len(data))
         burst = _Burst(sender, start_us, end_us, bytearray(data))
-        self._air = [other for other in self._air if other.end_us > start_us]
+        self._air = [other for other in self._air if other.end_us > now_us]
         for other in self._air:
             if other.sender is not sender:
                 self._collide(burst, other)
@@ -127,7 +128,7 @@ class Rs485Line(Copyable):
                 begun = 1 + begun_us * self._baud // self._byte_cost if begun_us >= 0 else 0
                 del burst.data[begun:]
                 burst.end_us = burst.start_us + self.after(len(burst.data))
-                end_us = max(end_us, burst.end_us)
+                end_us = max(end_us, burst.end_us) if begun else end_us
         return end_us
 
     def after(self, count: int) -> int:
@@ -221,6 +222,15 @@ class Rs485End:
         """When the last byte that is on its way here will have arrived."""
         return max((burst.end_us for burst in self._inbox), default=NEVER)
 
+    @property
+    def coming(self) -> bytes:
+        """Nothing: what is on its way can still be garbled."""
+        return b""
+
+    def arrival_us(self, count: int) -> int:
+        """Return when to look again, `NEVER` if nothing is on its way."""
+        return self.due_us
+
     def room(self, now_us: int) -> int:
         """Return how many bytes `send` takes at `now_us` without loss."""
         return max(0, self._buffer_bytes - self.unsent(now_us))
@@ -253,7 +263,7 @@ class Rs485End:
         accepted = traffic[: self.room(now_us)]
         self.lost += len(traffic) - len(accepted)
         if accepted:
-            self._busy_us = self._line.put(self, max(now_us, self._busy_us), accepted)
+            self._busy_us = self._line.put(self, now_us, max(now_us, self._busy_us), accepted)
 
     def hear(self, burst: _Burst) -> None:
         """Have a burst on its way here."""

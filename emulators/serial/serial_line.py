@@ -64,6 +64,15 @@ class LineEnd:
         return self._in.last_us
 
     @property
+    def coming(self) -> bytes:
+        """What is on its way here and was not taken."""
+        return self._in.coming
+
+    def arrival_us(self, count: int) -> int:
+        """Return when so many bytes will have arrived, the last if fewer are on their way."""
+        return self._in.arrival_us(count)
+
+    @property
     def lost(self) -> int:
         """Bytes from the other end that found a buffer full."""
         return self._in.lost
@@ -150,6 +159,18 @@ class _Direction:
         self._note_due()
         self.lost += max(0, len(data) - self._buffer_bytes)
         return data[: self._buffer_bytes]
+
+    @property
+    def coming(self) -> bytes:
+        return b"".join(burst.data[burst.taken :] for burst in self._bursts)
+
+    def arrival_us(self, count: int) -> int:
+        for burst in self._bursts:
+            left = len(burst.data) - burst.taken
+            if count <= left:
+                return self._arrival_us(burst, burst.taken + count)
+            count -= left
+        return self.last_us
 
     def room(self, now_us: int) -> int:
         """Return what the sender's buffer takes; the receiver's may overflow later."""

@@ -56,6 +56,19 @@ class HostReceiver(Copyable):
             return self._uart.due_ps // PS_PER_US + 1
         return due_us
 
+    @property
+    def coming(self) -> bytes:
+        """What is on its way and was not taken, as far as it is known to arrive."""
+        return self._end.coming if self._uart is None else b""
+
+    def arrival_us(self, count: int) -> int:
+        """Return when so many characters will be there, or when to look again.
+
+        Args:
+            count: how many, at least 1.
+        """
+        return self._end.arrival_us(count) if self._uart is None else self.due_us
+
     def poll(self, now_us: int) -> bytes:
         """Take the characters that have been received.
 

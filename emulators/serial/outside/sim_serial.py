@@ -72,7 +72,7 @@ class SimSerial(SimPort):
     def in_waiting(self) -> int:
         """Bytes that have come and were not read."""
         side = self._side()
-        self._take()
+        self._receive(side)
         if not self._input:
             side.look()
         return len(self._input)
@@ -90,22 +90,53 @@ class SimSerial(SimPort):
             SerialException: the port is closed; nothing came for an hour, and there is no timeout.
         """
         side = self._side()
-        until_us, gap_us = side.deadline_us(self.timeout), NEVER
-        data = bytearray()
-        while not self._read_cancelled:
-            if new := self._take(max(0, size - len(data))):
-                data += new
-                gap_us = side.deadline_us(self.inter_byte_timeout or None)  # 0 is none
-            if len(data) >= size or side.rig.now_us >= min(until_us, gap_us) or not self.is_open:
-                break
-            side.wait(min(until_us, gap_us), self._input_due_us, self._reading_ended)
-        else:
-            self._read_cancelled = False
+        if 0 < size <= len(self._input) and not self._read_cancelled:
+            return self._take(size)
+        until_us = side.deadline_us(self.timeout)
+        data = self._read_by(side, size, until_us)
         if len(data) < size and side.rig.now_us >= until_us:
             side.give_up(self.timeout)
         if not data and self.timeout == 0:
             side.look()
+        return data
+
+    def _read_by(self, side: SerialSide, size: int, until_us: int) -> bytes:
+        """Read up to `size` bytes, and wait for them until a time."""
+        data, end_us = bytearray(), until_us
+        gap_s = self.inter_byte_timeout or None  # 0 is none
+        waits = not self._read_cancelled
+        while waits:
+            self._receive(side)
+            if new := self._take(max(0, size - len(data))):
+                data += new
+                end_us = min(until_us, side.deadline_us(gap_s)) if gap_s else until_us
+            if len(data) >= size or side.rig.now_us >= end_us:
+                return bytes(data)
+            if waits := not self._reading_ended():
+                wanted = 1 if gap_s else size - len(data)
+                side.wait(end_us, partial(side.receiver.arrival_us, wanted), self._reading_ended)
+        self._read_cancelled = False
         return bytes(data)
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """Read until a line ends; the timeout is that of each byte.
+
+        Args:
+            size: how many bytes at most; -1 for any number.
+        """
+        if size is not None and size >= 0:
+            return super().readline(size)
+        if not (byte := self.read(1)):
+            return b""
+        side = self._side()
+        self._input[:0] = byte
+        self._gather(side, LF, side.deadline_us(self.timeout))
+        if end := self._input.find(LF) + 1:
+            return self._take(end)
+        if self._reading_ended():
+            self._read_cancelled = False
+            return self._take(len(self._input))
+        return super().readline()
 
     def read_until(self, expected: bytes = LF, size: int | None = None) -> bytes:
         """Read until a sequence has come, or the timeout is over.
@@ -114,29 +145,41 @@ class SimSerial(SimPort):
             expected: the sequence.
             size: how many bytes at most.
         """
-        until_us = self._side().deadline_us(self.timeout)
-        data = bytearray()
-        while (byte := self.read(1)) and self.side is not None:
+        side = self._side()
+        until_us, data = side.deadline_us(self.timeout), bytearray()
+        while byte := self.read(1):
             data += byte
             full = size is not None and len(data) >= size
-            if data[-len(expected) :] == expected or full or self.side.rig.now_us >= until_us:
+            if data[-len(expected) :] == expected or full or side.rig.now_us >= until_us:
                 break
+            if size is None and not self._input:
+                self._gather(side, expected, until_us)
         return bytes(data)
 
     def cancel_read(self) -> None:
         """Let a `read` return that waits at present, or the next one; any thread may call it."""
         self._read_cancelled = self.is_open
 
-    def _input_due_us(self) -> int:
-        return self.side.receiver.due_us if self.side is not None else NEVER
-
     def _reading_ended(self) -> bool:
         return self._read_cancelled or not self.is_open
 
-    def _take(self, size: int = 0) -> bytes:
-        """Take what has come into the input buffer, and up to `size` bytes out of it."""
-        if self.side is not None and len(self._input) < INPUT_BYTES:
-            self._input += self.side.receiver.poll(self.side.rig.now_us)
+    def _gather(self, side: SerialSide, expected: bytes, until_us: int) -> None:
+        """Let all bytes come up to a sequence at once, if they are on their way and in time."""
+        coming = side.receiver.coming
+        if count := (self._input + coming).find(expected) + 1:
+            count += len(expected) - 1 - len(self._input)
+            if count > 0 and (at_us := side.receiver.arrival_us(count)) <= until_us:
+                side.wait(at_us, lambda: at_us, self._reading_ended)
+                self._receive(side)
+
+    def _receive(self, side: SerialSide) -> None:
+        """Take what has come into the input buffer, unless that is full."""
+        now_us = side.rig.now_us
+        if side.receiver.due_us <= now_us and len(self._input) < INPUT_BYTES:
+            self._input += side.receiver.poll(now_us)
+
+    def _take(self, size: int) -> bytes:
+        """Take bytes out of the input buffer."""
         taken = bytes(self._input[:size])
         del self._input[:size]
         return taken

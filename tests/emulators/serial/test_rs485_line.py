@@ -93,3 +93,31 @@ def test_when_it_is_polled_makes_no_difference(
 def test_a_line_that_cannot_be_is_refused(what: str) -> None:
     with pytest.raises(ValueError, match="at least 1, ends 2"):
         Rs485Line(**{what: 0})  # type: ignore[arg-type]
+
+
+def test_what_is_queued_does_not_hide_what_is_on_the_wires() -> None:
+    line = Rs485Line(baud=100_000)
+    line.a.send(0, b"aaaa")
+    line.a.send(100, b"bbbb")  # from 400 us on
+    line.b.send(200, b"\0")
+    assert line.b.poll(1_000) == b"aa\0abbbb"
+    assert (line.a.poll(1_000), line.collisions) == (b"\0", 1)
+
+
+def test_what_has_not_begun_can_be_dropped() -> None:
+    line = Rs485Line(baud=100_000, ends=3)
+    line.a.send(0, b"abcdef")
+    line.a.send(150, b"later")  # behind the others
+    assert (line.a.unsent(150), line.a.sent_us) == (10, 1_100)
+    line.a.drop_unsent(150)
+    assert (line.a.unsent(150), line.a.sent_us) == (1, 200)
+    line.a.send(150, b"x")
+    assert [end.poll(2_000) for end in line.ends] == [b"", b"abx", b"abx"]
+    line.a.drop_unsent(2_000)
+    assert line.a.unsent(2_000) == 0
+
+
+def test_what_is_on_its_way_is_not_known_for_it_can_be_garbled() -> None:
+    line = Rs485Line(baud=100_000)
+    line.a.send(0, b"ab")
+    assert (line.b.coming, line.b.arrival_us(2)) == (b"", 100)

@@ -171,3 +171,24 @@ def test_a_line_that_is_never_idle_keeps_its_times_and_little_of_what_passed(bau
         assert total == now_us * baud // 10_000_000
         assert line.b.due_us == -(-(total + 1) * 10_000_000 // baud)
     assert len(pickle.dumps(line)) < 2_000 + baud // gcd(baud, 10_000_000)
+
+
+def test_what_is_on_its_way_is_known() -> None:
+    line = SerialLine(baud=100_000)
+    line.a.send(0, b"ab")
+    line.a.send(1_000, b"cde")
+    assert (line.b.coming, line.b.poll(150), line.b.coming) == (b"abcde", b"a", b"bcde")
+    assert [line.b.arrival_us(count) for count in (1, 2, 4, 9)] == [200, 1_100, 1_300, 1_300]
+    assert line.b.poll(2_000) == b"bcde"
+    assert (line.b.coming, line.b.arrival_us(1)) == (b"", NEVER)
+
+
+def test_what_has_not_begun_can_be_dropped() -> None:
+    line = SerialLine(baud=100_000)
+    line.a.send(0, b"abcdef")
+    assert (line.a.unsent(150), line.a.sent_us) == (5, 600)
+    line.a.drop_unsent(150)
+    assert (line.a.unsent(150), line.a.sent_us, line.a.room(150)) == (1, 200, 4_095)
+    line.a.send(150, b"x")
+    line.a.drop_unsent(1_000)
+    assert (line.b.poll(1_000), line.a.unsent(1_000)) == (b"abx", 0)
