@@ -23,6 +23,7 @@ from tickrig.emulators.testing.report.bench_report import (
     RunEnvironment,
     SignalSeries,
     TestRecord,
+    merge_reports,
 )
 from tickrig.emulators.testing.report.page import html_page
 from tickrig.emulators.testing.report.report_json import from_json, to_json
@@ -275,6 +276,24 @@ def test_a_report_of_no_test_says_so() -> None:
     assert page.all("header")[0].by_class("verdict")[0].words == "No test was run."
     assert page.by_class("empty")[0].words == "No test was run."
     assert not page.all("table")
+
+
+def test_merged_runs_are_told_apart(real: BenchReport) -> None:
+    late = replace(real.tests[0], mode="real", outcome=Outcome.BLOCKED, reason="12 ms late")
+    pty = BenchReport("", (replace(RUN, mode="real"),), (late,))
+    page = parse_page(html_page(merge_reports([real, pty])))
+    assert "2 runs : virtual, real" in page.all("header")[0].words
+    blocked = page.all(id="look")[0].all("li")[-1]
+    assert blocked.words == "blocked test_a_pulled_bus_stops_the_chair real 12 ms late"
+    row = page.by_class("requirements")[0].all("tr")[2]
+    assert [cell.attributes["title"].rpartition(" ")[2] for cell in row.by_class("cell")] == [
+        "(virtual)",
+        "(virtual)",
+        "(real)",
+    ]
+    both = page.by_class("file")[0].by_class("test")[:2]
+    assert [test.by_class("mode")[0].text for test in both] == ["virtual", "real"]
+    assert both[1].by_class("facts")[0].all("a")[0].attributes["href"] == "#run-2"
 
 
 def test_equal_names_have_anchors_of_their_own() -> None:
