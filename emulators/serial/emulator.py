@@ -44,12 +44,14 @@ class LineSettings:
         faults: the wire faults that can be armed.
         splitter: makes what cuts one direction for the log, into lines unless given.
         wire: makes the line of a baud rate.
+        uart: whether the device has a UART; one behind USB understands a host of any setting.
     """
 
     baud: int = 115_200
     faults: Mapping[str, FaultType[bytes]] = field(default_factory=lambda: BYTE_FAULTS)
     splitter: Callable[[Mark], Splitter] | None = None
     wire: Callable[[int], ByteLine] = SerialLine
+    uart: bool = True
 
 
 class Emulator(RunningEmulator):

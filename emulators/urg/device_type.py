@@ -101,7 +101,7 @@ def _configure(urg: DeviceType, options: Mapping[str, Any], seed: int) -> Config
             serial=options["serial"], noise=options["noise"], seed=seed, scip=scip
         )
     world = _world(options["size"], options["walls"], options["posts"])
-    line = replace(urg.line, baud=options["baud"])
+    line = replace(urg.line, baud=options["baud"], uart=options["baud"] != USB_BAUD)
     urg = replace(urg, line=line, talk=partial(_talk, scip))
     return ConfiguredDevice(urg, Urg(parameters, world), config_to_trace(parameters, world))
 

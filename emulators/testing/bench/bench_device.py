@@ -168,6 +168,25 @@ class BenchDevice:
         """
         return self._mode.serial(self._wire(), options)
 
+    @property
+    def url(self) -> str:
+        """Where a program opens the serial line by itself, as long as the bench is open.
+
+        It is what `serial.serial_for_url` takes: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
+        """
+        address = self._mode.address(self._wire())
+        if not isinstance(address, str):
+            raise ValueError(f"{self._wire()} is a CAN bus, which has no URL: see bus_options")
+        return address
+
+    @property
+    def bus_options(self) -> dict[str, Any]:
+        """With what a program opens the CAN bus by itself: `can.Bus(**bench.bus_options)`."""
+        address = self._mode.address(self._wire())
+        if isinstance(address, str):
+            raise ValueError(f"{self._wire()} is a serial line, which has no bus: see url")
+        return dict(address)
+
     def can_bus(self, **options: Any) -> can.BusABC:
         """Open the CAN bus as a python-can bus.
 

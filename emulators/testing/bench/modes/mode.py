@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+Address = str | dict[str, Any]
+"""What `serial.serial_for_url` takes of a line, and by keyword `can.Bus` of a bus."""
+
 
 class BenchMode(Protocol):
     """Where the devices are, and how time passes.
@@ -107,6 +110,10 @@ class BenchMode(Protocol):
 
     def canopen_network(self, wire: str) -> canopen.Network:
         """Connect the canopen library to a bus."""
+        ...
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
         ...
 
     def journal(self) -> tuple[WireLine, ...]:

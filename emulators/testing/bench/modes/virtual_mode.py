@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.device.twin import twin
-from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
-from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
+from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
 
@@ -41,6 +40,7 @@ class VirtualMode(EmulatedMode):
 
     def __init__(self, rig: BenchRig) -> None:
         super().__init__(rig, EXACT)
+        self._doors = VirtualDoors(rig)
 
     @property
     def now_us(self) -> int:
@@ -71,33 +71,23 @@ class VirtualMode(EmulatedMode):
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a host: bytes on a serial line, frames on a bus."""
-        mount = self._rig.state.mounts[wire]
-        if isinstance(mount, BusMount):
-            return CanHost(self._rig.rig, mount.open_end())
-        return SimLink(self._rig.rig, mount.line.b)
+        return self._doors.link(wire)
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a serial line by pyserial."""
-        raise NotImplementedError
+        return self._doors.serial(wire, options)
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can."""
-        from tickrig.emulators.can.outside.interface import (  # noqa: PLC0415 - python-can is slow
-            CHANNELS,
-            TickrigBus,
-        )
-
-        name = f"bench-{id(self._rig)}-{wire}"
-        with CHANNELS.offer(name, self._rig.rig, bus_of(self._rig, wire).wire):
-            return TickrigBus(name, **options)
+        return self._doors.can_bus(wire, options)
 
     def canopen_network(self, wire: str) -> canopen.Network:
         """Connect the canopen library to a bus."""
-        from tickrig.emulators.can.outside.sim_network import (  # noqa: PLC0415 - canopen is slow
-            SimNetwork,
-        )
+        return self._doors.canopen_network(wire)
 
-        return SimNetwork(self._rig.rig, bus_of(self._rig, wire).open_end())
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        return self._doors.address(wire)
 
     def too_slow(self) -> str:
         """Say nothing: virtual time is always kept."""
@@ -109,11 +99,4 @@ class VirtualMode(EmulatedMode):
 
     def close(self) -> None:
         """Give everything back."""
-
-
-def bus_of(rig: BenchRig, wire: str) -> BusMount:
-    """Return a CAN bus; ValueError if it is a serial line."""
-    mount = rig.state.mounts[wire]
-    if isinstance(mount, LineMount):
-        raise ValueError(f"{wire} is a serial line, not a CAN bus")
-    return mount
+        self._doors.close()

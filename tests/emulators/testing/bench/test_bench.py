@@ -2,7 +2,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import can
 import pytest
+import serial
 
 from tickrig import Bench
 from tickrig.device import Rrc, make_epos, make_f_palette
@@ -179,3 +181,51 @@ def test_what_is_seen_is_looked_for_as_long_as_it_may_take() -> None:
         assert bench.observe("the RRC waits", lambda: bench.get("state") == "WaitPowerOn")
         assert not bench.observe("VR2 runs", lambda: bench.get("vr2_power") == 1, within="20ms")
         assert bench.tolerance.time_us == bench.tolerance.stick_pct == 0
+
+
+class OwnHost:
+    """Somebody's host: it knows pyserial, and gives up after a time-out inside a line."""
+
+    def __init__(self, port: serial.SerialBase) -> None:
+        self.port = port
+
+    def device(self) -> bytes:
+        self.port.write(b"device\n")
+        self.port.read_until(b"OK:device\n")
+        return bytes(self.port.readline())
+
+
+@pytest.mark.parametrize("mode", ["virtual", pytest.param("real", marks=pytest.mark.realtime)])
+def test_a_host_of_pyserial_is_given_a_port_or_opens_it_itself(mode: str) -> None:
+    with Bench(Rrc(), mode=mode) as bench:
+        port = bench.serial(timeout=1)
+        assert OwnHost(port).device() == b"RRC\n"
+        port.close()
+        with serial.serial_for_url(bench.url, 115_200, timeout=1) as own:
+            assert OwnHost(own).device() == b"RRC\n"
+
+
+def test_a_time_out_passes_in_the_time_of_the_bench() -> None:
+    with Bench(Rrc()) as bench:
+        bench.fault("cut")
+        assert OwnHost(bench.serial(timeout=0.25)).device() == b""
+        assert bench.now_us == 500_000
+
+
+@pytest.mark.parametrize("mode", ["virtual", pytest.param("real", marks=pytest.mark.realtime)])
+def test_a_master_of_python_can_opens_the_bus_itself(mode: str) -> None:
+    with Bench(make_f_palette(5), mode=mode) as bench, can.Bus(**bench.bus_options) as bus:
+        bus.send(can.Message(arbitration_id=0, data=b"\x81\x05", is_extended_id=False))
+        while (message := bus.recv(2)) is not None and message.arbitration_id != 0x705:
+            pass
+        assert message is not None
+        assert bytes(message.data) == b"\0"
+
+
+def test_two_benches_have_addresses_of_their_own() -> None:
+    with Bench(Rrc()) as first, Bench(Rrc()) as second:
+        assert (first.url, second.url) == ("tickrig://rrc", "tickrig://rrc-2")
+    with Bench(Rrc()) as third:
+        assert third.url == "tickrig://rrc"
+        with pytest.raises(ValueError, match="rrc is a serial line, which has no bus: see url"):
+            third.bus_options  # noqa: B018 - it is what is asked

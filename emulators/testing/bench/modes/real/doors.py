@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
 from tickrig.emulators.testing.bench.modes.real.watched_link import (
     LinkGone,
@@ -101,6 +102,14 @@ class Doors:
         network.NOTIFIER_CYCLE = NOTIFIER_S
         self._opened.callback(network.disconnect)
         return network.connect()
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself; see `BenchMode`."""
+        place = self._places[wire]
+        if isinstance(place, LinePlace):
+            return place.url
+        rate = {} if place.bit_rate is None else {"bitrate": place.bit_rate}
+        return {"interface": place.interface, "channel": place.channel, **rate, **place.options}
 
     def close(self) -> None:
         """Close what is still open."""

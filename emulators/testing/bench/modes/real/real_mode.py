@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
+from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.real.control_thread import ControlThread
 from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
@@ -195,6 +196,11 @@ class RealMode(EmulatedMode):
         network = self._doors.canopen_network(wire)
         self._begin()
         return network
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        self._begin()
+        return self._doors.address(wire)
 
     def too_slow(self) -> str:
         """Say why no failure is to be believed: real time was not kept; empty if it was."""

@@ -1,0 +1,119 @@
+"""The doors that hosts come in by in virtual time; waiting at any of them steps the rig."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.emulators.serial.outside.serial_side import SerialSide
+    from tickrig.host.links.link import Link
+
+
+class VirtualDoors:
+    """Opens doors for hosts; see `BenchMode`.
+
+    Args:
+        rig: the rig.
+    """
+
+    def __init__(self, rig: BenchRig) -> None:
+        self._rig, self._mounts = rig.rig, rig.state.mounts
+        self._sides: dict[str, SerialSide] = {}
+        self._addresses: dict[str, Address] = {}
+        self._offered = ExitStack()
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a link."""
+        mount = self._mounts[wire]
+        if isinstance(mount, BusMount):
+            return CanHost(self._rig, mount.open_end())
+        return SimLink(self._rig, mount.line.b)
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a line by pyserial."""
+        from tickrig.emulators.serial.outside.sim_serial import SimSerial  # noqa: PLC0415 - slow
+
+        return SimSerial(self._side(wire), **options)
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        from tickrig.emulators.can.outside.interface import TickrigBus  # noqa: PLC0415 - slow
+
+        self._bus(wire)
+        address = self.address(wire)
+        assert not isinstance(address, str)
+        return TickrigBus(address["channel"], **options)
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        from tickrig.emulators.can.outside.sim_network import SimNetwork  # noqa: PLC0415 - slow
+
+        return SimNetwork(self._rig, self._bus(wire).open_end())
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        if wire not in self._addresses:
+            self._addresses[wire] = self._offer(wire)
+        return self._addresses[wire]
+
+    def close(self) -> None:
+        """Offer nothing any more."""
+        self._offered.close()
+
+    def _offer(self, wire: str) -> Address:
+        """Offer a wire under a name that nobody else has."""
+        mount = self._mounts[wire]
+        if isinstance(mount, LineMount):
+            from tickrig.emulators.serial.outside.serial_ports import (  # noqa: PLC0415 - slow
+                SERIAL_PORTS,
+            )
+
+            name = _free(wire, SERIAL_PORTS.names)
+            self._offered.enter_context(SERIAL_PORTS.offer(name, self._side(wire)))
+            return f"tickrig://{name}"
+        from tickrig.emulators.can.outside.interface import CHANNELS  # noqa: PLC0415 - slow
+
+        name = _free(wire, CHANNELS.names)
+        self._offered.enter_context(CHANNELS.offer(name, self._rig, mount.wire))
+        return {"interface": "tickrig", "channel": name}
+
+    def _side(self, wire: str) -> SerialSide:
+        """Return the host's side of a line, where one host is at a time."""
+        from tickrig.emulators.serial.outside.serial_side import SerialSide  # noqa: PLC0415 - slow
+        from tickrig.wire.serial.uart import UartSetting  # noqa: PLC0415 - with it
+
+        mount = self._mounts[wire]
+        if isinstance(mount, BusMount):
+            raise ValueError(f"{wire} is a CAN bus, not a serial line")
+        if wire not in self._sides:
+            settings = mount.settings
+            device = UartSetting(settings.baud) if settings.uart else None
+            self._sides[wire] = SerialSide(self._rig, mount.line.b, device)
+        return self._sides[wire]
+
+    def _bus(self, wire: str) -> BusMount:
+        mount = self._mounts[wire]
+        if isinstance(mount, LineMount):
+            raise ValueError(f"{wire} is a serial line, not a CAN bus")
+        return mount
+
+
+def _free(name: str, taken: tuple[str, ...]) -> str:
+    """Return a name that is not taken: it itself, or with a number behind it.
+
+    >>> _free("rrc", ("rrc", "rrc-2"))
+    'rrc-3'
+    """
+    names = [name, *(f"{name}-{number}" for number in range(2, len(taken) + 3))]
+    return next(each for each in names if each not in taken)
