@@ -15,6 +15,7 @@ from tickrig.emulators.testing.bench.modes.hardware.door_journal import DoorJour
 from tickrig.emulators.testing.bench.modes.hardware.operators import Operators
 from tickrig.emulators.testing.bench.modes.hardware.places import places_of
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
+from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.real.doors import Doors
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
@@ -167,6 +168,10 @@ class HardwareMode:
     def canopen_network(self, wire: str) -> canopen.Network:
         """Connect the canopen library to a bus."""
         return self._doors.canopen_network(wire)
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        return self._doors.address(wire)
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return what passed the doors last, and what the operator did."""
