@@ -29,6 +29,7 @@ MOST = {
     "tickrig TAB": 12,
     "tickrig check --help": 14,
     "tickrig init --help": 14,
+    "tickrig run --help": 16,
     "tickrig ctl /nowhere TAB": 20,
     "tickrig demo fig120 -- TAB": 19,
     "tickrig replay TAB": 18,

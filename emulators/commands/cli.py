@@ -40,6 +40,10 @@ COMMANDS: Final = {
         f"{TESTING}.report_cli:report_command",
         "Make one HTML page of test runs that were kept as JSON.",
     ),
+    "run": (
+        f"{TESTING}.run_cli:run",
+        "Run the bench of a rig file: all its devices on one rig.",
+    ),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
         "Run RT components, and work with them while they run.",
@@ -57,6 +61,7 @@ def main() -> None:
     tickrig emu rrc --link /tmp/rrc               emulate a device
     tickrig init                                  write a rig file to begin with
     tickrig check rig.toml                        see what is wrong with a rig file
+    tickrig run rig.toml                          run the bench of a rig file
     tickrig new device lamp                       begin a device of your own
     tickrig compare run.trace                     compare a recording with the emulator
     tickrig record /dev/ttyUSB0 -o run.trace      record a real device and its host

@@ -79,6 +79,7 @@ class TraceRecorder(Copyable):
         self._forgetful = path is not None
         self._shared: tuple[_Ticks, ...] = ()
         self._ticks: list[Tick] = []
+        self._last_us = 0
 
     def device(self, name: str, device: Device[W]) -> TracedDevice[W]:
         """Return a device that is recorded, to be put on a rig instead of the one given.
@@ -115,7 +116,8 @@ class TraceRecorder(Copyable):
         return not self._forgetful
 
     def add(self, tick: Tick) -> None:
-        """Record what happened."""
+        """Record what happened; the run lasts at least as long."""
+        self._last_us = max(self._last_us, tick.at_us)
         if not self._forgetful:
             self._ticks.append(tick)
         elif self._file is not None:
@@ -131,7 +133,7 @@ class TraceRecorder(Copyable):
         for part in (*(part.ticks for part in self._shared), self._ticks):
             for tick in part:
                 yield from (record.encode() for record in tick.records())
-        yield BenchRecord(now_us, "", Mark.END).encode()
+        yield BenchRecord(max(now_us, self._last_us), "", Mark.END).encode()
 
     def save(self, path: Path, now_us: int) -> None:
         """Write what is in memory into a file.
@@ -151,7 +153,7 @@ class TraceRecorder(Copyable):
     def close(self, now_us: int) -> None:
         """Write into its file how long the run lasted, and close it."""
         if self._file is not None:
-            self._file.close(BenchRecord(now_us, "", Mark.END).encode())
+            self._file.close(BenchRecord(max(now_us, self._last_us), "", Mark.END).encode())
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state of a copy; what was recorded so far is shared."""

@@ -6,17 +6,17 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
+from typing import Any, Final, Self, TypeVar
 
-from tickrig.emulators.canopen.build import store_keeper
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
-from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
+from tickrig.emulators.testing.bench.bench_rig import Parts
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
-from tickrig.emulators.testing.bench.plan_parts import begin_faults, parts_of
+from tickrig.emulators.testing.bench.plan_parts import parts_of
+from tickrig.emulators.testing.bench.plan_rig import rig_of
 from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
 from tickrig.emulators.testing.bench.triggers import Condition
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
@@ -29,7 +29,6 @@ T = TypeVar("T")
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
-    from tickrig.emulators.testing.bench.modes.real.outside import Outside
 
 VIRTUAL: Final = "virtual"
 REAL: Final = "real"
@@ -305,24 +304,11 @@ def _never() -> bool:
 def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
     """Start emulated devices in virtual or in real time."""
     if mode == VIRTUAL:
-        return VirtualMode(_rig(parts, plan))
+        return VirtualMode(rig_of(parts, plan))
     if mode != REAL:
         raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
     from tickrig.emulators.testing.bench.modes.real.real_mode import (  # noqa: PLC0415 - POSIX
         RealMode,
     )
 
-    return RealMode.open(parts.mounts, plan.real, lambda outside: _rig(parts, plan, outside))
-
-
-def _rig(parts: Parts, plan: RigPlan, outside: Outside | None = None) -> BenchRig:
-    """Make a rig with all that a plan says of it."""
-    state = (
-        RigState(parts)
-        if outside is None
-        else RigState(parts, bridges=outside.bridges, clock=outside.clock)
-    )
-    begin_faults(plan, state)
-    for store in parts.stores:
-        state.rig.watchers.append(store_keeper(store))
-    return BenchRig("bench", state)
+    return RealMode.open(parts.mounts, plan.real, lambda outside: rig_of(parts, plan, outside))

@@ -150,6 +150,16 @@ def test_what_is_kept_in_memory_is_saved_as_a_file_would_have_it(tmp_path: Path)
     assert (tmp_path / "kept").read_bytes() == (tmp_path / "written").read_bytes()
 
 
+def test_a_run_is_never_shorter_than_what_is_in_it(tmp_path: Path) -> None:
+    kept, written = Bench(), Bench(tmp_path / "written")
+    for bench in (kept, written):
+        bench.recorder.wire_fault(5_000, "line", "cut")
+    written.recorder.close(4_999)
+    lines = (tmp_path / "written").read_text("ascii").splitlines()
+    assert lines == [*kept.recorder.lines(4_999)]
+    assert lines[-1] == "0.005000 ."
+
+
 def test_a_full_disk_ends_the_recording_with_one_warning(caplog: pytest.LogCaptureFixture) -> None:
     bench = Bench(Path("/dev/full"))
     bench.run(50_000)

@@ -1,0 +1,191 @@
+"""Run the bench of a rig file: at ptys, network doors and buses, or in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Final
+
+import click
+
+from tickrig.emulators.bench.running_emulator import RunningEmulator
+from tickrig.emulators.bench.transcript import STATE
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.emulated import read_signal
+from tickrig.emulators.scenario.player import Player
+from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
+from tickrig.emulators.serial.pty_port import PtyPort
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import PortGone
+from tickrig.emulators.testing.bench.journal import text_of
+from tickrig.emulators.testing.bench.modes.real.outside import Outside
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.emulators.testing.bench.plan_parts import parts_of
+from tickrig.emulators.testing.bench.plan_rig import rig_of
+from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.emulators.testing.rig_file.summary import device_text
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting, format_time
+
+ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
+NOWHERE: Final = "-"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchOptions(RunOptions):
+    """The command line.
+
+    Attributes:
+        virtual: in virtual time, as fast as it goes.
+        for_us: how long; None until somebody ends it.
+    """
+
+    virtual: bool = False
+    for_us: int | None = None
+
+
+class BenchRun(EmulatorRun):
+    """One run.
+
+    Args:
+        plan: what the rig file says.
+        options: the command line.
+    """
+
+    def __init__(self, plan: RigPlan, options: BenchOptions) -> None:
+        super().__init__(options, in_real_time=not options.virtual)
+        self._plan, self._options = plan, options
+        self._outside: Outside | None = None
+        self._mounts: list[Mount] = []
+        self._is_over = False
+
+    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
+        bench = rig_of(parts_of(self._plan), self._plan, keeps=False)
+        return bench, ScenarioParser(bench.device, bench.operator)
+
+    def _open(self, stack: ExitStack) -> BenchRig:
+        parts = parts_of(self._plan)
+        self._mounts = list(parts.mounts)
+        if not self._options.virtual:
+            self._outside = self._open_outside(stack)
+            self._clock = self._outside.clock
+        try:
+            return rig_of(parts, self._plan, self._outside, trace=self._options.trace, keeps=False)
+        except OSError as error:
+            refuse_path("trace", error)
+
+    def _open_outside(self, stack: ExitStack) -> Outside:
+        try:
+            outside = Outside(self._mounts, self._plan.real)
+        except PortGone as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            if error.filename is None:
+                raise Refused(str(error)) from None
+            refuse_path("link", error)
+        stack.callback(outside.close)
+        for mount in self._mounts:
+            for port in outside.ports.get(mount.name, ()):
+                if isinstance(mount, LineMount) and isinstance(port, PtyPort):
+                    port.watch_setting(mount.settings.baud, _setting_shown(mount))
+        return outside
+
+    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
+        options = self._options
+        if options.for_us is not None:
+            bench.event_queue.put(self, options.for_us, lambda now_us: self._end(bench))
+        if options.verbose:
+            everything = options.verbose > 1
+            bench.log.listeners.append(lambda line: _show(line, everything=everything))
+            bench.after_step.append(_StateWatch(bench, click.echo))
+        return None
+
+    def _go_on(self, bench: RunningEmulator) -> None:
+        super()._go_on(bench)
+        if self._is_over and self._options.for_us is not None:
+            bench.rig.run_to(self._options.for_us)  # with the ticks of that time
+
+    def _end(self, bench: RunningEmulator) -> None:
+        self._is_over = True
+        bench.stop()
+
+    def _greet(self, bench: RunningEmulator) -> None:
+        for line in columns(self._row(mount) for mount in self._mounts):
+            click.echo(line)
+        control = self._options.control
+        say(f"{self._plan.path} in real time. Ctrl-C ends.")
+        say(
+            f"  tickrig ctl {control} describe"
+            if control
+            else "Add --control PATH to press buttons and make faults."
+        )
+        for mount in self._mounts:
+            if isinstance(mount, BusMount) and self._place(mount) == NOWHERE:
+                say(ALONE.format(wire=mount.name))
+
+    def _row(self, mount: Mount) -> tuple[str, ...]:
+        """Return the name of a wire, where it is, what it is, and which devices are on it."""
+        devices = ", ".join(map(device_text, self._plan.devices_on(mount.name)))
+        if isinstance(mount, BusMount):
+            rate = f"{mount.wire.bit_rate} bit/s"
+        else:
+            rate = f"{mount.settings.baud} {self._plan.wires[mount.name].framing}"
+        return mount.name, self._place(mount), rate, devices
+
+    def _place(self, mount: Mount) -> str:
+        """Return where hosts find a wire."""
+        door = self._plan.real.doors.get(mount.name)
+        if isinstance(mount, BusMount):
+            bus = door.bus if door else None
+            return f"{bus.interface} {bus.channel or ''}".strip() if bus else NOWHERE
+        ports = self._outside.ports[mount.name] if self._outside else []
+        pty = door.link if door and door.link else None
+        return " ".join(
+            str(pty or port.path) if isinstance(port, PtyPort) else str(port.url) for port in ports
+        )
+
+
+def columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+    """Yield rows with their columns below each other.
+
+    >>> list(columns([("a", "bc"), ("def", "g")]))
+    ['a    bc', 'def  g']
+    """
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _setting_shown(mount: LineMount) -> Callable[[str], None]:
+    def show(setting: str) -> None:
+        say(f"{mount.name}: the host has set its port to {setting}, not {mount.settings.baud} 8N1.")
+
+    return show
+
+
+def _show(line: WireLine, *, everything: bool) -> None:
+    """Show what was done, and what passed if that is wanted too."""
+    if everything or line.mark is Mark.PHYSICAL:
+        click.echo(text_of([line]))
+
+
+class _StateWatch:
+    """Shows the state of each device now and whenever it changes."""
+
+    def __init__(self, bench: RunningEmulator, write: Callable[[str], None]) -> None:
+        self._device, self._write = bench.device, write
+        self._shown: dict[str, Setting] = dict.fromkeys(
+            (name for name in bench.device.outputs if name.rpartition("/")[2] == STATE), ""
+        )
+
+    def __call__(self, now_us: int) -> None:
+        """Show what has changed."""
+        for name, shown in self._shown.items():
+            if (value := read_signal(self._device, name)) != shown:
+                self._shown[name] = value
+                self._write(f"{format_time(now_us)} * {name} {value}")

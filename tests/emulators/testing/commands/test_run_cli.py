@@ -1,0 +1,167 @@
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tickrig.emulators.testing.commands.replay_cli import replay_command
+from tickrig.emulators.testing.commands.run_cli import run
+from tickrig.host.control.client import ControlClient
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rrc import RrcClient
+from tickrig.wire.rrc.replies import RrcEvent
+
+RIG = """\
+[device.vr2]
+type = "rrc"
+
+[device.lidar]
+type = "urg"
+config.room = "4,3"
+
+[device.left]
+type = "epos"
+node_id = 1
+[device.left.start]
+load_nm = { ramp = [0, 1], over = "1s" }
+
+[fault]
+vr2 = "cut@1s-2s"
+left = "shaft_blocked@1.5s"
+"""
+GROUP = "239.74.163.27"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.toml").write_text(RIG)
+    return tmp_path
+
+
+def tickrig_run(*words: str) -> tuple[int, str, str]:
+    result = CliRunner().invoke(run, words)
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.mark.usefixtures("folder")
+def test_in_virtual_time_it_runs_as_fast_as_it_goes_and_shows_events() -> None:
+    status, out, err = tickrig_run("rig.toml", "--virtual", "--for", "3s", "-v")
+    assert (status, err) == (0, "ran 3.000 s; vr2 lost: 0; lidar lost: 0; can lost: 0\n")
+    assert out.splitlines() == [
+        "0.001000 * vr2/state Off",
+        "0.001000 * left/state Pre-operational",
+        "0.010000 * vr2/state WaitPowerOn",
+        "1.000000 vr2 ! cut",
+        "1.500000 left ! shaft_blocked=1",
+        "2.000000 vr2 ! cut=0",
+    ]
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_passes_is_shown_if_that_is_wanted() -> None:
+    _, out, _ = tickrig_run("rig.toml", "--virtual", "--for", "20ms", "-vv")
+    assert "can < 701#00" in out
+    assert "vr2 < EV:Initialized" in out
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_trace_is_replayed(folder: Path) -> None:
+    words = ("rig.toml", "--virtual", "--for", "2s", "--trace")
+    assert tickrig_run(*words, "a.trace", "--fault", "lidar/motor_jammed@1s")[0] == 0
+    result = CliRunner().invoke(replay_command, ["a.trace"])
+    assert (result.exit_code, result.stdout.startswith("identical")) == (0, True)
+    tickrig_run(*words, "b.trace", "--fault", "lidar/motor_jammed@1s")
+    assert (folder / "a.trace").read_bytes() == (folder / "b.trace").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["rig.toml", "--virtual"], "Error: --virtual wants a time: --for 10s"),
+        (["rig.toml", "--virtual", "--for", "1s", "--control", "x"], "--control belongs to real"),
+        (["rig.toml", "--for", "x"], "--for 'x' is not a time"),
+        (["nowhere.toml"], "Error: file nowhere.toml: No such file or directory"),
+        (["wrong.toml"], "wrong.toml:2: device.a.type: no device 'rcr'; did you mean 'rrc'?"),
+        (["rig.toml", "--fault", "xyz"], "--fault: no fault 'xyz'"),
+        (["rig.toml", "--virtual", "--for", "1s", "--trace", "no/t"], "trace no/t: No such file"),
+        (["link.toml"], "Error: link no/pty: No such file or directory"),
+        (["bus.toml"], "Error: "),
+    ],
+)
+def test_what_cannot_be_is_told(folder: Path, words: list[str], complaint: str) -> None:
+    rrc = '[device.a]\ntype = "rrc"\n'
+    (folder / "wrong.toml").write_text(rrc.replace("rrc", "rcr"))
+    (folder / "link.toml").write_text(rrc + '[real.a]\nlink = "no/pty"\n')
+    node = '[device.a]\ntype = "epos"\n[real.can]\ninterface = "nonesuch"\n'
+    (folder / "bus.toml").write_text(node)
+    status, out, err = tickrig_run(*words)
+    assert (status, out, "Traceback" in err) == (2, "", False)
+    assert complaint in err
+    assert err.count("\n") == 1 or "Usage" in err
+
+
+def test_a_mistake_of_a_user_s_class_is_one_line(folder: Path) -> None:
+    (folder / "mine.py").write_text(
+        "from tickrig.device.canopen.device_rtc.component import CanopenComponent\n"
+        "class Mine(CanopenComponent):\n"
+        "    type_name = 'Mine'\n"
+        "    def on_initialize(self):\n"
+        "        raise KeyError('oops')\n"
+    )
+    (folder / "own.toml").write_text('[device.a]\ntype = "mine.py:Mine"\nnode_id = 5\n')
+    status, _, err = tickrig_run("own.toml", "--virtual", "--for", "1s")
+    assert (status, "Traceback" in err) == (2, False)
+
+
+@contextmanager
+def live(*words: str, lines: int) -> Iterator[tuple[subprocess.Popen[str], list[str]]]:
+    """Run a bench in a process of its own; yield it and the lines that say where it is."""
+    program = "from tickrig.emulators.testing.commands.run_cli import run; run()"
+    command = [sys.executable, "-c", program, *words]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process, [process.stdout.readline() for _ in range(lines)]
+        finally:
+            process.kill()
+
+
+@pytest.mark.realtime
+def test_in_real_time_hosts_find_all_devices(folder: Path) -> None:
+    real = '[real]\ncontrol = "rig.ctl"\nvr2 = { link = "vr2", serve = "socket://0" }\n'
+    real += f'can = {{ interface = "udp_multicast", channel = "{GROUP}" }}\n'
+    (folder / "rig.toml").write_text(RIG[: RIG.index("[fault]")] + real)
+    with live("rig.toml", lines=3) as (process, lines):
+        vr2, lidar, bus = (line.split() for line in lines)
+        assert vr2[:2] == ["vr2", "vr2"]
+        assert vr2[2].startswith("socket://127.0.0.1:")
+        assert bus == f"can udp_multicast {GROUP} 1000000 bit/s left (epos, node-ID 1)".split()
+        with ControlClient(folder / "rig.ctl") as control, RrcClient.open("vr2") as client:
+            control.request("press", name="vr2/power_button")
+            client.wait_for(RrcEvent.POWER_ON_SUCCESS, 10_000_000)
+        link = SerialLink(lidar[1], 115_200)
+        link.send(b"SCIP2.0\n")
+        assert link.receive(10_000_000).startswith(b"SCIP2.0")
+        link.close()
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    assert (process.returncode, "Traceback" in err) == (0, False)
+    assert "rig.toml in real time. Ctrl-C ends." in err
+    assert not (folder / "vr2").is_symlink()
+    assert not (folder / "rig.ctl").exists()
+
+
+@pytest.mark.realtime
+def test_in_real_time_it_ends_by_itself_if_it_shall(folder: Path) -> None:
+    with live("rig.toml", "--for", "100ms", lines=3) as (process, lines):
+        _, err = process.communicate(timeout=30)
+    assert lines[2].startswith("can    -")
+    assert (process.returncode, "can: no bus outside" in err) == (0, True)
