@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,10 +13,6 @@ from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
-from tickrig.emulators.testing.plugin.evidence.bench_evidence import (
-    BenchEvidence,
-    BenchWitness,
-)
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
 from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.health import Health
@@ -23,8 +20,15 @@ from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check
 from tickrig.emulators.testing.plugin.safe_state import SafeState, unsafe
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.plugin.time_of_test import guard
 from tickrig.emulators.testing.plugin.verdict import blocked, make_error
 from tickrig.host.cli.refused import Refused
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.plugin.evidence.bench_evidence import (
+        BenchEvidence,
+        BenchWitness,
+    )
 
 
 class BenchedTest:
@@ -44,7 +48,7 @@ class BenchedTest:
         not_kept: why other files were not, each in a line.
     """
 
-    def __init__(self, item: pytest.Item, wanted: Wanted, safe: SafeState) -> None:
+    def __init__(self, item: pytest.Function, wanted: Wanted, safe: SafeState) -> None:
         self.item, self.wanted, self._safe = item, wanted, safe
         self._settings = item.config.stash[SETTINGS]
         self.bench: Bench | None = None
@@ -72,6 +76,10 @@ class BenchedTest:
         with suppress(NotOnThisBench):
             self._health = bench._mode.act(Health)
         if self._settings.report:
+            from tickrig.emulators.testing.plugin.evidence.bench_evidence import (  # noqa: PLC0415
+                BenchWitness,
+            )
+
             self._witness = BenchWitness(bench)
         if self._settings.compare and bench.mode == VIRTUAL:
             self.fingerprint = bench._mode.act(Fingerprint)
@@ -103,9 +111,12 @@ class BenchedTest:
         names = function._fixtureinfo.argnames
         self.bench.run(function.obj(**{name: function.funcargs[name] for name in names}))
 
-    def check(self) -> None:
-        """Fail the test if it leaves its bench in a state in which none may be."""
+    @contextmanager
+    def judged(self) -> Iterator[None]:
+        """Fail the test if it looks at a wrong clock, or leaves its bench as none may be."""
         assert self.bench is not None
+        with guard(self.bench.mode, self.item.fixturenames, self._allowed):
+            yield
         complaints = self._health.complaints(self._allowed) if self._health else ()
         if found := [*complaints, *unsafe(self.bench, self._safe)]:
             text = "after the test the bench is not as it has to be:"

@@ -11,10 +11,12 @@ from tickrig.emulators.bench.names import known
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.health import ERRORS, LOST
 from tickrig.emulators.testing.plugin.settings import MODES
+from tickrig.emulators.testing.plugin.time_of_test import CLOCK
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
 
+ALLOWED: Final = (ERRORS, LOST, CLOCK)
 HAND: Final = "hand"
 OR: Final = " or "
 
@@ -33,8 +35,8 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
     """
     allowed = words_of(item, "allows")
     for word in allowed:
-        if word not in (ERRORS, LOST):
-            raise ValueError(f"allows({word!r}): it can allow {ERRORS!r} and {LOST!r}")
+        if word not in ALLOWED:
+            raise ValueError(f"allows({word!r}): it can allow {', '.join(map(repr, ALLOWED))}")
     return allowed
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
-from tickrig.emulators.testing.plugin.settings import Settings
+from tickrig.emulators.testing.plugin.settings import MODES, Settings
 
 
 def prepare(config: pytest.Config, settings: Settings) -> None:
@@ -18,23 +19,30 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
     if settings.rig_file and settings.ordered:
         from tickrig.emulators.testing.plugin.bench_source import plan_of  # noqa: PLC0415 - slow
 
-        try:
+        with _usage():
             plan_of(settings.rig_file)
-        except OSError as error:
-            raise pytest.UsageError(f"{settings.rig_file}: {error.strerror}") from None
-        except ValueError as error:
-            raise pytest.UsageError(str(error)) from None
     if settings.compare:
         from tickrig.emulators.testing.plugin.compare import Compare  # noqa: PLC0415 - asked for
 
-        if settings.modes != ("virtual",):
+        if settings.modes != MODES[:1]:
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
     if settings.report:
-        if settings.report.suffix != ".json" and find_spec("jinja2") is None:
-            raise pytest.UsageError("--bench-report needs Jinja2: pip install 'tickrig[report]'")
         from tickrig.emulators.testing.plugin.report_plugin import (  # noqa: PLC0415 - asked for
             ReportPlugin,
         )
+        from tickrig.emulators.testing.report.report_file import check_report  # noqa: PLC0415
 
+        with _usage():
+            check_report(settings.report)
         config.pluginmanager.register(ReportPlugin(config, settings), "tickrig-bench-report")
+
+
+@contextmanager
+def _usage() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise pytest.UsageError(f"{error.filename}: {error.strerror}") from None
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from None

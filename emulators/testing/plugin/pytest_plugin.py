@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from inspect import iscoroutinefunction
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
     "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
-    "allows(*what): what may have been on the bench though no fault ordered it: 'lost' for what "
-    "found a buffer full, 'error frames' (tickrig)",
+    "allows(*what): what may happen though no fault ordered it: 'lost' for what found a buffer "
+    "full, 'error frames', and 'clock' for looks at the machine's in virtual time (tickrig)",
     "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
 )
 
@@ -109,6 +109,15 @@ def bench(
         yield opened
 
 
+@pytest.fixture
+def bench_time(bench: Bench) -> Iterator[Any]:
+    """The clock of the bench: `time.sleep` and `time.monotonic` of hosts are on it, too."""
+    from tickrig.emulators.testing.plugin.time_of_test import time_of  # noqa: PLC0415 - asked for
+
+    with time_of(bench) as clock:
+        yield clock
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
     """Note requirements; skip a test whose fixtures its bench cannot give."""
@@ -121,11 +130,11 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
     """Skip a test that its bench cannot run; fail one that leaves its bench in a bad state."""
-    with skipped_where_it_cannot():
-        result = yield
-        if (test := item.stash.get(BENCHED, None)) is not None:
-            test.check()
-    return result
+    test = item.stash.get(BENCHED, None)
+    if test is None:
+        return (yield)
+    with skipped_where_it_cannot(), test.judged():
+        return (yield)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

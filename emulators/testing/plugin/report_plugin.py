@@ -20,13 +20,12 @@ from tickrig.emulators.testing.report.bench_report import (
     RunEnvironment,
     TestRecord,
 )
-from tickrig.emulators.testing.report.report_file import write_report, write_run
+from tickrig.emulators.testing.report.report_file import write_report
 from tickrig.emulators.testing.report.report_json import from_data, to_data
 
 RECORD: Final = "tickrig_record"
 """The attribute of the last report of a test that has its record as JSON."""
 
-JSON: Final = ".json"
 OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
 REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
 
@@ -70,10 +69,8 @@ class ReportPlugin:
         path = self._settings.report
         if path is None or hasattr(self._config, "workerinput"):
             return
-        write = write_run if path.suffix == JSON else write_report
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write(self._report(), path)
+            write_report(self._report(), path)
         except OSError as error:
             self._error = f"bench: {path} was not written: {error.strerror}"
             session.exitstatus = session.exitstatus or pytest.ExitCode.INTERNAL_ERROR

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import can
 import canopen
@@ -14,6 +15,8 @@ from tickrig.emulators.testing.plugin.evidence import journal_text
 from tickrig.host.monitor.decode import decoder
 
 Run = Callable[..., pytest.RunResult]
+
+SRC = Path(__file__).parents[4] / "src"
 
 IMPORTED_ONCE = (benched_test, journal_text, decoder, can, canopen, serial)
 """A run of its own forgets what it has imported, and what is imported twice has two classes."""
@@ -31,3 +34,17 @@ def run(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Run:
         return pytester.runpytest_inprocess(*given, plugins=[pytest_plugin])
 
     return run
+
+
+@pytest.fixture
+def run_apart(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run pytest with the plug-in and xdist in a process of its own, and with no other plug-in."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("PYTHONPATH", str(SRC))
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+
+    def run_apart(*options: str) -> pytest.RunResult:
+        plugins = ("-p", pytest_plugin.__name__, "-p", "xdist")
+        return pytester.runpytest_subprocess("--strict-markers", "-rA", *plugins, *options)
+
+    return run_apart

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 
 import pytest
 
@@ -103,7 +101,7 @@ def test_what_tests_share_is_given_back_after_the_last(pytester: pytest.Pytester
 
 
 def test_hashes_do_not_depend_on_workers_or_on_the_seed_of_hashes(
-    pytester: pytest.Pytester,
+    pytester: pytest.Pytester, run_apart: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile(
@@ -119,15 +117,8 @@ def test_hashes_do_not_depend_on_workers_or_on_the_seed_of_hashes(
     )
     hashes = set()
     for hash_seed, options in (("1", ("-n1",)), ("2", ())):
-        done = subprocess.run(
-            [sys.executable, "-m", "pytest", "-q", *PLUGIN, *options, "--bench-compare"],
-            env={"PYTHONHASHSEED": hash_seed, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        hashes |= set(re.findall("bench: 2 tests were the same in both runs; (.*)", done.stdout))
+        monkeypatch.setenv("PYTHONHASHSEED", hash_seed)
+        lines = run_apart(*options, "--bench-compare").outlines
+        (line,) = [line for line in lines if line.startswith("bench: 2 tests were the same")]
+        hashes.add(line)
     assert len(hashes) == 1
-
-
-PLUGIN = ("-p", "tickrig.emulators.testing.plugin.pytest_plugin", "-p", "xdist")

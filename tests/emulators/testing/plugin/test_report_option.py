@@ -78,17 +78,16 @@ def by_name(report: BenchReport) -> dict[str, TestRecord]:
     return {test.nodeid.partition("::")[2]: test for test in report.tests}
 
 
-@pytest.mark.parametrize("options", [(), ("-p", "xdist", "-n1")], ids=["alone", "in a worker"])
+@pytest.mark.parametrize("in_a_worker", [False, True])
 def test_a_report_tells_of_each_test_that_has_a_bench(
-    pytester: pytest.Pytester, run: Run, options: tuple[str, ...]
+    pytester: pytest.Pytester, run: Run, run_apart: Run, in_a_worker: bool
 ) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile(TESTS)
-    with_plugin = ("-p", "tickrig.emulators.testing.plugin.pytest_plugin") if options else ()
-    args = (*options, *with_plugin, "--bench-report", "out/run.json", "--bench-seed", "5")
-    result = pytester.runpytest_subprocess(*args) if options else run(*args)
-    result.stdout.fnmatch_lines(["bench: */out/run.json tells of 8 tests"])
-    report = read_run(pytester.path / "out" / "run.json")
+    options = ("--bench-report", "run.json", "--bench-seed", "5")
+    result = run_apart("-n1", *options) if in_a_worker else run(*options)
+    result.stdout.fnmatch_lines(["bench: */run.json tells of 8 tests"])
+    report = read_run(pytester.path / "run.json")
     tests = by_name(report)
     assert {name: test.outcome for name, test in tests.items()} == OUTCOMES
     assert [one.name for one in report.requirements] == ["SAF-1", "SAF-2", "SAF-3"]
