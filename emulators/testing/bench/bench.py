@@ -6,7 +6,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
