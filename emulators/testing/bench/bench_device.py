@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
@@ -131,6 +132,19 @@ class BenchDevice:
             NotOnThisBench: it has no switch.
         """
         self._mode.switch_power(self.name, on=True)
+
+    def perform(self, text: str, do: Callable[[], object]) -> None:
+        """Have something done that is more than one act, such as bringing the device off.
+
+        Args:
+            text: what, as `switch VR2 off, unless it is off`; a human is told so.
+            do: does it with an emulator; not called where a human does it.
+
+        Raises:
+            OperatorRefused: the human did not do it.
+            NotOnThisBench: it cannot be done.
+        """
+        self._mode.perform(self.name, text, do)
 
     def observe(self, text: str, seen: Condition, within: Duration = SOON) -> bool:
         """Look whether something is seen at the device: in an emulator, or by who sits there.

@@ -79,6 +79,10 @@ class EmulatedMode(ABC):
         """Say whether something is seen; False if it was not in time."""
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
+    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
+        """Do something that is more than one act."""
+        do()
+
     def switch_power(self, owner: str, *, on: bool) -> None:
         """Give or take the supply of a device, of all if it is empty."""
         for name in [owner] if owner else self.devices:

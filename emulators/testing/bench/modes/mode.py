@@ -86,6 +86,9 @@ class BenchMode(Protocol):
         """Say whether something is seen at a device, or by a human who is asked the text."""
         ...
 
+    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
+        """Have something done at a device: by the test itself, or by a human who is told."""
+
     def meanwhile(self, host: Callable[[int], object]) -> None:
         """Let a host go on, so many microseconds at a time, while a human is asked."""
 

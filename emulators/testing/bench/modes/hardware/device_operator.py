@@ -46,6 +46,10 @@ class DeviceOperator(Protocol):
         """Say whether something is seen; None if the device itself is to be asked."""
         ...
 
+    def have_done(self, text: str) -> bool:
+        """Have something done, told in words; False if nobody is here who understands them."""
+        ...
+
     def switch_power(self, *, on: bool) -> None:
         """Give or take the supply."""
 

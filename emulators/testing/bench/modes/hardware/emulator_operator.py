@@ -95,6 +95,10 @@ class EmulatorOperator:
         """The emulator is to be asked."""
         return None
 
+    def have_done(self, text: str) -> bool:
+        """Nobody understands it."""
+        return False
+
     def switch_power(self, *, on: bool) -> None:
         """Give or take the supply."""
         name = next((name for name in POWER if self._prefix + name in self._inputs), None)

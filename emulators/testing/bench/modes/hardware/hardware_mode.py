@@ -131,6 +131,11 @@ class HardwareMode:
             return answer
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
+    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
+        """Have something done that is more than one act."""
+        if not self._operators.have_done(owner, text):
+            do()
+
     def meanwhile(self, host: Callable[[int], object]) -> None:
         """Let a host go on while a human is asked."""
         self._terminal.hosts.append(host)

@@ -51,7 +51,7 @@ class HumanOperator:
         """Have an input set, or all inputs of a group, and held."""
         pairs = self._record.check_set(name, *values)
         wanted = [self._wish(self._physical.inputs.table[member], value) for member, value in pairs]
-        self._have_done(f"{' and '.join(wanted)}, and leave it so")
+        self.have_done(f"{' and '.join(wanted)}, and leave it so")
         self._record.set(name, *values)
 
     def get(self, name: str) -> Setting:
@@ -75,20 +75,20 @@ class HumanOperator:
         """Have a button pressed and let go."""
         text = self._physical.inputs.find(name, SignalType.BUTTON).text
         held = f", hold it for {duration_us / 1e6:g} s" if duration_us >= HOLD_US else ""
-        self._have_done(f"press the {text}{held} and let it go")
+        self.have_done(f"press the {text}{held} and let it go")
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
         """Have a physical fault made; NotOnThisBench for one of the wire, or of a certain time."""
         item = self._find_fault(spec.name)
         if (spec.rate, spec.from_us, spec.to_us, for_us) != (None, 0, NEVER, None):
             raise NotOnThisBench(f"no hand makes {spec.name} at a certain time")
-        self._have_done(f"make this fault: {item.text} ({item.name})")
+        self.have_done(f"make this fault: {item.text} ({item.name})")
         self._record.set(spec.name, 1)
 
     def clear(self, fault: str) -> None:
         """Have a physical fault mended."""
         item = self._find_fault(fault)
-        self._have_done(f"mend this fault: {item.text} ({item.name})")
+        self.have_done(f"mend this fault: {item.text} ({item.name})")
         self._record.set(fault, 0)
 
     def sees(self, text: str) -> bool | None:
@@ -97,18 +97,20 @@ class HumanOperator:
         self.said_no |= not seen
         return seen
 
+    def have_done(self, text: str) -> bool:
+        """Have something done, told in words."""
+        self._terminal.have_done(f"{self._device}: {text}")
+        return True
+
     def switch_power(self, *, on: bool) -> None:
         """Switch the device, or have it switched."""
         if self._power is not None:
             self._power.switch(on=on)
         else:
-            self._have_done(f"switch it {'on' if on else 'off'}")
+            self.have_done(f"switch it {'on' if on else 'off'}")
 
     def close(self) -> None:
         """Nothing is held."""
-
-    def _have_done(self, text: str) -> None:
-        self._terminal.have_done(f"{self._device}: {text}")
 
     def _find_fault(self, name: str) -> InputSignal:
         if name not in self._physical.inputs.table:

@@ -149,6 +149,14 @@ class Operators:
                 return answer
         return None
 
+    def have_done(self, owner: str, text: str) -> bool:
+        """Tell the human at a device, or the first that there is; False if there is none."""
+        for device in [owner] if owner else self._plan.devices:
+            if self._operator_at(device).have_done(text):
+                self._journal.note(device, f"done: {text}")
+                return True
+        return False
+
     def _operator_of(self, device: str) -> DeviceOperator:
         if path := self._where.control.get(device):
             return EmulatorOperator(path, self._plan.devices[device])

@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import select
-import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from typing import Final
+from typing import IO, Final
 
 from tickrig.emulators.testing.bench.errors import NotOnThisBench, OperatorRefused
 
+TERMINAL: Final = "/dev/tty"
 POLL_US: Final = 10_000
 DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 
 
 class Terminal:
-    """Asks at standard input and output; hosts go on meanwhile.
+    """Asks at the terminal of this process, whatever its standard input and output are.
+
+    So tests may run with both caught. Hosts go on meanwhile.
 
     Args:
-        opened: makes a context in which both are the terminal, where tests run with them caught.
+        path: of the terminal.
 
     Attributes:
         hosts: are called in turn with microseconds while an answer is awaited.
     """
 
-    def __init__(self, opened: Callable[[], AbstractContextManager[object]] = nullcontext) -> None:
-        self._opened = opened
+    def __init__(self, path: str = TERMINAL) -> None:
+        self._path = path
         self.hosts: list[Callable[[int], object]] = []
 
     def prompt(self, text: str) -> str:
@@ -34,16 +35,18 @@ class Terminal:
         Raises:
             OperatorRefused: nobody is there.
         """
-        with self._opened():
-            sys.stdout.write(f"\n{text} ")
-            sys.stdout.flush()
-            while not self._is_typed():
-                for host in self.hosts:
-                    host(POLL_US)
-            line = sys.stdin.readline()
+        try:
+            with open(self._path, "r+b", buffering=0) as terminal:
+                terminal.write(f"\n{text} ".encode())
+                while not self._is_typed(terminal):
+                    for host in self.hosts:
+                        host(POLL_US)
+                line = terminal.readline()
+        except OSError as error:
+            raise OperatorRefused(f"nobody is at the terminal ({error.strerror})") from None
         if not line:
             raise OperatorRefused("nobody is at the terminal (end of input)")
-        return line.strip()
+        return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
         """Ask for something to be done.
@@ -67,6 +70,6 @@ class Terminal:
             continue
         return answer == "y"
 
-    def _is_typed(self) -> bool:
+    def _is_typed(self, terminal: IO[bytes]) -> bool:
         wait_s = 0 if self.hosts else POLL_US / 1e6
-        return bool(select.select([sys.stdin], [], [], wait_s)[0])
+        return bool(select.select([terminal], [], [], wait_s)[0])

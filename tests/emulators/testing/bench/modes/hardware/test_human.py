@@ -15,6 +15,7 @@ from tickrig.emulators.testing.bench.errors import (
     OperatorRefused,
     PortGone,
 )
+from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.rig_file.plan import (
     HardwarePlan,
     PortPlan,
@@ -179,3 +180,17 @@ def test_an_emulator_that_is_not_there_is_told(tmp_path: Path) -> None:
     control = {"rrc": tmp_path / "ctl"}
     with pytest.raises(PortGone, match=r"rrc: no emulator at .*ctl: No such file"):
         bench_of(Answers(), HardwarePlan(control=control))
+
+
+def test_what_is_more_than_one_act_is_told_in_words() -> None:
+    human = Answers("")
+    bench = bench_of(human)
+    bench.perform("switch VR2 off, unless it is off", lambda: bench.press("power_button"))
+    assert human.asked == [f"rrc: switch VR2 off, unless it is off, {HOW}"]
+    assert "rrc ! done: switch VR2 off, unless it is off" in bench.transcript()
+
+
+def test_no_terminal_is_nobody_there(tmp_path: Path) -> None:
+    bench = Bench.of_plan(serial_plan(HardwarePlan()), "hardware", Terminal(str(tmp_path)))
+    with pytest.raises(OperatorRefused, match=r"nobody is at the terminal \(Is a directory\)"):
+        bench.press("power_button")

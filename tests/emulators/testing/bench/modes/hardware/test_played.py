@@ -47,6 +47,8 @@ def test_a_host_and_hands_at_an_rrc_in_another_process(bench: Bench) -> None:
         assert bench.wait_until(lambda: bench.get("state") == "Standby", within="8s")
         client.output(30, 0, confirm=True)
         assert bench.observe("VR2 drives", lambda: bench.get("out_v_pct") == 30)
+        bench.perform("hold the stick", lambda: bench.set("stick", 5, 5))
+        assert bench.get("stick_v_pct") == 5
         bench["rrc"].set("stick", 0, 0)
     assert "rrc > output1e00" in bench.transcript()
     assert "rrc < OK:output" in bench.transcript()

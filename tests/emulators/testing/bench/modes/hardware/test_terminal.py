@@ -16,6 +16,7 @@ from tickrig.host.control.client import ControlClient
 ROOT = Path(__file__).parents[6]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])}
 TIMEOUT_S = 30
+PLUGIN = "tickrig.emulators.testing.plugin.pytest_plugin"
 
 DRIVE = """
 import sys
@@ -88,4 +89,44 @@ def test_a_host_goes_on_while_its_operator_takes_his_time() -> None:
             assert control.request("get", names=["out_v_pct"])["values"] == {"out_v_pct": 30}
         terminal.sendline("y")
         terminal.expect_exact("answer: True")
+        terminal.expect(pexpect.EOF)
+
+
+RIG = """
+[device.rrc]
+type = "rrc"
+
+[hardware.rrc]
+port = "{port}"
+"""
+
+BODY = """
+from pathlib import Path
+
+import pytest
+
+@pytest.fixture
+def bench_config() -> Path:
+    return Path("rig.toml")
+
+def test_it_is_asked(bench) -> None:
+    print("caught")
+    bench.press("power_button")
+    assert bench.observe("the motors stand still", lambda: True)
+"""
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(("answer", "outcome"), [("y", "1 passed"), ("n", "1 failed")])
+def test_pytest_catches_no_question(tmp_path: Path, answer: str, outcome: str) -> None:
+    (tmp_path / "rig.toml").write_text(RIG.format(port=tmp_path / "tty"))
+    (tmp_path / "test_it.py").write_text(BODY)
+    words = ["-m", "pytest", "-q", "-p", PLUGIN, "--bench-mode", "hardware"]
+    alone = {**ENVIRONMENT, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    with pexpect.spawn(sys.executable, words, TIMEOUT_S, cwd=tmp_path, env=alone) as terminal:
+        terminal.expect_exact("press the power button of the controller and let it go, then")
+        terminal.sendline()
+        terminal.expect_exact("is it so? the motors stand still [y/n]")
+        terminal.sendline(answer)
+        terminal.expect_exact(outcome)
         terminal.expect(pexpect.EOF)
