@@ -6,6 +6,7 @@ import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from math import isfinite
 from typing import ClassVar, Final, NamedTuple
 
@@ -134,18 +135,18 @@ class SignalSeries:
     steps: bool = True
 
     def __post_init__(self) -> None:
-        """Know nothing where a number is none; ValueError if times run backwards."""
-        before_us = None
-        for at_us, value in self.points:
-            if before_us is not None and at_us < before_us:
+        """Take booleans as 0 and 1, NaN as unknown; ValueError if times run backwards."""
+        for (before_us, _), (at_us, _) in pairwise(self.points):
+            if at_us < before_us:
                 raise ValueError(f"{self.name}: {at_us} us comes after {before_us} us")
-            before_us = at_us
-            if isinstance(value, float) and not isfinite(value):
-                cleaned = tuple((at, _known(value)) for at, value in self.points)
-                object.__setattr__(self, "points", cleaned)
+        if any(_plain(value) is not value for _, value in self.points):
+            cleaned = tuple((at_us, _plain(value)) for at_us, value in self.points)
+            object.__setattr__(self, "points", cleaned)
 
 
-def _known(value: Value) -> Value:
+def _plain(value: Value) -> Value:
+    if isinstance(value, bool):
+        return int(value)
     return None if isinstance(value, float) and not isfinite(value) else value
 
 

@@ -130,6 +130,12 @@ def test_a_value_that_is_no_number_is_unknown() -> None:
     assert "NaN" not in to_json(replace(REPORT, tests=(replace(TEST, series=(series,)),)))
 
 
+def test_a_switch_is_a_number() -> None:
+    series = SignalSeries("on", points=((0, False), (1, True)))
+    assert [type(value) for _, value in series.points] == [int, int]
+    assert from_data(SignalSeries, to_data(series)) == series
+
+
 def test_reports_of_workers_become_one() -> None:
     others = replace(TEST, nodeid="other"), replace(TEST, nodeid="real", run=1)
     real = replace(RUN, mode="real")
