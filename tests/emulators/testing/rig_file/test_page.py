@@ -1,0 +1,55 @@
+"""docs/rig-file.md shows the keys as they are, and what it shows happens."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tickrig.emulators.commands.cli import main
+from tickrig.emulators.testing.rig_file.reader import parse_rig_file
+from tickrig.emulators.testing.rig_file.schema import PAGE, rows
+
+FILE = Path(__file__).parents[4] / "docs" / "rig-file.md"
+TEXT = FILE.read_text("utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"^```{kind}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", PAGE)
+def test_a_table_of_the_page_is_the_schema(name: str) -> None:
+    assert "\n".join(["", *rows(PAGE[name]), ""]) in TEXT
+
+
+@pytest.mark.parametrize("block", blocks("toml"))
+def test_an_example_is_right(block: str) -> None:
+    parse_rig_file(block, FILE)
+
+
+def run(line: str) -> str:
+    result = CliRunner().invoke(main, shlex.split(line.removeprefix("tickrig ")))
+    return result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("block", blocks("console"))
+def test_a_session_goes_as_shown(
+    block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for part in block.removeprefix("$ ").split("\n$ "):
+        line, _, shown = part.strip().partition("\n")
+        assert run(line).strip() == shown
+
+
+def test_the_mistakes_are_those_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (wrong,), (shown,) = blocks("toml mistakes"), blocks("text mistakes")
+    Path("bench.toml").write_text(wrong)
+    assert run("tickrig check bench.toml") == shown
