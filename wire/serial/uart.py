@@ -13,7 +13,7 @@ Parity = Literal["N", "E", "O", "M", "S"]
 """None, even, odd, mark (always 1), space (always 0)."""
 
 PS_PER_US: Final = 1_000_000
-PS_PER_S: Final = 1_000_000_000_000
+PS_PER_S: Final = 1_000_000 * PS_PER_US
 """Bits of a fast line are shorter than a microsecond: here, times are in picoseconds."""
 
 OVERSAMPLING: Final = 16
@@ -73,13 +73,13 @@ class UartSetting:
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
-        """Compute the bit behind the data bits of a character.
+        """Compute the bit behind the data bits of a character; the stop bit if there is none.
 
         Args:
             value: the character.
         """
         odd = value.bit_count() % 2
-        return {"E": odd, "O": 1 - odd, "M": 1, "S": 0, "N": 1}[self.parity]
+        return {"E": odd, "O": 1 - odd, "S": 0}.get(self.parity, 1)
 
     def bits(self, value: int) -> tuple[int, ...]:
         """Return start bit, data bits and parity bit of a character.
@@ -120,7 +120,7 @@ class Character:
     """
 
     value: int
-    end_ps: int = 0
+    end_ps: int
     framing_error: bool = False
     parity_error: bool = False
     line_break: bool = False
@@ -145,7 +145,7 @@ class UartReceiver:
     setting: UartSetting
     now_ps: int = 0
     _next: int = field(init=False)  # number of the next sample to be taken
-    _sampled: list[int] = field(init=False, default_factory=list)
+    _sampled: list[int] | None = field(init=False, default=None)  # of a character, from its edge
     _idle: bool = field(init=False, default=True)  # the line was 1, a 0 is a start bit
 
     def __post_init__(self) -> None:
@@ -155,7 +155,7 @@ class UartReceiver:
     @property
     def due_ps(self) -> int:
         """When the stop bit of the character that is being received is sampled, else `NEVER`."""
-        if not self._sampled:
+        if self._sampled is None:
             return NEVER
         left = self._frame_samples - len(self._sampled) - 1
         return self._time_of(self._next + left * OVERSAMPLING)
@@ -170,33 +170,32 @@ class UartReceiver:
         Yields:
             The characters that are complete.
         """
-        self.now_ps = max(self.now_ps, until_ps)
         end = self._sample_from(until_ps)
         while self._next < end:
-            if self._sampled:
-                yield from self._sample(level)
+            if self._sampled is not None:
+                yield from self._sample(self._sampled, level)
             elif level or not self._idle:
                 self._idle, self._next = bool(level), end
             else:
-                self._sampled.append(0)
+                self._sampled = []
                 self._next += MID_BIT
 
-    def _sample(self, level: int) -> Iterator[Character]:
+    def _sample(self, frame: list[int], level: int) -> Iterator[Character]:
         """Take the middle of a bit."""
-        taken, frame = self._next, self._sampled
+        taken = self._next
         frame.append(level)
         self._next += OVERSAMPLING
-        false_start = len(frame) == 2 and level
+        false_start = len(frame) == 1 and level
         if false_start or len(frame) == self._frame_samples:
             self._next = taken + 1
-            self._sampled, self._idle = [], bool(level)
+            self._sampled, self._idle = None, bool(level)
             if not false_start:
-                yield self._character(frame[2:], self._time_of(taken + MID_BIT))
+                yield self._character(frame[1:], self._time_of(taken + MID_BIT))
 
     @property
     def _frame_samples(self) -> int:
-        """Edge, start bit, data bits, parity bit, stop bit."""
-        return 3 + self.setting.data_bits + (self.setting.parity != "N")
+        """Start bit, data bits, parity bit, stop bit."""
+        return 2 + self.setting.data_bits + (self.setting.parity != "N")
 
     def _character(self, sampled: list[int], end_ps: int) -> Character:
         count = self.setting.data_bits

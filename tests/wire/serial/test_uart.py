@@ -50,6 +50,19 @@ def test_a_character_is_sent_the_lowest_bit_first(setting: UartSetting, bits: st
     assert sent == "0" + bits.replace(" ", "")
 
 
+def test_the_parity_bit_makes_the_ones_even_or_odd() -> None:
+    for value in EVERY_BYTE:
+        for parity, odd in (("E", 0), ("O", 1)):
+            setting = UartSetting(parity=parity)  # type: ignore[arg-type]
+            assert (value.bit_count() + setting.parity_bit(value)) % 2 == odd
+            assert setting.parity_bit(value) in (0, 1)
+    assert [UartSetting(parity=parity).parity_bit(1) for parity in PARITIES] == [1, 1, 0, 1, 0]
+
+
+def test_a_setting_is_written_as_people_do() -> None:
+    assert [str(UartSetting(1, 5, "M", 1.5)), str(UartSetting())] == ["1 5M1.5", "115200 8N1"]
+
+
 def test_a_line_has_the_levels_of_its_bits() -> None:
     setting = UartSetting(1_000_000, 5, "E", 2)
     levels = list(setting.levels(0b00001, 5_000_000))
@@ -99,12 +112,12 @@ def test_levels_may_come_in_any_pieces(
     sender: UartSetting, receiver: UartSetting, data: bytes, cuts: list[int]
 ) -> None:
     uart, pieces = UartReceiver(receiver), iter(cuts)
-    received, start_ps = list[Character](), 0
+    received, start_ps, now_ps = list[Character](), 0, 0
     for value in data:
         for level, until_ps in sender.levels(value, start_ps):
-            while (cut_ps := uart.now_ps + next(pieces, 10**13)) < until_ps:
-                received += uart.push(level, cut_ps)
-            received += uart.push(level, until_ps)
+            while (cut_ps := now_ps + next(pieces, 10**13)) < until_ps:
+                received += uart.push(level, now_ps := cut_ps)
+            received += uart.push(level, now_ps := until_ps)
         start_ps += sender.duration_ps()
     received += uart.push(1, start_ps + receiver.duration_ps(2))
     assert tuple(received) == sample(data, sender, receiver)
@@ -206,7 +219,9 @@ def test_due_is_when_the_stop_bit_is_sampled() -> None:
 def test_a_time_that_has_passed_is_looked_at_no_more() -> None:
     uart = UartReceiver(SLOW, now_ps=100_000_000)
     assert list(uart.push(0, 50_000_000)) == []
-    assert (uart.now_ps, uart.due_ps) == (100_000_000, NEVER)
+    assert uart.due_ps == NEVER
+    assert [got.value for got in uart.push(0, 101_000_000)] == []
+    assert uart.due_ps == 109_500_000
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
