@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
-from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
@@ -73,8 +72,7 @@ class BenchedTest:
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
-        with suppress(NotOnThisBench):
-            self._health = bench._mode.act(Health)
+        self._health = Health(bench)
         if self._settings.report:
             from tickrig.emulators.testing.plugin.evidence.bench_evidence import (  # noqa: PLC0415
                 BenchWitness,

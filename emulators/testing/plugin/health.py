@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
+from contextlib import suppress
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from tickrig.device.physical import SignalType
 from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.mounts import LineMount
+from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
@@ -26,22 +30,21 @@ class Health:
     before. A line on which no host spoke may overflow: nobody reads there.
 
     Args:
-        rig: of the bench.
+        bench: the bench. Of real devices only the error frames are known.
     """
 
-    def __init__(self, rig: BenchRig) -> None:
-        self._rig = rig
-        mounts = rig.state.mounts
-        self._buses = {name for name, on in mounts.items() if isinstance(on, BusMount)}
-        self._wires = set(mounts)
-        self._faults = frozenset(rig.state.assembly.inputs.names(SignalType.FAULT))
-        self._faulty = self._wires if rig.operator.active_faults else set[str]()
-        self._spoken = set(self._buses)
-        self._errors: dict[str, str] = {}
-        rig.journal.listeners.append(self._hear)
-        for mount in mounts.values():
-            if isinstance(mount, LineMount):
-                mount.tap.listeners.append(partial(self._pass, mount.name))
+    def __init__(self, bench: Bench) -> None:
+        self._mode = bench._mode
+        self._wires = frozenset(self._mode.wires)
+        self._buses = self._spoken = frozenset(buses_of(bench))
+        self._faulty, self._errors = frozenset[str](), dict[str, str]()
+        self._mode.hear(self._hear)
+        try:
+            self._mode.act(self._begin)
+        except NotOnThisBench:
+            signals: Mapping[str, Any] = bench.describe()
+            self._wire_faults = {fault["name"] for fault in signals["wire_faults"]}
+            self._faults = {one["name"] for one in signals["inputs"] if one["kind"] == "fault"}
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
         """Return what is wrong, each in a line; nothing if all is well.
@@ -49,21 +52,33 @@ class Health:
         Args:
             allowed: what may be nevertheless: `ERRORS`, `LOST`.
         """
-        errors = [] if ERRORS in allowed else self._errors.values()
-        mounts = {} if LOST in allowed else self._rig.state.mounts
-        lost = [
+        found = [] if ERRORS in allowed else list(self._errors.values())
+        with suppress(NotOnThisBench):
+            if LOST not in allowed:
+                found += self._mode.act(self._lost)
+            found += self._mode.act(_broken_off)
+        return tuple(found)
+
+    def _begin(self, rig: BenchRig) -> None:
+        self._wire_faults = set(rig.wire.fault_types)
+        self._faults = set(rig.state.assembly.inputs.names(SignalType.FAULT))
+        if rig.operator.active_faults:
+            self._faulty = self._wires
+        for mount in rig.state.mounts.values():
+            if isinstance(mount, LineMount):
+                mount.tap.listeners.append(partial(self._pass, mount.name))
+
+    def _lost(self, rig: BenchRig) -> list[str]:
+        return [
             f"{name}: {on.lost} {'frames' if name in self._buses else 'bytes'} found a buffer full"
-            for name, on in mounts.items()
+            for name, on in rig.state.mounts.items()
             if on.lost and name in self._spoken - self._faulty
         ]
-        recorder = self._rig.state.recorder
-        trace = [f"the trace: {recorder.error}"] if recorder and recorder.error else []
-        return (*errors, *lost, *trace)
 
     def _pass(self, wire: str, at_us: int, mark: Mark, data: bytes) -> None:
         """Note that a host spoke."""
         if mark is Mark.TO_DEVICE:
-            self._spoken.add(wire)
+            self._spoken |= {wire}
 
     def _hear(self, line: WireLine) -> None:
         if line.mark is Mark.PHYSICAL:
@@ -75,8 +90,8 @@ class Health:
         """Note that a fault came."""
         name = line.data.decode().partition("=")[0]
         names = {name, f"{line.source}/{name}"}
-        if line.source in self._wires and names & self._rig.wire.fault_types.keys():
-            self._faulty = self._faulty | {line.source}
+        if line.source in self._wires and names & self._wire_faults:
+            self._faulty |= {line.source}
         elif names & self._faults:
             self._faulty = self._wires
 
@@ -92,3 +107,9 @@ class Health:
             f"{line.source}: an error frame that no fault ordered, at "
             f"{format_time(line.at_us)} s: {describe_error_frame(frame)}"
         )
+
+
+def _broken_off(rig: BenchRig) -> list[str]:
+    """Return why the trace of a bench is not whole."""
+    recorder = rig.state.recorder
+    return [f"the trace: {recorder.error}"] if recorder and recorder.error else []

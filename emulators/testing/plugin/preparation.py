@@ -24,7 +24,7 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
     if settings.compare:
         from tickrig.emulators.testing.plugin.compare import Compare  # noqa: PLC0415 - asked for
 
-        if settings.modes != MODES[:1]:
+        if MODES[0] not in settings.modes:
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
     if settings.report:

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
 def buses_of(bench: Bench) -> tuple[str, ...]:
     """Return the names of its CAN buses."""
+    mode = bench._mode
     try:
-        mounts = bench._mode.act(lambda rig: rig.state.mounts)
+        mounts = mode.act(lambda rig: rig.state.mounts)
     except NotOnThisBench:
-        return ()
+        return tuple(wire for wire in mode.wires if isinstance(mode.address(wire), dict))
     return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
 
 
