@@ -21,6 +21,7 @@ class LogFormat(StrEnum):
     TRC = "trc"
     CSV = "csv"
     MF4 = "mf4"
+    TRACE = "trace"
 
 
 SUFFIXES: Final = {
@@ -33,6 +34,7 @@ SUFFIXES: Final = {
     ".trc": LogFormat.TRC,
     ".csv": LogFormat.CSV,
     ".mf4": LogFormat.MF4,
+    ".trace": LogFormat.TRACE,
 }
 
 COMPRESSED: Final = ".gz"

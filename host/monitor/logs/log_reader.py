@@ -200,6 +200,7 @@ READERS: Final = {
     LogFormat.BLF: (CAN_LOG, "CanLogReader"),
     LogFormat.TRC: (CAN_LOG, "CanLogReader"),
     LogFormat.MF4: (CAN_LOG, "CanLogReader"),
+    LogFormat.TRACE: ("tickrig.host.monitor.logs.trace_log", "TraceLogReader"),
 }
 """Module and class of the reader of each format."""
 

@@ -25,6 +25,7 @@ WRITERS: Final = {
     LogFormat.BLF: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.MF4: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.TRACE: ("tickrig.host.monitor.logs.trace_log", "TraceLogWriter"),
 }
 """Module and class of the writer of each format."""
 
