@@ -11,7 +11,7 @@ from tickrig.host.text.values import format_time
 SHOWN: Final = 20
 """So many differences are listed."""
 
-HEAD: Final = ("", "recorded", "emulated", "different", "latest")
+HEAD: Final = ("", "recorded", "emulated", "different", "worst")
 
 
 def report(
@@ -33,14 +33,12 @@ def report(
     listed = rows if everything else different[:SHOWN] if len(different) > 1 else []
     left = len(different) - len(listed) if listed and not everything else 0
     count = sum(pair.recorded is not None for _, pair in rows)
-    result = (
-        f"different: {len(different)} of {count} lines" if different else f"same: {count} lines"
-    )
+    result = f"different: {len(different)} of" if different else "same:"
     sections = (
         list(_first(file, *different[0])) if different else [],
         [_row(name, pair) for name, pair in listed] + [f"... and {left} more"] * bool(left),
         list(_table(pairs)),
-        [f"{result} lines, within {tolerance_us / 1_000:g} ms"],
+        [f"{result} {count} lines, within {tolerance_us / 1_000:g} ms"],
     )
     lines = [line for section in sections if section for line in ("", *section)]
     return lines[1:], not different

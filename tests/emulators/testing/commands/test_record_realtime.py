@@ -34,7 +34,7 @@ class Recorder:
     def __init__(self, port: str, out: Path, link: Path) -> None:
         self.out, self.link = out, link
         self._ended: tuple[int, str] | None = None
-        words = ["record", port, "--out", str(out), "--type", "rrc", "--link", str(link)]
+        words = ["record", port, *self.options(str(out), str(link))]
         self.process = subprocess.Popen(
             [sys.executable, "-c", PROGRAM, *words],
             stdin=subprocess.PIPE,
@@ -44,6 +44,11 @@ class Recorder:
         )
         assert self.process.stdout
         assert self.process.stdout.readline() == f"{link}\n"
+
+    @staticmethod
+    def options(out: str, link: str) -> list[str]:
+        """Return the options of the command."""
+        return ["--out", out, "--type", "rrc", "--link", link]
 
     def type(self, line: str) -> None:
         assert self.process.stdin
