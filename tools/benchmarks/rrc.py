@@ -8,6 +8,8 @@ from benchmarks.table import rates
 from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.rrc.commands import Output, StableMode, Status
@@ -39,6 +41,7 @@ def run(seconds: float) -> None:
     bare()
     idle()
     client()
+    pyserial_host()
 
 
 def streaming() -> None:
@@ -91,3 +94,18 @@ def client() -> None:
             client.output(number % 100, 0)
 
     rates("RrcClient.output with its OK, virtual time", calls, "calls/s", work)
+
+
+def pyserial_host() -> None:
+    """Let a host with pyserial ask for the version, and read its two lines."""
+    bench = Bench()
+    port = SimSerial(SerialSide(bench.rig, bench.line.b), timeout=0.5)
+    calls = 2_000
+
+    def work() -> None:
+        for _ in range(calls):
+            port.write(b"version\n")
+            assert port.readline() == b"OK:version\n"
+            assert port.readline() == b"Version 1.0\n"
+
+    rates("a command and two readline of pyserial, virtual time", calls, "calls/s", work)
