@@ -193,10 +193,9 @@ class _Direction:
 
     def _forget_taken(self, burst: _Burst) -> None:
         """Drop what was taken of a burst that goes on for long, without moving a time."""
-        if burst.taken >= self._buffer_bytes:
-            count = burst.taken - burst.taken % self._whole_bytes
-            burst.data, burst.taken = burst.data[count:], burst.taken - count
-            burst.start_us += count * self._byte_cost // self._baud
+        count = burst.taken - burst.taken % self._whole_bytes
+        burst.data, burst.taken = burst.data[count:], burst.taken - count
+        burst.start_us += count * self._byte_cost // self._baud
 
     def _arrived(self, burst: _Burst, now_us: int) -> int:
         return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)
