@@ -22,7 +22,7 @@ class RigPassing:
     Args:
         rig: stepped while somebody waits.
         deliver: called between its steps; hands hosts what has arrived, as a thread of theirs
-            would do: `partial(network.run_for, 0)` of a `SimNetwork`.
+            would do: `network.deliver` of a `SimNetwork`.
     """
 
     def __init__(self, rig: Rig, deliver: Sequence[Callable[[], None]] = ()) -> None:

@@ -8,7 +8,6 @@ import select
 import threading
 import time
 from collections.abc import Iterator
-from functools import partial
 from types import ModuleType
 
 import pytest
@@ -246,7 +245,7 @@ def test_a_network_hands_out_while_its_host_sleeps() -> None:
     bench = SimBench()
     seen: list[int] = []
     bench.network.subscribe(0x705, lambda can_id, data, stamp: seen.append(data[0]))
-    for passing in (bench.network, RigPassing(bench.rig, [partial(bench.network.run_for, 0)])):
+    for passing in (bench.network, RigPassing(bench.rig, [bench.network.deliver])):
         bench.slave.reset()
         bench.network.nmt.state = "OPERATIONAL"
         with patched_time(passing):
