@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Coroutine
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -247,6 +249,21 @@ class Bench(BenchDevice):
             host: is called again and again with microseconds, as `client.run_for`.
         """
         self._mode.meanwhile(host)
+
+    def patched_time(self) -> AbstractContextManager[Any]:
+        """Let hosts live in the time of the bench that call `time.sleep` or `time.monotonic`.
+
+        In virtual time, from `with` to its end, `time.sleep`, `monotonic`, `time` and
+        `perf_counter`, `wait` of threading's events and conditions, `get` and `put` of queues
+        make the time of the bench pass, wherever the code of a host has kept them (docs/hosts.md).
+        In real time they do so anyway.
+
+        Returns:
+            A context manager; it gives the clock, with the functions of `time`.
+        """
+        if isinstance(self._mode, VirtualMode):
+            return self._mode.patched_time()
+        return nullcontext(time)
 
     def transcript(self) -> str:
         """Return the latest lines and frames, and what was done: time, where, direction, text."""

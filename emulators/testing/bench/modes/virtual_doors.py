@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,9 @@ class VirtualDoors:
 
     Args:
         rig: the rig.
+
+    Attributes:
+        deliver: called between steps while a host sleeps; hands hosts what has arrived.
     """
 
     def __init__(self, rig: BenchRig) -> None:
@@ -32,6 +36,7 @@ class VirtualDoors:
         self._sides: dict[str, SerialSide] = {}
         self._addresses: dict[str, Address] = {}
         self._offered = ExitStack()
+        self.deliver: list[Callable[[], None]] = []
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a link."""
@@ -59,7 +64,9 @@ class VirtualDoors:
         """Connect the canopen library to a bus."""
         from tickrig.emulators.can.outside.sim_network import SimNetwork  # noqa: PLC0415 - slow
 
-        return SimNetwork(self._rig, self._bus(wire).open_end())
+        network = SimNetwork(self._rig, self._bus(wire).open_end())
+        self.deliver.append(network.deliver)
+        return network
 
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.device.twin import twin
@@ -10,6 +11,7 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
+from tickrig.emulators.testing.host_clock.rig_passing import RigPassing
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
 
@@ -88,6 +90,14 @@ class VirtualMode(EmulatedMode):
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""
         return self._doors.address(wire)
+
+    def patched_time(self) -> AbstractContextManager[object]:
+        """Let hosts that look at a clock live in the rig's time; see `patched_time`."""
+        from tickrig.emulators.testing.host_clock.patched_time import (  # noqa: PLC0415 - seldom
+            patched_time,
+        )
+
+        return patched_time(RigPassing(self._rig.rig, self._doors.deliver))
 
     def too_slow(self) -> str:
         """Say nothing: virtual time is always kept."""
