@@ -22,11 +22,12 @@ class Switch:
 
     Attributes:
         original: the other one.
+        act: what hosts find.
         on: whether it is in use; where somebody has kept it, it is the original afterwards.
     """
 
     def __init__(self, original: Callable[..., Any], act: Act) -> None:
-        self.original, self.on, self._act = original, True, act
+        self.original, self.on, self.act = original, True, act
         self.__name__, self.__doc__ = original.__name__, original.__doc__
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -34,7 +35,7 @@ class Switch:
         frame = sys._getframe(1)
         name = frame.f_globals.get("__name__") or ""
         if self.on and is_host(name, frame.f_code.co_filename):
-            return self._act(self.original, frame, *args, **kwargs)
+            return self.act(self.original, frame, *args, **kwargs)
         return self.original(*args, **kwargs)
 
 

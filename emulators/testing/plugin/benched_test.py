@@ -113,7 +113,7 @@ class BenchedTest:
     def judged(self) -> Iterator[None]:
         """Fail the test if it looks at a wrong clock, or leaves its bench as none may be."""
         assert self.bench is not None
-        with guard(self.bench.mode, self.item.fixturenames, self._allowed):
+        with guard(self.bench.mode, self._allowed):
             yield
         complaints = self._health.complaints(self._allowed) if self._health else ()
         if found := [*complaints, *unsafe(self.bench, self._safe)]:

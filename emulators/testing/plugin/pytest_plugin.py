@@ -112,9 +112,7 @@ def bench(
 @pytest.fixture
 def bench_time(bench: Bench) -> Iterator[Any]:
     """The clock of the bench: `time.sleep` and `time.monotonic` of hosts are on it, too."""
-    from tickrig.emulators.testing.plugin.time_of_test import time_of  # noqa: PLC0415 - asked for
-
-    with time_of(bench) as clock:
+    with bench.patched_time() as clock:
         yield clock
 
 

@@ -80,6 +80,8 @@ def test_within_patched_time_all_is_well() -> None:
     bench = RrcBench()
     with unpatched_time_fails(), patched_time(bench.passing):
         assert Host(bench.port).rest(2.0) > 1.9
+    with patched_time(bench.passing), unpatched_time_fails():
+        assert Host(bench.port).rest(2.0) > 1.9
 
 
 def test_behind_patched_time_it_is_refused_again() -> None:
