@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
@@ -16,8 +17,10 @@ from tickrig.emulators.testing.bench.modes.hardware.operators import Operators
 from tickrig.emulators.testing.bench.modes.hardware.places import places_of
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.real.doors import Doors
+from tickrig.emulators.testing.bench.modes.real.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.triggers import Condition
@@ -71,7 +74,12 @@ class HardwareMode:
         mounts = self._like.state.mounts
         places = places_of(plan, self._where, mounts)
         self._doors = Doors(places, lambda wire: self._journal.watch(mounts[wire], self._pace))
+        self._waits = CpuWaits()
         self._operators = Operators(plan, self._where, self._like, self._terminal, self._journal)
+        self._stack = ExitStack()
+        self._stack.enter_context(keeping_time())
+        for close in (self._operators.close, self._doors.close):
+            self._stack.callback(close)
 
     @property
     def devices(self) -> tuple[str, ...]:
@@ -186,7 +194,8 @@ class HardwareMode:
         """Say why no failure is to be believed; empty if one is, or a human has said no."""
         if self._operators.said_no:
             return ""
-        return too_slow(host=self._pace.late_us, emulator=self._operators.late_us)
+        host_us = max(self._pace.late_us, self._waits.worst_us)
+        return too_slow(host=host_us, emulator=self._operators.late_us)
 
     def act(self, action: Callable[[BenchRig], T]) -> NoReturn:
         """Refuse: there is no rig."""
@@ -198,11 +207,11 @@ class HardwareMode:
 
     def close(self) -> None:
         """Close all ports, and let the operator go."""
-        self._doors.close()
-        self._operators.close()
+        self._stack.close()
 
     def _look(self) -> None:
         """Do what has waited for a condition that is true now."""
+        self._waits.look(self.now_us)
         if self._looking:
             return
         self._looking = True

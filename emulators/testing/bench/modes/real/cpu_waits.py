@@ -12,6 +12,9 @@ TASKS: Final = Path("/proc/self/task")
 LOOK_US: Final = 10_000
 """Waits are added up over at least so long; sleepers wait a little each time they wake."""
 
+LONG_US: Final = 20 * LOOK_US
+"""In a longer time many short waits add up to what a late thread has."""
+
 
 class CpuWaits:
     """The longest wait that came on in a short time; none where the system does not count.
@@ -21,23 +24,27 @@ class CpuWaits:
 
     Args:
         tasks: the folder of the threads.
+        spares_looker: the thread that looks is not looked at: it knows how late it is.
 
     Attributes:
         worst_us: the longest so far, in about `LOOK_US`.
     """
 
-    def __init__(self, tasks: Path = TASKS) -> None:
-        self._tasks, self.worst_us = tasks, 0
+    def __init__(self, tasks: Path = TASKS, *, spares_looker: bool = False) -> None:
+        self._tasks, self._spares_looker, self.worst_us = tasks, spares_looker, 0
         self._waited_ns: dict[str, int] = {}
-        self._next_us, self._own = 0, ""
+        self._seen_us, self._own = -LOOK_US, ""
 
     def look(self, now_us: int) -> None:
-        """Look at all threads but the one that looked first, unless that was a moment ago."""
-        if now_us < self._next_us:
+        """Look at all threads, unless that was a moment ago; what was long ago says nothing."""
+        passed_us, before = now_us - self._seen_us, self._waited_ns
+        if passed_us < LOOK_US:
             return
-        self._own = self._own or str(threading.get_native_id())
-        self._next_us = now_us + LOOK_US
-        before, self._waited_ns = self._waited_ns, self._read()
+        if self._spares_looker and not self._own:
+            self._own = str(threading.get_native_id())
+        self._seen_us, self._waited_ns = now_us, self._read()
+        if passed_us > LONG_US:
+            return
         for thread, waited_ns in self._waited_ns.items():
             longer_us = (waited_ns - before.get(thread, waited_ns)) // 1_000
             self.worst_us = max(self.worst_us, longer_us)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -17,6 +16,7 @@ from tickrig.emulators.testing.bench.modes.real.control_thread import ControlThr
 from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.real.doors import Doors
+from tickrig.emulators.testing.bench.modes.real.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
 from tickrig.emulators.testing.bench.modes.real.outside import Outside
 from tickrig.emulators.testing.bench.modes.real.rig_thread import RigThread
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
-SWITCH_S: Final = 0.0005
-"""A thread that computes lets the rig come to its turn after this time (Python: 5 ms)."""
 
 
 class HostInCondition(BaseException):
@@ -72,7 +70,7 @@ class RealMode(EmulatedMode):
         self._clock, self._stack = outside.clock, ExitStack()
         self._begun = self._judging = False
         self._thread = RigThread(rig, outside.clock)
-        self._pace, self._waits = _Watch(self._thread), CpuWaits()
+        self._pace, self._waits = _Watch(self._thread), CpuWaits(spares_looker=True)
         self._doors = Doors(outside.places, lambda wire: self._pace)
         rig.rig.watchers.append(self._waits.look)
         self._watch_settings(outside)
@@ -169,8 +167,7 @@ class RealMode(EmulatedMode):
         """Let time pass from now on."""
         if not self._begun:
             self._begun = True
-            self._stack.callback(sys.setswitchinterval, sys.getswitchinterval())
-            sys.setswitchinterval(SWITCH_S)
+            self._stack.enter_context(keeping_time())
             self._thread.start()
 
     def link(self, wire: str) -> Link[Any]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -27,11 +29,22 @@ from tickrig.emulators.testing.rig_file.plan import (
 HOW = "then press Enter (n: not done, c: cannot be done):"
 
 
-def bench_of(terminal: Answers, hardware: HardwarePlan | None = None) -> Bench:
-    return Bench.of_plan(serial_plan(hardware or HardwarePlan()), "hardware", terminal)
+BenchOf = Callable[..., Bench]
 
 
-def test_a_button_is_pressed_by_the_words_of_its_table() -> None:
+@pytest.fixture
+def bench_of() -> Iterator[BenchOf]:
+    """Opens a bench of an RRC with a human at the terminal."""
+    with ExitStack() as stack:
+
+        def bench_of(terminal: Terminal, hardware: HardwarePlan | None = None) -> Bench:
+            plan = serial_plan(hardware or HardwarePlan())
+            return stack.enter_context(Bench.of_plan(plan, "hardware", terminal))
+
+        yield bench_of
+
+
+def test_a_button_is_pressed_by_the_words_of_its_table(bench_of: BenchOf) -> None:
     human = Answers("", "")
     bench = bench_of(human)
     bench.press("power_button")
@@ -43,7 +56,7 @@ def test_a_button_is_pressed_by_the_words_of_its_table() -> None:
     assert "rrc ! power_button pressed for 0.1 s" in bench.transcript()
 
 
-def test_a_group_is_set_at_once_and_remembered() -> None:
+def test_a_group_is_set_at_once_and_remembered(bench_of: BenchOf) -> None:
     human = Answers("")
     bench = bench_of(human)
     bench.set("stick", 100, -20)
@@ -54,7 +67,7 @@ def test_a_group_is_set_at_once_and_remembered() -> None:
     assert "rrc ! stick=100 -20" in bench.transcript()
 
 
-def test_an_output_is_asked_for_until_it_is_a_number() -> None:
+def test_an_output_is_asked_for_until_it_is_a_number(bench_of: BenchOf) -> None:
     human = Answers("", "fast", "30", "Output")
     bench = bench_of(human)
     assert bench.get("out_v_pct") == 30
@@ -62,7 +75,7 @@ def test_an_output_is_asked_for_until_it_is_a_number() -> None:
     assert human.asked[2] == "rrc: what is out_v_pct now in %? (translation to the power module)"
 
 
-def test_a_fault_that_a_hand_can_make_is_made_and_mended() -> None:
+def test_a_fault_that_a_hand_can_make_is_made_and_mended(bench_of: BenchOf) -> None:
     human = Answers("", "")
     bench = bench_of(human)
     bench.fault("bus_unplugged")
@@ -83,22 +96,24 @@ def test_a_fault_that_a_hand_can_make_is_made_and_mended() -> None:
         ("bus_unplugged", {"when": lambda: True}, "the moment that something is so"),
     ],
 )
-def test_what_no_hand_can_do_is_told(spec: str, options: dict[str, str], text: str) -> None:
+def test_what_no_hand_can_do_is_told(
+    bench_of: BenchOf, spec: str, options: dict[str, str], text: str
+) -> None:
     with pytest.raises(NotOnThisBench, match=text):
-        bench_of(Answers()).fault(spec, **options)  # type: ignore[arg-type]  # as they come
+        bench_of(Answers()).fault(spec, **options)
 
 
-def test_what_a_human_cannot_do_is_not_on_this_bench() -> None:
+def test_what_a_human_cannot_do_is_not_on_this_bench(bench_of: BenchOf) -> None:
     with pytest.raises(NotOnThisBench, match="cannot do this: rrc: make this fault: noise on"):
         bench_of(Answers("what?", "c")).fault("bus_noise")
 
 
-def test_who_says_no_has_refused() -> None:
+def test_who_says_no_has_refused(bench_of: BenchOf) -> None:
     with pytest.raises(OperatorRefused, match="did not do this: rrc: press the power button"):
         bench_of(Answers("N")).press("power_button")
 
 
-def test_what_is_seen_counts_however_late_the_machine_was() -> None:
+def test_what_is_seen_counts_however_late_the_machine_was(bench_of: BenchOf) -> None:
     human = Answers("maybe", "y", "n")
     bench = bench_of(human)
     assert bench.observe("the motors drive forward at 30 %", lambda: False)
@@ -113,7 +128,7 @@ def test_what_is_seen_counts_however_late_the_machine_was() -> None:
     assert "rrc ! not seen: the motors stand still" in bench.transcript()
 
 
-def test_power_is_switched_by_hand_or_by_command(tmp_path: Path) -> None:
+def test_power_is_switched_by_hand_or_by_command(bench_of: BenchOf, tmp_path: Path) -> None:
     human = Answers("")
     bench = bench_of(human)
     bench.switch_off()
@@ -142,12 +157,12 @@ def test_power_is_switched_by_hand_or_by_command(tmp_path: Path) -> None:
         (lambda bench: bench.can_bus(), "nobody has said where rrc is"),
     ],
 )
-def test_what_cannot_be_is_told(act, text: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_cannot_be_is_told(bench_of: BenchOf, act, text: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises((ValueError, NotOnThisBench), match=text):
         act(bench_of(Answers()))
 
 
-def test_what_real_devices_cannot_do_is_told() -> None:
+def test_what_real_devices_cannot_do_is_told(bench_of: BenchOf) -> None:
     bench = bench_of(Answers())
     with pytest.raises(NotOnThisBench, match="real devices have no twins"):
         bench.fork()
@@ -157,7 +172,7 @@ def test_what_real_devices_cannot_do_is_told() -> None:
     assert "power_button" in names
 
 
-def test_a_rig_file_says_what_is_still_right() -> None:
+def test_a_rig_file_says_what_is_still_right(bench_of: BenchOf) -> None:
     tolerance = Tolerances(stick_pct=7, time_us=20_000, values={"gauge": 1})
     assert bench_of(Answers(), HardwarePlan(tolerance=tolerance)).tolerance is tolerance
 
@@ -167,7 +182,7 @@ def test_a_rig_file_without_hardware_is_told() -> None:
         Bench.of_plan(RigPlan(), "hardware")
 
 
-def test_a_port_that_is_not_there_says_nothing_of_the_device() -> None:
+def test_a_port_that_is_not_there_says_nothing_of_the_device(bench_of: BenchOf) -> None:
     ports = {"rrc": PortPlan(port="/dev/no-such-port")}
     with bench_of(Answers(), HardwarePlan(ports=ports)) as bench:
         with pytest.raises(PortGone, match="'/dev/no-such-port': No such file or directory"):
@@ -176,13 +191,13 @@ def test_a_port_that_is_not_there_says_nothing_of_the_device() -> None:
             bench.serial()
 
 
-def test_an_emulator_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_an_emulator_that_is_not_there_is_told(bench_of: BenchOf, tmp_path: Path) -> None:
     control = {"rrc": tmp_path / "ctl"}
     with pytest.raises(PortGone, match=r"rrc: no emulator at .*ctl: No such file"):
         bench_of(Answers(), HardwarePlan(control=control))
 
 
-def test_what_is_more_than_one_act_is_told_in_words() -> None:
+def test_what_is_more_than_one_act_is_told_in_words(bench_of: BenchOf) -> None:
     human = Answers("")
     bench = bench_of(human)
     bench.perform("switch VR2 off, unless it is off", lambda: bench.press("power_button"))
@@ -190,7 +205,7 @@ def test_what_is_more_than_one_act_is_told_in_words() -> None:
     assert "rrc ! done: switch VR2 off, unless it is off" in bench.transcript()
 
 
-def test_no_terminal_is_nobody_there(tmp_path: Path) -> None:
-    bench = Bench.of_plan(serial_plan(HardwarePlan()), "hardware", Terminal(str(tmp_path)))
+def test_no_terminal_is_nobody_there(bench_of: BenchOf, tmp_path: Path) -> None:
+    bench = bench_of(Terminal(str(tmp_path)))
     with pytest.raises(OperatorRefused, match=r"nobody is at the terminal \(Is a directory\)"):
         bench.press("power_button")
