@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -97,7 +98,7 @@ def test_a_fault_that_a_hand_can_make_is_made_and_mended(bench_of: BenchOf) -> N
     ],
 )
 def test_what_no_hand_can_do_is_told(
-    bench_of: BenchOf, spec: str, options: dict[str, str], text: str
+    bench_of: BenchOf, spec: str, options: dict[str, Any], text: str
 ) -> None:
     with pytest.raises(NotOnThisBench, match=text):
         bench_of(Answers()).fault(spec, **options)
