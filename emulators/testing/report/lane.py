@@ -19,6 +19,8 @@ MOST_POINTS: Final = 800
 """Of a curve; more cannot be seen."""
 MOST_WORDS: Final = 200
 WORD_CHARACTERS: Final = 80
+CURVE_PX: Final = 64
+SWITCH_PX: Final = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,7 @@ class Lane:
         words: its values, if they are words, or its only number.
         low: its least number,
         high: its greatest one.
+        scale: the numbers at the lower and the upper edge of the field.
         zero: how far from the top zero is, in per cent; None if it is at an edge or outside.
         rows: what a table tells: first, least, greatest and last value, number of samples.
     """
@@ -50,6 +53,11 @@ class Lane:
     def constant(self) -> bool:
         """It never changed."""
         return not self.path and len(self.words) == 1
+
+    @property
+    def height(self) -> int:
+        """How high its picture is, in pixels; switches need little."""
+        return SWITCH_PX if self.scale == (0, 1) else CURVE_PX
 
 
 def lane_of(series: SignalSeries, axis: Axis) -> Lane:
