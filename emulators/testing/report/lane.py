@@ -21,6 +21,8 @@ MOST_WORDS: Final = 200
 WORD_CHARACTERS: Final = 80
 CURVE_PX: Final = 64
 SWITCH_PX: Final = 32
+SWITCH: Final[tuple[float, float]] = (0, 1)
+"""The scale of what is on or off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,7 @@ class Lane:
     @property
     def height(self) -> int:
         """How high its picture is, in pixels; switches need little."""
-        return SWITCH_PX if self.scale == (0, 1) else CURVE_PX
+        return SWITCH_PX if self.scale == SWITCH else CURVE_PX
 
 
 def lane_of(series: SignalSeries, axis: Axis) -> Lane:

@@ -1,4 +1,4 @@
-"""The page docs/report.md: its program and its commands, in the order in which they stand."""
+"""The page docs/report.md: its programs and its commands, in the order in which they stand."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.emulators.testing.report.html_tree import parse_page
+from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.report.html_tree import Element, parse_page
 from tickrig.emulators.commands.cli import main
+from tickrig.emulators.testing.plugin import pytest_plugin
+
+pytest_plugins = ("pytester",)
 
 TEXT = (Path(__file__).parents[4] / "docs" / "report.md").read_text("utf-8")
 
@@ -19,25 +23,53 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
 
 
-def test_the_program_keeps_a_run_and_the_commands_make_its_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+COMMANDS = [
+    *(line[2:] for block in blocks("console") for line in block.splitlines()),
+    *re.findall(r"pytest [\w. -]+", "".join(blocks("yaml"))),
+]
+
+
+def run_tickrig(*words: str) -> None:
+    result = CliRunner().invoke(main, words)
+    assert (result.exit_code, result.stdout) == (0, ""), result.output
+
+
+def page() -> Element:
+    return parse_page(Path("bench.html").read_text("utf-8"))
+
+
+@pytest.fixture
+def run_pytest(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run pytest with the plug-in of the tree and no other."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
+    return lambda *words: pytester.runpytest_inprocess(*words, plugins=[pytest_plugin])
+
+
+@pytest.mark.realtime
+def test_the_commands_make_the_pages(pytester: pytest.Pytester, run_pytest: Run) -> None:
+    pytester.makepyfile(test_chair=blocks("python")[0])
+    pytester.makeini("[pytest]")
+    heads = []
+    for line in COMMANDS:
+        program, *words = shlex.split(line)
+        if program == "pytest":
+            run_pytest(*words).assert_outcomes(passed=1)
+        else:
+            run_tickrig(*words)
+        heads.append(page().all("header")[0].words)
+    counts = [re.findall(r"[0-9]+ \w+ of [0-9]+ tests?", head) for head in heads]
+    one, two = ["1 passed of 1 test"], ["2 passed of 2 tests"]
+    assert counts == [one, one, one, one, two, one, one]
+    assert "Wheelchair, release 2" in heads[4]
+
+
+def test_the_program_keeps_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (program,) = blocks("python")
-    exec(compile(program, "docs/report.md", "exec"), {})
-    Path("real.json").write_bytes(Path("virtual.json").read_bytes())
-    lines = [line for block in blocks("console") for line in block.splitlines()]
-    lines += [
-        f"$ {line}" for line in re.findall(r"tickrig report [\w. -]+", "".join(blocks("yaml")))
-    ]
-    assert len(lines) == 4
-    for line in lines:
-        words = shlex.split(line.removeprefix("$ tickrig "))
-        result = CliRunner().invoke(main, words)
-        assert (result.exit_code, result.stdout) == (0, ""), result.output
-        page = parse_page(Path("bench.html").read_text("utf-8"))
-        assert "passed" in page.all("header")[0].words
-        assert page.by_class("requirements")[0].all("tr")[1].words.startswith("SAF-12 A pulled bus")
+    exec(compile(blocks("python")[1], "docs/report.md", "exec"), {})
+    run_tickrig("report", "mine.json", "-o", "bench.html")
+    (row,) = page().by_class("requirements")[0].all("tr")[1:]
+    assert row.words.startswith("SAF-12 A pulled bus stops the chair within 200 ms shown 1 of 1")
 
 
 def test_each_named_test_is_there() -> None:
