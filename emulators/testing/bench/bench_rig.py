@@ -99,10 +99,11 @@ class RigState(Copyable):
         self.recorder = (
             TraceRecorder(trace, header_of(mounts, parts.seed)) if trace or keeps else None
         )
+        self.drivers = self._drivers(parts)
         self.rig = Rig(
             *(station for mount in mounts for station in mount.stations(self.recorder)),
             bridges=bridges,
-            couplings=(*parts.bodies, *self._drivers(parts)),
+            couplings=(*parts.bodies, *self.drivers),
             clock=clock,
         )
         self._start(parts.start)  # it is recorded too

@@ -57,6 +57,7 @@ class Health:
             if LOST not in allowed:
                 found += self._mode.act(self._lost)
             found += self._mode.act(_broken_off)
+            found += self._mode.act(_without_value)
         return tuple(found)
 
     def _begin(self, rig: BenchRig) -> None:
@@ -107,6 +108,12 @@ class Health:
             f"{line.source}: an error frame that no fault ordered, at "
             f"{format_time(line.at_us)} s: {describe_error_frame(frame)}"
         )
+
+
+def _without_value(rig: BenchRig) -> list[str]:
+    """Return the signals of the rig file that could not set their inputs."""
+    problems = [driver.problems for driver in rig.state.drivers]
+    return [f"signal {line}" for each in problems for line in each.values()]
 
 
 def _broken_off(rig: BenchRig) -> list[str]:

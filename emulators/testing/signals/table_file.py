@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.record.replay import read_recording
+from tickrig.emulators.record.bench_replay import read_bench_recording
 from tickrig.emulators.testing.signals.fields import number
 from tickrig.host.text.trace import Mark
 
@@ -66,13 +66,21 @@ def _read_trace(path: Path, column: str | None) -> Points:
     """Return the changes of an input in a trace; it has no value before the first of them."""
     if column is None:
         raise ValueError("column is missing: the name of an input")
-    records = read_recording(path.read_bytes()).records
-    changes = [(r.at_us, *r.change) for r in records if r.mark is Mark.PHYSICAL]
-    return [
-        (at_us, float(value))
-        for at_us, name, value in changes
-        if name == column and not isinstance(value, str)
+    records = read_bench_recording(path.read_bytes()).records
+    changes = [
+        (record, *record.change)
+        for record in records
+        if record.mark is Mark.PHYSICAL and record.change
     ]
+    found = [
+        (record.at_us, record.name, value)
+        for record, name, value in changes
+        if column in (name, f"{record.name}/{name}")
+    ]
+    if len(devices := {device for _, device, _ in found}) > 1:
+        names = ", ".join(f"{device}/{column}" for device in sorted(devices))
+        raise ValueError(f"column {column!r} is not of one device: name one of {names}")
+    return [(at_us, float(value)) for at_us, _, value in found if not isinstance(value, str)]
 
 
 def _read_log(path: Path, column: str | None) -> Points:

@@ -226,3 +226,14 @@ def test_outputs_are_safe_after_a_test(
     result.assert_outcomes(passed=not said, failed=bool(said))
     if said:
         result.stdout.fnmatch_lines(["after the test the bench is not as it has to be:", said])
+
+
+def test_a_signal_without_a_value_fails_the_test(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makefile(
+        ".toml",
+        rig='[device.chair]\ntype = "rrc"\nstart.gauge = {formula = "sqrt(2 - t)"}\n',
+    )
+    pytester.makepyfile("def test_it(bench):\n    bench.run_for('3s')\n")
+    result = run("--bench", "rig.toml")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*signal chair/gauge: nan is no value at 2.010000 s"])

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from tests.emulators.testing.signals.signal_bench import signals_of
+from tickrig import open_bench
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.models.epos import make_epos
@@ -51,11 +52,16 @@ class Example:
             for name, value in each["start"].items()
         }
         self.driver = SignalDriver(signals_of({**plan["signal"], **driven}, RIGS), self.devices)
+        self.plan = plan
         self.watch = Watch(self.devices)
         self.rig = Rig(
             *(Station(node, node.port) for node in nodes.values()),
             couplings=[self.driver, self.watch],
         )
+
+    def driven(self, device: str) -> list[str]:
+        """Return which inputs of a device have signals."""
+        return list(self.plan["device"][device]["start"])
 
 
 class Watch:
@@ -75,6 +81,18 @@ class Watch:
 def test_it_needs_few_lines(name: str) -> None:
     text = Example(name).text
     assert len(text.splitlines()) <= 25
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_bench_does_the_same(name: str) -> None:
+    example = Example(name)
+    with open_bench(RIGS / f"{name}.toml") as bench:
+        for _ in range(4):
+            example.rig.run_for(700_000)
+            bench.run_for("700ms")
+            for key, device in example.devices.items():
+                inputs = {one: device.inputs[one] for one in example.driven(key)}
+                assert inputs == {one: bench[key].get(one) for one in inputs}
 
 
 def held(samples: list[tuple[int, float]], every_us: int, until_us: int) -> Iterator[float]:

@@ -17,6 +17,16 @@ TRACE = """\
 2.000000 ! gauge=4
 3.000000 .
 """
+BENCH_TRACE = """\
+# tickrig-trace v2 {"wires": {"bus": {"type": "can"}}, "devices": {\
+"left": {"wire": "bus", "type": "epos", "node_id": 2}, \
+"right": {"wire": "bus", "type": "epos", "node_id": 3}}}
+0.001000 left < 702#00
+0.400000 left ! supply_v=23.5
+0.500000 right ! supply_v=20
+0.600000 right ! 0x6064=7
+1.000000 .
+"""
 
 
 @pytest.mark.parametrize(
@@ -28,6 +38,9 @@ TRACE = """\
         ("a.csv", "\ufefft_us\tv\n5\t1e3\n", "", (((5, 1000.0),), True)),
         ("a.log", LOG, 'column="181[2:4]s"', (((0, -2.0), (1_250_000, 1000.0)), True)),
         ("a.trace", TRACE, 'column="gauge"', (((10_000, 9.0), (2_000_000, 4.0)), False)),
+        ("a.trace", TRACE, 'column="rrc/stick_v_pct"', (((500_000, 3.0),), False)),
+        ("a.trace", BENCH_TRACE, 'column="left/supply_v"', (((400_000, 23.5),), False)),
+        ("a.trace", BENCH_TRACE, 'column="0x6064"', (((600_000, 7.0),), False)),
     ],
 )
 def test_a_column_of_a_file(
@@ -63,6 +76,13 @@ def test_a_column_of_a_file(
         ("a.log", LOG, "", "{path}: column is missing: bits of a frame, as 181[2:6]s*0.001"),
         ("a.log", LOG, 'column="183[0]"', "{path} has no value of 183[0]"),
         ("a.trace", TRACE, "", "{path}: column is missing: the name of an input"),
+        (
+            "a.trace",
+            BENCH_TRACE,
+            'column="supply_v"',
+            "{path}: column 'supply_v' is not of one device: name one of left/supply_v,"
+            " right/supply_v",
+        ),
         (
             "a.trace",
             "noise",
