@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
     "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
+    "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
     "allows(*what): what may happen though no fault ordered it: 'lost' for what found a buffer "
     "full, 'error frames', and 'clock' for looks at the machine's in virtual time (tickrig)",
-    "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
 )
 
 OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
