@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from tickrig.host.text.log import log_of
 
 _logger = log_of(__name__)
+
+BINARY: Final[int] = getattr(os, "O_BINARY", 0)
+"""Windows would write CR LF."""
 
 
 class LineFile:
@@ -29,7 +33,7 @@ class LineFile:
     """
 
     def __init__(self, path: Path, first: str, running: str = "the emulator") -> None:
-        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o666)
         self._path, self._running = path, running
         self.error = ""
         self.write([first])

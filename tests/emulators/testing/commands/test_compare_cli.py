@@ -17,12 +17,18 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.commands.cli import main
+from tickrig.emulators.commands.device_config import configure
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rrc.cli import main as rrc_emu
+from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.recording_link import RecordingLink
+from tickrig.host.text.byte_text import escape, unescape
 from tickrig.wire.can import CanFrame
+from tickrig.wire.modbus.rtu import encode_frame
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import LiteFrame
 
 
 def compared(path: Path, *words: str) -> Result:
@@ -137,6 +143,43 @@ def test_a_bench_is_compared_device_by_device(tmp_path: Path) -> None:
     path.write_bytes(bench.trace.replace(b"io < 583#", b"io < 584#"))
     result = compared(path, "--tolerance", "1ms")
     assert (result.exit_code, "io 583 " in result.stdout) == (1, True)
+
+
+CHUNKS = {
+    "rtc-lite": [*(LiteFrame(LiteCommand(x)).encode() for x in (b"CX", b"CI", b"AA")), b"junk"],
+    "rh3-base": [
+        encode_frame(1, bytes.fromhex("0300000002")),
+        encode_frame(1, bytes.fromhex("0600640005")),
+        b"noise",
+        encode_frame(1, bytes.fromhex("0300000004")),
+    ],
+    "urg": [b"SCIP2.0\n", b"VV\n", b"PP\n", b"BM\n", b"MD0044072501002\n", b"QT\n"],
+}
+
+
+@pytest.mark.parametrize("name", CHUNKS)
+def test_each_type_of_device_is_compared(tmp_path: Path, name: str) -> None:
+    made = configure(name, {})
+    emulator = Emulator(name, made.device, line=made.type.line)
+    emulator.rig.run_for(700_100)
+    link = RecordingLink(SimLink(emulator.rig, emulator.line.b), tmp_path / "t", type=name)
+    for chunk in CHUNKS[name]:
+        link.send(chunk)
+        until_us = link.now_us + 300_000
+        while link.now_us < until_us:
+            link.receive(until_us - link.now_us)
+    link.close()
+    words = ["--ignore", "00???"] if name == "urg" else []  # its time stamps
+    result = compared(tmp_path / "t", *words)
+    assert result.exit_code == 0, result.output
+    first, *lines = (tmp_path / "t").read_text().splitlines()
+    place = max(n for n, line in enumerate(lines) if " < " in line)
+    head, mark, text = lines[place].partition(" < ")
+    data = bytearray(unescape(text))
+    data[len(data) // 2] ^= 1
+    lines[place] = head + mark + escape(bytes(data))
+    (tmp_path / "t").write_text("".join(f"{line}\n" for line in (first, *lines)))
+    assert compared(tmp_path / "t", *words).exit_code == 1
 
 
 def record_bus(path: Path, supply_v: float = 24.0) -> None:
