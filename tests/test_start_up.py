@@ -33,6 +33,8 @@ MOST = {
     "tickrig ctl /nowhere TAB": 20,
     "tickrig demo fig120 -- TAB": 19,
     "tickrig replay TAB": 18,
+    "tickrig compare TAB": 18,
+    "tickrig record TAB": 21,
     "tickrig rtc ls": 28,
     "tickrig rtc con TAB": 28,
     "rrc-emu TAB": 14,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.emulators.testing.commands.type_option import type_option
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH, add_options, time_option
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
@@ -17,12 +18,12 @@ if TYPE_CHECKING:
     from tickrig.emulators.commands.device_type import ConfiguredDevice
     from tickrig.emulators.record.bench_replay import BenchRecording
     from tickrig.emulators.record.tolerance import Tolerance
-    from tickrig.emulators.testing.commands.compared_line import ComparedRun
+    from tickrig.emulators.testing.commands.compare.compared_line import ComparedRun
 
 BIT_RATE: Final = 1_000_000
 
 _device: Final = add_options(
-    click.option("--type", "type_name", default="", help="Device type, if the trace has none."),
+    type_option("Device type, if the trace has none."),
     click.option(
         "--config", multiple=True, metavar="NAME=VALUE", help="An option of that type: node=lite-a."
     ),
@@ -73,7 +74,7 @@ def compare_command(
     with loading():
         from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
         from tickrig.emulators.record.comparison import compare  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.commands.compare_report import report  # noqa: PLC0415
+        from tickrig.emulators.testing.commands.compare.comparison_text import report  # noqa: PLC0415
 
     tolerance = _read_tolerance(options)
     try:
@@ -125,8 +126,8 @@ def _ticked(
     from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
     from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice  # noqa: PLC0415
     from tickrig.emulators.testing.bench.recorded_device import make_recorded  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compared_bus import compare_node_ticks  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compared_line import compare_ticks  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare.compared_bus import compare_node_ticks  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare.compared_line import compare_ticks  # noqa: PLC0415
 
     entry = recording.header.devices[name]
     if options["type_name"]:
@@ -142,7 +143,7 @@ def _on_line(
     recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> ComparedRun:
     """Compare what passed a serial port."""
-    from tickrig.emulators.testing.commands.compared_line import compare_port  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare.compared_line import compare_port  # noqa: PLC0415
 
     recorded = recording.header.devices[name].type
     if not (recorded or options["type_name"]):
@@ -160,7 +161,7 @@ def _on_bus(
     """Compare what passed a bus."""
     from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # noqa: PLC0415 - slow
     from tickrig.emulators.canopen.node.node_spec import parse_node  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compared_bus import compare_bus  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare.compared_bus import compare_bus  # noqa: PLC0415
 
     specs = [spec for text in options["nodes"] for spec in parse_node(text)]
     if not specs:

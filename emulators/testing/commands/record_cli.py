@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from tickrig.emulators.testing.commands.type_option import type_option
 from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
@@ -32,7 +33,7 @@ RECORDING_ENDED: Final = 3
 @click.command("record")
 @click.argument("port")
 @click.option("-o", "--out", type=PATH, required=True, metavar="FILE", help="The trace.")
-@click.option("--type", "type_name", default="", help="Device type, as of 'tickrig emu': rrc.")
+@type_option("Device type, as of 'tickrig emu': rrc.")
 @click.option("--link", type=PATH, help="Symbolic link to make to the host's terminal.")
 @click.option("--baud", type=click.IntRange(1), help="Of the port.  [that of the type, or 115200]")
 @click.pass_context

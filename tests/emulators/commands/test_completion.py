@@ -28,6 +28,9 @@ MAINS = {
 }
 
 
+TYPES = "rrc rtc-lite rh3-base urg"
+
+
 def completed(line: str) -> str:
     command, *words = line.split(" ")
     shell = BashComplete(load(MAINS[command]), {}, command, "")
@@ -92,3 +95,9 @@ def test_faults_are_completed_as_they_are_known(line: str) -> None:
 
 def test_faults_of_every_node_are_completed() -> None:
     assert completed("canopen-slave-emu --eds a.eds --fault p") == "power_off"
+
+
+@pytest.mark.parametrize("verb", ["record /dev/ttyUSB0", "compare run.trace"])
+def test_device_types_are_completed(verb: str) -> None:
+    assert completed(f"tickrig {verb} --type ").startswith(TYPES)
+    assert completed(f"tickrig {verb} --type rt") == "rtc-lite"

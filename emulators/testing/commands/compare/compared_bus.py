@@ -13,7 +13,7 @@ from tickrig.emulators.record.bench_replay import BenchRecording, do, play_devic
 from tickrig.emulators.record.comparison import Said
 from tickrig.emulators.record.tolerance import Tolerance
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.testing.commands.compared_line import SEARCHED_US, ComparedRun
+from tickrig.emulators.testing.commands.compare.compared_line import SEARCHED_US, ComparedRun
 from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame

@@ -1,0 +1,1 @@
+"""What tickrig compare does: both runs of a device or a bus, and what it prints."""
