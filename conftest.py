@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 
 from tickrig.emulators.testing.plugin import pytest_plugin
 
-collect_ignore = ["tests/stranger"]  # of somebody else: `tests/test_stranger.py` installs it
+collect_ignore = ["tests/outside", "tests/stranger"]  # of others: tests/test_*.py install them
 
 # How long an example takes says something about the machine, not about the code.
 settings.register_profile("tickrig", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -78,7 +78,8 @@ def _lack(choice: str, bench: Bench) -> str:
         return "" if _described(bench).get("inputs") else "nobody can set anything here"
     kind, _, name = choice.partition(":")
     there = list(KINDS[kind](bench))
-    return "" if name in there else f"no {kind} {name!r}; known: {known(there) or 'none'}"
+    found = any(each == name or each.endswith(f"/{name}") for each in there)  # of any device
+    return "" if found else f"no {kind} {name!r}; known: {known(there) or 'none'}"
 
 
 def _described(bench: Bench) -> Mapping[str, Any]:  # an answer of the control socket
