@@ -63,11 +63,11 @@ def read_toml(text: str) -> TomlDocument:
 
 
 class _WrongError(Exception):
-    """The statement cannot be read further."""
+    """The statement cannot be read further than here; it may be told of another place."""
 
-    def __init__(self, at: int, reason: str) -> None:
+    def __init__(self, at: int, reason: str, place: int | None = None) -> None:
         super().__init__(reason)
-        self.at = at
+        self.at, self.place = at, at if place is None else place
 
 
 class _Reader:
@@ -86,7 +86,7 @@ class _Reader:
             try:
                 self._statement()
             except _WrongError as error:
-                self._report(error.at, str(error))
+                self._report(error.place, str(error))
                 self._go_on_behind(start, error.at)
         return document_of(self._top, self._mistakes, whole=self._whole)
 
@@ -294,7 +294,5 @@ class _Reader:
 
     def _close(self, start: int, sign: str, what: str) -> None:
         if not self._is(sign):
-            begun = self._line(start)
-            where = "" if begun == self._line(self._at) else f" of line {begun}"
-            raise _WrongError(self._at, f"{sign!r} of the {what}{where} is missing")
+            raise _WrongError(self._at, f"{sign!r} of the {what} is missing", start)
         self._at += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
@@ -14,7 +14,6 @@ from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
 from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.commands.device_config import configure
@@ -34,15 +33,10 @@ from tickrig.emulators.testing.rig_file.plan import (
     WirePlan,
     WireType,
 )
+from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.values import Setting
-
-
-@cache
-def eds_cache() -> EdsCache:
-    """Return the descriptions that this process has read: benches come and go."""
-    return EdsCache()
 
 
 def parts_of(plan: RigPlan) -> Parts:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.bench.names import SHOWN
-from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.commands.device_config import option_names
 from tickrig.emulators.testing.rig_file.devices import RESERVED, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
@@ -62,21 +62,18 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
 
 def _make(types: Iterable[str], folder: Path) -> Iterator[tuple[DevicePlan, Probe]]:
     """Yield each device with a name and a node-ID of its own."""
-    names, node_ids, cache = set[str](), set[int](), EdsCache()
+    names, node_ids = set[str](), set[int]()
     for given in types:
-        reasons: list[str] = []
         try:
             kind, place = kind_of(given, folder)
         except ValueError as error:
             raise TypeRefusedError(str(error)) from None
         plan = DevicePlan(name=_name(given, names), kind=kind, type=place, wire="")
-        found = probe(plan, cache, lambda reason, *keys, to=reasons: to.append(reason))
-        if found is None:
-            raise TypeRefusedError(f"{given}: {reasons[0]}")
-        node_id = None
-        if found.baud is None:
-            node_id = _free(found.node_id or 1, node_ids)
-        yield DevicePlan(name=plan.name, kind=kind, type=given, wire="", node_id=node_id), found
+        found = probe(plan)
+        if not isinstance(found, Probe):
+            raise TypeRefusedError(f"{given}: {found[0].reason}")
+        node_id = _free(found.node_id or 1, node_ids) if found.baud is None else None
+        yield replace(plan, type=given, node_id=node_id), found
 
 
 def _name(given: str, taken: set[str]) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,7 +45,7 @@ class DeviceReader:
 
     def __init__(self, section: Section | None, wires: Wires, folder: Path) -> None:
         self._wires, self._folder = wires, folder
-        self._given = dict(wires)
+        self._given, self._types = dict(wires), cache(DEVICES.names)
         self.plans: dict[str, DevicePlan | None] = {}
         self.sections: dict[str, Section] = {}
         for name, table in section.subs() if section else ():
@@ -77,7 +78,7 @@ class DeviceReader:
         kind, place = None, ""
         if isinstance(given, str) and given:
             try:
-                kind, place = kind_of(given, self._folder)
+                kind, place = kind_of(given, self._folder, self._types)
             except ValueError as error:
                 section.wrong(str(error), "type")
         schema = {None: EVERYTHING, DeviceKind.SERIAL: SERIAL_DEVICE}.get(kind, CANOPEN_DEVICE)
@@ -131,12 +132,15 @@ class DeviceReader:
         return name
 
 
-def kind_of(text: str, folder: Path) -> tuple[DeviceKind, str]:
+def kind_of(
+    text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
+) -> tuple[DeviceKind, str]:
     """Return what a type names, and the same with the path that it has for this program.
 
     Args:
         text: as the file has it.
         folder: where files are looked for.
+        types: returns the names of all device types; called if it is none of ours.
 
     Raises:
         ValueError: it names nothing that there is.
@@ -149,7 +153,7 @@ def kind_of(text: str, folder: Path) -> tuple[DeviceKind, str]:
         return DeviceKind.EDS, str(folder / text)
     if text in MODELS:
         return DeviceKind.MODEL, text
-    if text not in DEVICES.built_in and text not in (names := DEVICES.names()):
+    if text not in DEVICES.built_in and text not in (names := types()):
         hint = near(text, [*names, *MODELS])
         raise ValueError(f"no device {shown(text)}; {hint} (or an EDS or DCF file, FILE.py:Class)")
     return DeviceKind.SERIAL, text

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.chance import check_rate
@@ -37,7 +39,7 @@ class Probe:
         wire_faults: those of its end of the wire, or of its bus.
         title: what it is, for people.
         baud: of a serial device, that of its type.
-        node_id: of a node, None if nothing gives one.
+        node_id: of a node, that of its DCF or model.
         bit_rate: of a node, that of its DCF.
     """
 
@@ -66,54 +68,59 @@ def check_wire_fault(
     check_rate(name, rate, rated=faults[name].rated)
 
 
-def probe(plan: DevicePlan, cache: EdsCache, wrong: Callable[..., None]) -> Probe | None:
+@cache
+def eds_cache() -> EdsCache:
+    """Return the descriptions that this process has read: benches come and go."""
+    return EdsCache()
+
+
+class Wrong(NamedTuple):
+    """Why a device cannot be made.
+
+    Attributes:
+        reason: for people.
+        keys: below its table.
+    """
+
+    reason: str
+    keys: tuple[str, ...]
+
+
+def probe(plan: DevicePlan) -> Probe | list[Wrong]:
     """Make a device.
 
     Args:
-        plan: what it is.
-        cache: of EDS files.
-        wrong: takes a mistake and the keys below the device's table where it stands.
+        plan: what it is; its name, wire, node-ID and start make no difference.
 
     Returns:
-        What it has, None if it cannot be made.
+        What it has, or all that is wrong.
     """
     if plan.kind is DeviceKind.SERIAL:
-        made = _configured(plan, wrong)
-        if made is None:
-            return None
-        line = made.type.line
-        return Probe(made.device, line.faults, made.type.title, baud=line.baud)
+        return _serial(plan.type, plan.config)
     device = Path(plan.type) if plan.kind is DeviceKind.EDS else plan.type
     try:
-        found = describe(cache, device, plan.profile or AUTO)
+        found = describe(eds_cache(), device, plan.profile or AUTO)
     except Refused as error:
-        for reason in str(error).splitlines():
-            wrong(reason, "type")
-        return None
+        return [Wrong(reason, ("type",)) for reason in str(error).splitlines()]
     except SystemExit as error:  # a user's file may do anything
-        wrong(f"{plan.type}: {explain_error(error)}", "type")
-        return None
-    node_id = found.node_id if plan.node_id is None else plan.node_id
-    slave = make_slave(found.make_dictionary(), node_id or ANY_ID, None, found.application)
+        return [Wrong(f"{plan.type}: {explain_error(error)}", ("type",))]
+    slave = make_slave(found.make_dictionary(), ANY_ID, None, found.application)
     node = Nodes([Node(plan.name, slave, CanWire())])
     title = found.info.product_name or Path(plan.type).name
     if plan.kind is DeviceKind.MODEL:
         title = MODELS[plan.type].text
-    return Probe(node, CAN_FAULTS, title, node_id=node_id, bit_rate=found.bit_rate)
+    return Probe(node, CAN_FAULTS, title, node_id=found.node_id, bit_rate=found.bit_rate)
 
 
-def _configured(plan: DevicePlan, wrong: Callable[..., None]) -> ConfiguredDevice | None:
-    """Make a device on a serial line; each option that it does not take is told."""
-    reasons = {key: _reason(plan.type, key, value) for key, value in plan.config.items()}
-    for key, reason in reasons.items():
-        if reason:
-            wrong(reason, "config", key)
-    if any(reasons.values()):
-        return None
-    if reason := _refusal(plan.type, plan.config):
-        wrong(reason, "config" if plan.config else "type")
-        return None
-    return configure(plan.type, plan.config)
+def _serial(name: str, config: Mapping[str, object]) -> Probe | list[Wrong]:
+    """Make a device on a serial line."""
+    made = _configured(name, config)
+    if isinstance(made, ConfiguredDevice):
+        line = made.type.line
+        return Probe(made.device, line.faults, made.type.title, baud=line.baud)
+    alone = [(key, _reason(name, key, value)) for key, value in config.items()]
+    wrong = [Wrong(reason, ("config", key)) for key, reason in alone if reason]
+    return wrong or [Wrong(made, ("config" if config else "type",))]
 
 
 def _reason(name: str, key: str, value: object) -> str:
@@ -124,16 +131,18 @@ def _reason(name: str, key: str, value: object) -> str:
         return ""  # the device is the mistake
     if key.replace("_", "-") not in names:
         return f"no option {key!r}; {near(key, list(names))}"
-    reason = _refusal(name, {key: value}).removeprefix("Invalid value for ")
+    made = _configured(name, {key: value})
+    if isinstance(made, ConfiguredDevice):
+        return ""
+    reason = made.removeprefix("Invalid value for ")
     return reason.replace("'", "", 2) if reason.startswith("'--") else reason
 
 
-def _refusal(name: str, config: Mapping[str, object]) -> str:
-    """Return why there can be no such device, empty if there can."""
+def _configured(name: str, config: Mapping[str, object]) -> ConfiguredDevice | str:
+    """Return the device of these options, or why there can be none."""
     try:
-        configure(name, config)
+        return configure(name, config)
     except ValueError as error:
         return str(error)
     except (Exception, SystemExit) as error:  # a foreign type may raise anything
         return explain_error(error)
-    return ""

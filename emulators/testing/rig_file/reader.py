@@ -10,7 +10,6 @@ from typing import Final
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
-from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.body import read_body
 from tickrig.emulators.testing.rig_file.devices import DeviceReader
@@ -18,7 +17,7 @@ from tickrig.emulators.testing.rig_file.doors import DoorReader
 from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
 from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
 from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan, WirePlan, WireType
-from tickrig.emulators.testing.rig_file.probe import Probe, check_wire_fault, probe
+from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, check_wire_fault, probe
 from tickrig.emulators.testing.rig_file.schema import TOP
 from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
 from tickrig.emulators.testing.rig_file.starts import Start, StartReader
@@ -82,6 +81,7 @@ class _Reader:
         self._wires = read_wires(top.sub("wire"))
         self._devices = DeviceReader(top.sub("device"), self._wires, self._folder)
         self._probes: dict[str, Probe | None] = {}
+        self._physical: dict[str, HasSignals] = {}
 
     def read(self) -> RigPlan:
         """Read all of it; what is wrong is noted."""
@@ -96,9 +96,8 @@ class _Reader:
         starts = StartReader(self._folder)
         signals = starts.read_signals(section) if (section := top.sub("signal")) else {}
         devices = self._with_starts(starts)
-        physical = self._physical
         if top.notes.document.whole:
-            starts.check(physical)
+            starts.check(self._physical)
         doors = DoorReader(self._wires, self._devices.plans, self._folder)
         fault, body, real, hardware = map(top.sub, ("fault", "body", "real", "hardware"))
         return RigPlan(
@@ -107,21 +106,26 @@ class _Reader:
             devices=devices,
             signals=signals,
             faults=tuple(read_faults(fault, self._fault_owners())) if fault else (),
-            body=read_body(body, physical, node_ids) if body else None,
+            body=read_body(body, self._physical, node_ids) if body else None,
             real=doors.read_real(real) if real else RigPlan().real,
             hardware=doors.read_hardware(hardware) if hardware else None,
             path=self._path,
         )
 
-    @property
-    def _physical(self) -> Mapping[str, HasSignals]:
-        return {name: each.physical if each else UNKNOWN for name, each in self._probes.items()}
-
     def _make_probes(self) -> None:
-        cache = EdsCache()
+        """Make each device, of those that are the same one."""
+        made: dict[str, Probe | list[Wrong]] = {}
         for name, plan in self._devices.plans.items():
-            wrong = self._devices.sections[name].wrong if plan else None
-            self._probes[name] = probe(plan, cache, wrong) if plan and wrong else None
+            found = None
+            if plan is not None:
+                key = f"{plan.kind} {plan.type} {plan.profile} {plan.config}"
+                found = made[key] if key in made else made.setdefault(key, probe(plan))
+            if isinstance(found, list):
+                for reason, keys in found:
+                    self._devices.sections[name].wrong(reason, *keys)
+                found = None
+            self._probes[name] = found
+            self._physical[name] = found.physical if found else UNKNOWN
 
     def _with_starts(self, starts: StartReader) -> dict[str, DevicePlan]:
         """Return the devices with their starts."""
@@ -143,23 +147,23 @@ class _Reader:
             plan, section = self._devices.plans[name], self._devices.sections.get(name)
             if not (section and each) or each.baud is not None:
                 continue
-            if each.node_id is None:
+            node_id = plan.node_id if plan and plan.node_id is not None else each.node_id
+            if node_id is None:
                 section.wrong("no key 'node_id': its file gives none; 1..127, or lss")
-            elif each.node_id != UNCONFIGURED:
-                first = seen.setdefault((plan.wire if plan else name, each.node_id), name)
+            elif node_id != UNCONFIGURED:
+                first = seen.setdefault((plan.wire if plan else name, node_id), name)
                 if first != name:
-                    section.wrong(f"node-ID {each.node_id} is that of {first!r} already", "node_id")
-                names.setdefault(each.node_id, name)
+                    section.wrong(f"node-ID {node_id} is that of {first!r} already", "node_id")
+                names.setdefault(node_id, name)
         return names
 
     def _with_rate(self, wire: WirePlan) -> WirePlan:
         """Return a bus with the bit rate of a DCF, if the file gives none."""
-        nodes = [
-            name for name, each in self._devices.plans.items() if each and each.wire == wire.name
-        ]
-        probes = [found for name in nodes if (found := self._probes[name])]
-        rates = [each.bit_rate for each in probes if each.bit_rate]
-        return replace(wire, bit_rate=rates[0]) if rates and wire.bit_rate is None else wire
+        if wire.type is not WireType.CAN or wire.bit_rate is not None:
+            return wire
+        nodes = [each for each in self._devices.plans.values() if each and each.wire == wire.name]
+        probes = [found for node in nodes if (found := self._probes[node.name])]
+        return replace(wire, bit_rate=next((x.bit_rate for x in probes if x.bit_rate), None))
 
     def _wire_faults(self, wire: WirePlan | None) -> CheckFault | None:
         """Return what judges faults of a wire, None if nobody can."""

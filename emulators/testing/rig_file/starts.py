@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.fields import check_name, closest, near, shown
@@ -14,9 +14,12 @@ from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
 from tickrig.emulators.testing.signals.scope import SLASH, check_signals
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.emulators.testing.signals.sources import Constant
-from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
+from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
 from tickrig.host.text.toml_document import TomlPath
 from tickrig.host.text.values import Setting
+
+OBJECT: Final = "0x"
+"""How the names of objects of a node begin."""
 
 Start = dict[str, Setting | SignalSpec]
 
@@ -43,8 +46,7 @@ class StartReader:
                 check_name(name)
             except ValueError as error:
                 section.wrong(str(error), name)
-            spec = self._spec(section, (name,), value) or UNREAD
-            self._signals[name], self._places[name] = spec, (section, (name,))
+            self._keep(name, self._spec(section, (name,), value) or UNREAD, section, (name,), value)
         return dict(self._signals)
 
     def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
@@ -56,14 +58,15 @@ class StartReader:
             physical: what it has.
         """
         start: Start = {}
+        names: list[str] = []  # a node has many objects
         if physical is UNKNOWN:
             section = replace(section, values=_without_lists(section.values))
         for keys, name, value in self._inputs(section, physical.inputs.groups):
             if name in start:
                 section.wrong(f"{name} is given twice", *keys)
             elif name not in (table := physical.inputs.table):
-                names = [*physical.inputs.groups, *table]
-                section.wrong(f"no input {shown(name)}; {near(name, names)}", *keys)
+                names = names or [*physical.inputs.groups, *table]
+                section.wrong(f"no input {shown(name)}; {near(name, _alike(name, names))}", *keys)
             elif (found := self._value(section, keys, value, f"{device}{SLASH}{name}")) is not None:
                 start[name] = found
                 if not isinstance(found, SignalSpec):
@@ -100,8 +103,15 @@ class StartReader:
             return int(value) if isinstance(value, bool) else value
         spec = self._spec(section, keys, value)
         if spec is not None:
-            self._signals[full], self._places[full] = spec, (section, keys)
+            self._keep(full, spec, section, keys, value)
         return spec
+
+    def _keep(
+        self, name: str, spec: SignalSpec, section: Section, keys: TomlPath, value: Any
+    ) -> None:
+        """Keep a signal with the key that says what it is."""
+        form = [key for key in FORMS if isinstance(value, dict) and key in value]
+        self._signals[name], self._places[name] = spec, (section, (*keys, *form[:1]))
 
     def _spec(self, section: Section, keys: TomlPath, value: Any) -> SignalSpec | None:
         if is_broken(value):
@@ -116,6 +126,13 @@ class StartReader:
             if not (missing and missing[0] not in value and closest(str(missing[0]), misspelt)):
                 section.wrong(mistake.reason, *mistake.keys)
         return None
+
+
+def _alike(name: str, names: Iterable[str]) -> list[str]:
+    """Leave objects out where none is meant, and else those that begin otherwise."""
+    if name.startswith(OBJECT):
+        return [each for each in names if each.startswith(name[:4])]
+    return [each for each in names if not each.startswith(OBJECT)]
 
 
 def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -34,8 +34,11 @@ def summary(plan: RigPlan) -> Iterator[str]:
     ]
     yield ", ".join(filter(None, counts))
     width = max((len(name) for name in plan.wires), default=0)
+    on_wires: dict[str, list[str]] = {name: [] for name in plan.wires}
+    for device in plan.devices.values():
+        on_wires[device.wire].append(device_text(device))
     for wire in plan.wires.values():
-        devices = ", ".join(map(device_text, plan.devices_on(wire.name)))
+        devices = ", ".join(on_wires[wire.name])
         yield f"  {wire.name:{width}}  {wire_text(wire)}: {devices or 'nothing'}"
 
 

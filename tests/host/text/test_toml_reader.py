@@ -60,8 +60,8 @@ def test_the_values_are_those_of_the_standard_library() -> None:
 @pytest.mark.parametrize(
     ("text", "mistakes"),
     [
-        ("a = [1, 2\n[b]\n", ["2: ']' of the array of line 1 is missing"]),
-        ("a = [1,\n2,\nb = 1\n", ["3: ']' of the array of line 1 is missing"]),
+        ("a = [1, 2\n[b]\n", ["1: ']' of the array is missing"]),
+        ("a = [1,\n2,\nb = 1\n", ["1: ']' of the array is missing"]),
         ("a = [\n 1,\n x,\n 3,\n]\n", ["3: 'x' is no value: a text stands in quotes"]),
         ("a = [1,,2]", ["1: a value is missing before ',2]'"]),
         ("a = {x = 1\nb = 2", ["1: '}' of the inline table is missing"]),
