@@ -13,6 +13,7 @@ from pymodbus.client import ModbusSerialClient
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.serial.outside import protocol_tickrig
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.rs485_line import Rs485Line
@@ -55,6 +56,16 @@ def test_minimalmodbus_drives_a_base_in_virtual_time(
         pytest.fail("it does not move")
     with pytest.raises(minimalmodbus.IllegalRequestError):
         master.read_register(0x300)
+
+
+def test_a_host_that_calls_serial_itself_gets_a_port_of_the_rig(
+    rig: Rig, master: minimalmodbus.Instrument, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    master.serial.close()
+    monkeypatch.setattr(serial, "Serial", protocol_tickrig.Serial)
+    own = minimalmodbus.Instrument(URL, 1)
+    own.serial.baudrate = 115_200
+    assert own.read_registers(0, 2) == [0x5248, 0x0100]
 
 
 def test_minimalmodbus_waits_its_timeout_and_no_longer(

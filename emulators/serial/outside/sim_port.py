@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import io
+import logging
 from typing import Any, NoReturn, cast
 
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
@@ -12,6 +13,8 @@ from tickrig.device.twin import twin
 from tickrig.emulators.serial.outside.modem_lines import ModemLines
 from tickrig.emulators.serial.outside.serial_side import Mismatch, SerialSide
 from tickrig.wire.serial.uart import Parity, UartSetting
+
+LOG = logging.getLogger(__name__)
 
 
 class SimPort(SerialBase):
@@ -51,7 +54,7 @@ class SimPort(SerialBase):
         if self.port is None or self.side is None:
             raise SerialException("Port must be configured before it can be used.")
         side = self.side
-        side.check_thread(self.port)
+        side.waits.check_thread(self.port)
         if side.in_use:
             raise SerialException(f"could not open port {self.port}: another host has it open")
         self.is_open = True
@@ -84,7 +87,7 @@ class SimPort(SerialBase):
         """Return the line; raise SerialException if it cannot be used."""
         if not self.is_open or self.side is None:
             raise PortNotOpenError
-        self.side.check_thread(str(self.port))
+        self.side.waits.check_thread(str(self.port))
         return self.side
 
     def _reconfigure_port(self) -> None:
@@ -96,9 +99,21 @@ class SimPort(SerialBase):
         setting = UartSetting(self.baudrate, self.bytesize, parity, self.stopbits)
         if setting != side.setting or not side.in_use:
             self._input += side.receiver.poll(side.rig.now_us)
-            side.use(str(self.port), setting, self.mismatch)
+            self._use(side, setting)
         side.transmitter.waits_for_cts = bool(self.rtscts)
         side.transmitter.release(side.rig.now_us)
+
+    def _use(self, side: SerialSide, setting: UartSetting) -> None:
+        """Send and receive at a setting; raise SerialException if it is refused."""
+        if side.device is not None:
+            if setting != side.device:
+                what = f"{self.port} is set to {setting}, the device has {side.device}"
+                if (self.mismatch or side.mismatch) == "refuse":
+                    raise SerialException(what)
+                LOG.warning("%s: each samples what the other sends, perhaps wrongly", what)
+            side.transmitter.setting = setting
+            side.receiver.use(setting, side.rig.now_us)
+        side.setting = setting
 
     def _update_dtr_state(self) -> None:
         self._side().modem_lines.dtr = bool(self.dtr)
@@ -128,7 +143,7 @@ class SimPort(SerialBase):
 
     def _modem_lines(self) -> ModemLines:
         side = self._side()
-        side.look()
+        side.waits.look()
         return side.modem_lines
 
     def fileno(self) -> NoReturn:

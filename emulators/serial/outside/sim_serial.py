@@ -74,7 +74,7 @@ class SimSerial(SimPort):
         side = self._side()
         self._receive(side)
         if not self._input:
-            side.look()
+            side.waits.look()
         return len(self._input)
 
     def read(self, size: int = 1, /) -> bytes:
@@ -92,12 +92,12 @@ class SimSerial(SimPort):
         side = self._side()
         if 0 < size <= len(self._input) and not self._read_cancelled:
             return self._take(size)
-        until_us = side.deadline_us(self.timeout)
+        until_us = side.waits.deadline_us(self.timeout)
         data = self._read_by(side, size, until_us)
         if len(data) < size and side.rig.now_us >= until_us:
-            side.give_up(self.timeout)
+            side.waits.give_up(self.timeout)
         if not data and self.timeout == 0:
-            side.look()
+            side.waits.look()
         return data
 
     def _read_by(self, side: SerialSide, size: int, until_us: int) -> bytes:
@@ -109,12 +109,12 @@ class SimSerial(SimPort):
             self._receive(side)
             if new := self._take(max(0, size - len(data))):
                 data += new
-                end_us = min(until_us, side.deadline_us(gap_s)) if gap_s else until_us
+                end_us = min(until_us, side.waits.deadline_us(gap_s)) if gap_s else until_us
             if len(data) >= size or side.rig.now_us >= end_us:
                 return bytes(data)
             if waits := not self._reading_ended():
-                wanted = 1 if gap_s else size - len(data)
-                side.wait(end_us, partial(side.receiver.arrival_us, wanted), self._reading_ended)
+                there_us = partial(side.receiver.arrival_us, 1 if gap_s else size - len(data))
+                side.waits.wait(end_us, there_us, self._reading_ended)
         self._read_cancelled = False
         return bytes(data)
 
@@ -130,7 +130,7 @@ class SimSerial(SimPort):
             return b""
         side = self._side()
         self._input[:0] = byte
-        self._gather(side, LF, side.deadline_us(self.timeout))
+        self._gather(side, LF, side.waits.deadline_us(self.timeout))
         if end := self._input.find(LF) + 1:
             return self._take(end)
         if self._reading_ended():
@@ -146,7 +146,7 @@ class SimSerial(SimPort):
             size: how many bytes at most.
         """
         side = self._side()
-        until_us, data = side.deadline_us(self.timeout), bytearray()
+        until_us, data = side.waits.deadline_us(self.timeout), bytearray()
         while byte := self.read(1):
             data += byte
             full = size is not None and len(data) >= size
@@ -169,7 +169,7 @@ class SimSerial(SimPort):
         if count := (self._input + coming).find(expected) + 1:
             count += len(expected) - 1 - len(self._input)
             if count > 0 and (at_us := side.receiver.arrival_us(count)) <= until_us:
-                side.wait(at_us, lambda: at_us, self._reading_ended)
+                side.waits.wait(at_us, lambda: at_us, self._reading_ended)
                 self._receive(side)
 
     def _receive(self, side: SerialSide) -> None:
@@ -191,7 +191,7 @@ class SimSerial(SimPort):
         """Bytes that were written and have not left."""
         side = self._side()
         if waiting := side.transmitter.unsent(side.rig.now_us):
-            side.look()
+            side.waits.look()
         return waiting
 
     def write(self, data: ReadableBuffer, /) -> int:
@@ -212,14 +212,14 @@ class SimSerial(SimPort):
         if isinstance(data, str):
             raise TypeError(f"unicode strings are not supported, please encode to bytes: {data!r}")
         left = bytes(data)
-        length, until_us = len(left), side.deadline_us(self.write_timeout)
+        length, until_us = len(left), side.waits.deadline_us(self.write_timeout)
         while left := left[side.transmitter.send(side.rig.now_us, left) :]:
             if self.write_timeout == 0 or self._writing_ended():
                 break
             if side.rig.now_us >= until_us:
-                side.give_up(self.write_timeout)
+                side.waits.give_up(self.write_timeout)
                 raise SerialTimeoutException("Write timeout")
-            side.wait(until_us, partial(self._room_us, side, len(left)), self._writing_ended)
+            side.waits.wait(until_us, partial(self._room_us, side, len(left)), self._writing_ended)
         self._write_cancelled = False
         return length - len(left)
 
@@ -230,11 +230,11 @@ class SimSerial(SimPort):
     def flush(self) -> None:
         """Wait until all that was written has left, to its last stop bit."""
         side = self._side()
-        until_us = side.deadline_us(None)
+        until_us = side.waits.deadline_us(None)
         while side.transmitter.unsent(side.rig.now_us):
             if side.rig.now_us >= until_us:
-                side.give_up(None)
-            side.wait(until_us, lambda: side.transmitter.sent_us)
+                side.waits.give_up(None)
+            side.waits.wait(until_us, lambda: side.transmitter.sent_us)
 
     def reset_output_buffer(self) -> None:
         """Forget what was written and of which no bit has left."""

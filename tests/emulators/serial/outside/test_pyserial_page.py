@@ -15,5 +15,5 @@ SECTION = TEXT.partition("\n## pyserial\n")[2].partition("\n## ")[0]
 def test_its_programs_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial, "protocol_handler_packages", ["serial.urlhandler"])
     programs = re.findall(r"^```python\n(.*?)^```", SECTION, re.DOTALL | re.MULTILINE)
-    assert len(programs) == 4
+    assert len(programs) == 5
     exec(compile("".join(programs), "docs/hosts.md", "exec"), {"__name__": "page"})

@@ -1,0 +1,103 @@
+"""The waits of a host on a rig, and what it is told that would wait for ever."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from threading import get_ident
+from typing import Any, Final
+
+from serial.serialutil import SerialException
+
+from tickrig.device.twin import Copyable
+from tickrig.emulators.rig.rig import Rig
+from tickrig.wire.instant import NEVER
+
+LOG = logging.getLogger(__name__)
+
+LONGEST_US: Final = 3_600_000_000
+"""A wait without a timeout ends with an exception after an hour."""
+
+MOST_LOOKS: Final = 10_000
+"""Looks that a host takes at one instant before it is told that it will wait for ever."""
+
+
+class HostWaits(Copyable):
+    """Steps a rig while a host waits, in the thread that made it and in no other.
+
+    Args:
+        rig: the rig.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self._thread, self._wrong_thread = get_ident(), ""
+        self._looks, self._looked_us = 0, NEVER
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on in the thread in which it is copied."""
+        vars(self).update(state, _thread=get_ident())
+
+    def check_thread(self, name: str) -> None:
+        """Raise SerialException, now and ever after, if a second thread uses a port.
+
+        Args:
+            name: the port.
+        """
+        if get_ident() != self._thread and not self._wrong_thread:
+            self._wrong_thread = (
+                f"{name}: a second thread cannot make virtual time pass; read and write in the"
+                " thread that made the rig, or run in real time"
+            )
+            LOG.error(self._wrong_thread)
+        if self._wrong_thread:
+            raise SerialException(self._wrong_thread)
+
+    def deadline_us(self, timeout_s: float | None) -> int:
+        """Return when a timeout that begins now ends; without one, when `give_up` says so.
+
+        Args:
+            timeout_s: the timeout in seconds, None if there is none.
+        """
+        return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
+
+    def give_up(self, timeout_s: float | None) -> None:
+        """Raise SerialException if there was no timeout: the host would wait for ever.
+
+        Args:
+            timeout_s: the timeout that is over.
+        """
+        if timeout_s is None:
+            raise SerialException("nothing came for an hour, and no timeout was given")
+
+    def look(self) -> None:
+        """Count a look that found nothing.
+
+        Raises:
+            SerialException: there were too many at one instant: the host would wait for ever.
+        """
+        if self._looked_us != self.rig.now_us:
+            self._looks, self._looked_us = 0, self.rig.now_us
+        self._looks += 1
+        if self._looks > MOST_LOOKS:
+            raise SerialException(
+                f"looked {MOST_LOOKS} times at {self._looked_us / 1e6:.6f} s: looking makes no"
+                " time pass; read with a timeout, or let time.sleep be that of the rig"
+            )
+
+    def wait(
+        self, until_us: int, due_us: Callable[[], int], done: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Let time pass until something is due.
+
+        Args:
+            until_us: until when at most.
+            due_us: returns when it will be, `NEVER` if that is not known.
+            done: returns whether the wait is to end at once.
+        """
+        rig = self.rig
+        at_us = due_us()
+        if at_us > until_us:
+            rig.run_until(lambda: due_us() <= until_us or done(), until_us - rig.now_us)
+            at_us = due_us()
+        rig.run_until(done, max(0, min(at_us, until_us) - rig.now_us))
