@@ -16,6 +16,9 @@ from tickrig.host.text.values import parse_time_us
 LEAST_US: Final = 100
 """No period, ramp or time constant is shorter."""
 
+FINEST: Final = 1e-12
+"""No quantisation is finer."""
+
 
 def number(value: object) -> float:
     """Take a number, or true and false as 1 and 0."""
@@ -29,9 +32,9 @@ def number(value: object) -> float:
 
 
 def step(value: object) -> float:
-    """Take a number above 0."""
-    if (found := number(value)) <= 0:
-        raise ValueError(f"it takes a number above 0, as 0.01, not {value!r:.60}")
+    """Take a number from `FINEST` on."""
+    if (found := number(value)) < FINEST:
+        raise ValueError(f"it takes a number from {FINEST:g} on, as 0.01, not {value!r:.60}")
     return found
 
 

@@ -15,6 +15,12 @@ from tickrig.emulators.testing.signals.mistake import Mistake
 from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
 from tickrig.emulators.testing.signals.sources import Constant
 
+LONGEST: Final = 100
+"""So many signals may need each other in a row."""
+
+TAKEN: Final = ("t", "pi")
+"""What formulas name otherwise."""
+
 SLASH: Final = "/"
 """Between the name of a device and that of its input or output."""
 
@@ -85,7 +91,7 @@ class Scope:
                     yield found
 
     def ordered(self) -> list[str]:
-        """Return all signals, each behind those that it needs; ValueError for a circle."""
+        """Return all signals, each behind those that it needs; ValueError if there is none."""
         order: dict[str, None] = {}
         for key in self.signals:
             self._enter(key, (), order)
@@ -94,12 +100,18 @@ class Scope:
     def _enter(self, key: str, path: tuple[str, ...], order: dict[str, None]) -> None:
         if key in order:
             return
+        if len(path) == LONGEST:
+            raise _Order(f"it needs more than {LONGEST} others in a row", path[0])
         if key in path:
             circle = (*path[path.index(key) :], key)
-            raise ValueError(f"a circle: {' -> '.join(circle)}")
+            raise _Order(f"a circle: {' -> '.join(circle)}", key)
         for other in self.needed(key):
             self._enter(other, (*path, key), order)
         order[key] = None
+
+
+class _Order(ValueError):  # noqa: N818 - told as a mistake
+    """Why there is no order: the reason, and the signal."""
 
 
 def check_signals(
@@ -119,15 +131,16 @@ def check_signals(
     if not mistakes:
         try:
             scope.ordered()
-        except ValueError as error:
-            key = str(error).partition(": ")[2].partition(" -> ")[0]
-            mistakes.append(Mistake((key,), str(error)))
+        except _Order as error:
+            mistakes.append(Mistake((error.args[1],), str(error.args[0])))
     return mistakes
 
 
 def _check(scope: Scope, key: str) -> Iterator[Mistake]:
     if SLASH in key:
         yield from _check_target(scope, key)
+    if key in TAKEN:
+        yield Mistake((key,), f"no signal can be called so: in formulas {key} is something else")
     source = scope.signals[key].source
     if isinstance(source, Lag | Integral):
         source = source.formula

@@ -85,7 +85,7 @@ class SignalSpec(Immutable):
         """Return what quantisation and limits leave of a value."""
         if isinstance(value, str) or not (self.step or self.low > -inf or self.high < inf):
             return value
-        if self.step and isfinite(value):
+        if self.step and isfinite(value / self.step):
             value = _rounded(value, self.step)
         return min(max(value, self.low), self.high)
 

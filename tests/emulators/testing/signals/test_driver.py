@@ -225,6 +225,13 @@ def test_a_text_is_no_number() -> None:
             ["a/volt: a circle: a/volt -> y -> z -> a/volt"],
         ),
         (
+            'pi = 3\nt = {formula = "t"}',
+            [
+                f"{name}: no signal can be called so: in formulas {name} is something else"
+                for name in ("pi", "t")
+            ],
+        ),
+        (
             '"c/volt" = 1\n"a/amps" = 2\n"a/count" = 1.5',
             [
                 "c/volt: no device c; known: a, b",
@@ -255,6 +262,24 @@ def test_all_mistakes_on_a_bench_are_found_at_once(toml: str, mistakes: list[str
     assert [str(mistake) for mistake in found] == mistakes
     with pytest.raises(ValueError, match="; " if len(mistakes) > 1 else "circle"):
         SignalBench(signals)
+
+
+def test_a_row_of_signals_has_its_limit() -> None:
+    rows = {f"s{n}": {"formula": f"s{n + 1}"} for n in range(2_000)}
+    found = check_signals(signals_of({**rows, "s2000": 1}), {})
+    assert [str(mistake) for mistake in found] == ["s0: it needs more than 100 others in a row"]
+
+
+def test_huge_values_are_as_far_as_an_input_goes() -> None:
+    bench = SignalBench.of(
+        """
+        "a/volt" = {formula = "1e308 * 10 * t", step = 1e-12}
+        "b/volt" = {formula = "x * 1e300", step = 0.1}
+        x = {integral = "1e308"}
+        """
+    )
+    bench.rig.run_for(1_000_000)
+    assert (bench.a.inputs["volt"], bench.b.inputs["volt"]) == (100, 100)
 
 
 def test_what_is_within_its_limits_may_reach_further() -> None:

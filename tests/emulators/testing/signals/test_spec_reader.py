@@ -92,7 +92,7 @@ def test_formulas_and_what_holds_state() -> None:
                 "x.ramp: it takes a number, as 12.5, not '1'",
                 'x.over: it takes a time with its unit, as "1.5s" or "20ms", not 10',
                 "x.from: 'soon' is not a time: write 1.5s, 200ms or 250us",
-                "x.step: it takes a number above 0, as 0.01, not 0",
+                "x.step: it takes a number from 1e-12 on, as 0.01, not 0",
             ],
         ),
         (
