@@ -143,7 +143,7 @@ class SerialRun(EmulatorRun):
         try:
             port = NetworkPort(url)
         except OSError as error:
-            raise Refused(f"--serve {url}: {error.strerror or error}") from error
+            refuse_path("--serve", error)
         stack.callback(port.close)
         self._places.append(port.url)
         if port.is_open_to_others:

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.serial.host_setting import HostSetting
@@ -47,7 +47,8 @@ class NetworkPort(NonCopyable):
         port: its TCP port.
 
     Raises:
-        OSError: the port is taken, or the host is no address of this machine.
+        OSError: the port is taken, or the host is no address of this machine; the URL is its
+            `filename`.
     """
 
     why_not_copied = "it is a TCP port of this machine"
@@ -178,25 +179,34 @@ class NetworkPort(NonCopyable):
 
 
 def _listen(url: ServeUrl) -> socket.socket:
-    """Return a listening socket, non-blocking."""
+    """Return a listening socket, non-blocking; OSError names the URL."""
+    try:
+        family, kind, protocol, address = _resolve(url)
+        listener = socket.socket(family, kind, protocol)
+        try:
+            if os.name == "posix":  # else somebody could take the same port
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            with suppress(OSError):
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+            listener.bind(address)
+            listener.listen()
+        except OSError:
+            listener.close()
+            raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(url)) from error
+    listener.setblocking(False)
+    return listener
+
+
+def _resolve(url: ServeUrl) -> tuple[int, int, int, Any]:
+    """Return family, kind, protocol and address of where to listen."""
     try:
         found = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)
     except ValueError as error:  # what IDNA cannot take, as a..b
         raise OSError(errno.EINVAL, f"{url.host!r} is no name of a host") from error
     family, kind, protocol, _, address = found[0]
-    listener = socket.socket(family, kind, protocol)
-    try:
-        if os.name == "posix":  # else somebody could take the same port
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        with suppress(OSError):
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
-        listener.bind(address)
-        listener.listen()
-    except OSError:
-        listener.close()
-        raise
-    listener.setblocking(False)
-    return listener
+    return family, kind, protocol, address
 
 
 def _reachable(address: str) -> str:

@@ -8,12 +8,12 @@ import logging
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 
 import pytest
 
 from tickrig.emulators.serial.network.host_connection import LAST_WORDS_US, STUCK_US
-from tickrig.emulators.serial.network.network_port import NetworkPort
+from tickrig.emulators.serial.network.network_port import MAX_DISMISSED, NetworkPort
 from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
 from tickrig.emulators.serial.serial_hub import SerialHub
 
@@ -94,6 +94,23 @@ def test_a_second_host_is_told_and_left_and_the_first_stays(
     assert record.getMessage().startswith(f"{port.url} has a host already: {first}; 127.0.0.1:")
 
 
+def test_of_many_hosts_that_were_refused_few_are_kept() -> None:
+    with served() as port, greeted(port), ExitStack() as stack:
+        refused = [stack.enter_context(connected(port)) for _ in range(2 * MAX_DISMISSED)]
+        for _ in range(1_000):
+            port.poll(0)
+        assert refused[-1].recv(100).startswith(port.url.encode())
+        with pytest.raises(ConnectionError):
+            send_on(refused[0])
+
+
+def send_on(host: socket.socket) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline:
+        host.send(b"let me in\n")
+        time.sleep(0.001)
+
+
 @pytest.mark.parametrize("last", [b"", b"x" * 5_000])
 def test_the_next_host_is_taken_when_all_of_the_last_one_was(last: bytes) -> None:
     with served() as port:
@@ -113,7 +130,8 @@ def test_a_host_that_ended_its_sending_is_answered_for_a_while() -> None:
         port.poll(0)
         port.send(0, b"RRC\n")
         assert host.recv(100) == b"RRC\n"
-        port.poll(LAST_WORDS_US)
+        for late_us in range(LAST_WORDS_US, 20 * LAST_WORDS_US, LAST_WORDS_US):
+            port.poll(late_us)  # the end may be there only at the second look
         assert host.recv(100) == b""
 
 
@@ -193,7 +211,7 @@ def test_a_port_open_to_others_says_so_and_where_this_machine_finds_it(place: st
 def test_a_port_that_is_taken_is_free_again_after_close() -> None:
     with served() as port, greeted(port):
         url = parse_serve_url(port.url)
-        with pytest.raises(OSError, match="in use"):
+        with pytest.raises(OSError, match=f"in use: '{url}'"):
             NetworkPort(url)
     NetworkPort(url).close()
 
