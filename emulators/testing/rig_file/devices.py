@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.testing.rig_file.fields import check_name, near, shown
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, WirePlan, WireType
@@ -55,6 +56,17 @@ class DeviceReader:
                 if not table.notes.names:
                     self._check_name(name, table)
                 self.plans[name] = self._read(name, table)
+
+    def check_stores(self) -> None:
+        """Note files that are there and keep something else than what nodes store."""
+        for name, plan in self.plans.items():
+            if plan is not None and plan.store is not None:
+                try:
+                    StoreFile(plan.store)
+                except StoreError as error:
+                    self.sections[name].wrong(str(error), "store")
+                except OSError as error:
+                    self.sections[name].wrong(f"{plan.store}: {error.strerror}", "store")
 
     def put_on_wires(self) -> None:
         """Find the wire of each device, and note what is wrong with wires."""

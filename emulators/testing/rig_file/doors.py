@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
-from tickrig.emulators.testing.rig_file.fields import near
+from tickrig.emulators.testing.rig_file.fields import closest, near
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DevicePlan,
@@ -59,7 +59,9 @@ class DoorReader:
         doors: dict[str, DoorPlan] = {}
         for name, wire, table in self._tables(section, CONTROL):
             if wire is None:
-                table.wrong(f"{name!r} shares its wire: write its doors into [real.WIRE]")
+                device = self._devices[name]
+                shared = device.wire if device else "WIRE"
+                table.wrong(f"the wire of {name!r} is {shared!r}, write [real.{shared}]")
             elif wire.name in doors:
                 table.wrong(f"the doors of wire {wire.name!r} are given twice")
             else:
@@ -78,9 +80,11 @@ class DoorReader:
             schema = _hardware_schema(wire, is_device=name in self._devices)
             found = table.read(schema)
             if wire is not None and "port" in found:
+                if wire.name in ports:
+                    table.wrong(f"the port of wire {wire.name!r} is given twice", "port")
                 ports[wire.name] = PortPlan(port=found["port"], baud=found.get("baud"))
             if wire is not None and "interface" in found:
-                buses[wire.name] = _bus(found)
+                buses[wire.name] = _bus(table, found)
             if name in self._devices and CONTROL in found:
                 control[name] = self._file(found[CONTROL])
             if switched := _power(table, found):
@@ -121,7 +125,7 @@ class DoorReader:
     def _door(self, wire: WirePlan, section: Section) -> DoorPlan:
         if wire.type is WireType.CAN:
             found = section.read(REAL_BUS)
-            return DoorPlan(bus=_bus(found) if "interface" in found else None)
+            return DoorPlan(bus=_bus(section, found) if "interface" in found else None)
         found = section.read(REAL_LINE)
         serve = found.get("serve", ())
         for url in serve:
@@ -156,7 +160,13 @@ def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:
     return {**HARDWARE_LINE, **of_device}
 
 
-def _bus(found: Mapping[str, Any]) -> BusPlan:
+def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
+    """Return a bus; a driver that is not here may be there on another machine."""
+    from can import VALID_INTERFACES  # noqa: PLC0415 - slow
+
+    name = found["interface"]
+    if name not in VALID_INTERFACES and (meant := closest(name, sorted(VALID_INTERFACES))):
+        section.wrong(f"no driver {name!r}; did you mean {meant[0]!r}?", "interface")
     return BusPlan(
         interface=found["interface"],
         channel=found.get("channel"),

@@ -90,6 +90,7 @@ class _Reader:
         if "device" not in top.values and top.notes.document.whole:
             top.wrong("no device: a rig file has tables [device.NAME] with a type")
         self._make_probes()
+        self._devices.check_stores()
         self._devices.put_on_wires()
         check_wires(top, self._wires, self._devices.plans)
         node_ids = self._check_node_ids()

@@ -311,10 +311,22 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         (RRC + "[real]\nrcr.link = 'x'", ["4: real.rcr: no device or wire 'rcr'; did you mean"]),
         (RRC + "[real.rrc]\nserve = 'http://x'", ["4: real.rrc.serve: 'http://x' is not rfc2217"]),
         (RRC + "[real.rrc]\nchannel = 'x'", ["4: real.rrc: no key 'channel'; "]),
-        (NODE + "[real.node]\nlink = 'x'", ["4: real.node: 'node' shares its wire"]),
+        (
+            NODE + "[real.node]\nlink = 'x'",
+            ["4: .*wire of 'node' is 'can', write [real.can]"],
+        ),
         (
             RRC + "[device.b]\ntype='rrc'\n[real]\nrrc.link = 'x'\nb.link = 'x'",
             ["7: real.b: bench/x is that of 'rrc' already"],
+        ),
+        (
+            NODE + "[real.can]\ninterface = 'socketcn'",
+            ["5: .*no driver 'socketcn'; did you"],
+        ),
+        (
+            "[wire.l]\ntype='serial'\n" + RRC + "wire='l'\n"
+            "[hardware]\nl.port = 'x'\nrrc.port = 'x'",
+            ["8: hardware.rrc.port: the port of wire 'l' is given twice"],
         ),
         (RRC + "[hardware.rrc]\nbaud = 9600", ["3: hardware.rrc: no key 'port'"]),
         (
@@ -357,6 +369,21 @@ def test_a_file_that_is_no_text_is_told_with_its_line(tmp_path: Path) -> None:
         read_rig_file(file)
     with pytest.raises(FileNotFoundError):
         read_rig_file(tmp_path / "nowhere.toml")
+
+
+def test_a_store_that_is_none_is_told(tmp_path: Path) -> None:
+    (tmp_path / "store.json").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    text = '[device.{name}]\ntype = "epos"\nnode_id = {at}\nstore = "{name}{suffix}"\n'
+    rig = text.format(name="store", at=1, suffix=".json") + text.format(
+        name="folder", at=2, suffix=""
+    )
+    with pytest.raises(RigFileError) as caught:
+        parse_rig_file(rig, tmp_path / "rig.toml")
+    first, second = (f"{line}: {reason}" for line, reason in caught.value.mistakes)
+    assert first.startswith("4: device.store.store: ")
+    assert "store.json: not a store file" in first
+    assert second == f"8: device.folder.store: {tmp_path}/folder: Is a directory"
 
 
 def test_what_an_eds_has_wrong_is_told(tmp_path: Path) -> None:
