@@ -198,7 +198,8 @@ class _Direction:
         burst.start_us += count * self._byte_cost // self._baud
 
     def _arrived(self, burst: _Burst, now_us: int) -> int:
-        return min(len(burst.data), (now_us - burst.start_us) * self._baud // self._byte_cost)
+        passed_us = max(0, now_us - burst.start_us)  # it may be looked at as of an earlier time
+        return min(len(burst.data), passed_us * self._baud // self._byte_cost)
 
     def _arrival_us(self, burst: _Burst, count: int) -> int:
         return burst.start_us - (-count * self._byte_cost // self._baud)

@@ -192,3 +192,17 @@ def test_what_has_not_begun_can_be_dropped() -> None:
     line.a.send(150, b"x")
     line.a.drop_unsent(1_000)
     assert (line.b.poll(1_000), line.a.unsent(1_000)) == (b"abx", 0)
+
+
+def test_it_can_be_polled_byte_by_byte_as_of_the_times_of_arrival() -> None:
+    line = SerialLine(baud=100_000)
+    line.a.send(0, b"ab")
+    line.a.send(1_000, b"cde")
+    line.a.send(9_000, b"f")
+    arrived = list[tuple[int, bytes]]()
+    while (at_us := line.b.due_us) < NEVER:
+        arrived.append((at_us, line.b.poll(at_us)))
+    times = (100, 200, 1_100, 1_200, 1_300, 9_100)
+    assert arrived == [
+        (at_us, bytes([value])) for at_us, value in zip(times, b"abcdef", strict=True)
+    ]
