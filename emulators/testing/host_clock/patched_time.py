@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from tickrig.emulators.rig.sim_waits import Passing, SimTime
 from tickrig.emulators.testing.host_clock.host_waits import HostWaits
@@ -17,14 +18,15 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
     What their code calls of `time` (`sleep`, `time`, `monotonic`, `perf_counter`, and in
     nanoseconds) is on the clock of `passing`; so are `wait` and `wait_for` of threading's events
     and conditions, `get` and `put` of queues, and a `select` of nothing with a timeout. Each look
-    at the clock takes 100 us, so that a loop that only looks comes to its end.
+    at the clock takes 100 us, so that a loop that only looks comes to its end. Event loops of
+    asyncio that are made meanwhile, if it was imported before, have the time of `passing` too.
 
     Code of a host is all that is not Python's own, pytest's, Hypothesis's, coverage's, pyserial's,
     python-can's, canopen's or ours. It is found in its modules whatever it has kept: names
     (`from time import sleep`), attributes of classes, defaults of arguments. Threads that run
     already keep their time. Of the others, only that of the caller can wait.
 
-    Not patched: what an object has kept before, `datetime`, `asyncio`, `socket`, `Thread.join`,
+    Not patched: what an object has kept before, `datetime`, `socket`, `Thread.join`,
     semaphores, `threading.Timer`, `queue.SimpleQueue`.
 
     Args:
@@ -34,5 +36,16 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
         The clock.
     """
     clock = SimTime(passing)
-    with Switches(HostWaits(passing, clock).acts()):
+    with Switches(HostWaits(passing, clock).acts()), _loops(passing):
         yield clock
+
+
+def _loops(passing: Passing) -> AbstractContextManager[None]:
+    """Return what lets event loops have this time; nothing where asyncio is not in use."""
+    if "asyncio" not in sys.modules:
+        return nullcontext()
+    from tickrig.emulators.testing.host_clock.bench_loop import (  # noqa: PLC0415 - imports asyncio
+        bench_loops,
+    )
+
+    return bench_loops(passing)

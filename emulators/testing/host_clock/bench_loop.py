@@ -1,0 +1,101 @@
+"""Event loops of asyncio in the time of a rig."""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from math import ceil
+from selectors import SelectorKey
+from threading import get_ident
+from typing import Any
+
+from tickrig.emulators.rig.sim_waits import Passing
+
+Events = list[tuple[SelectorKey, int]]
+
+
+class BenchLoop(asyncio.SelectorEventLoop):
+    """An event loop whose time is that of a rig.
+
+    Where it would wait for its next timer, time passes; what has come meanwhile from files,
+    sockets and other threads it finds then, but it does not wait for them.
+
+    Args:
+        passing: whose time passes.
+    """
+
+    def __init__(self, passing: Passing) -> None:
+        self._passing = passing
+        super().__init__(_PassingSelector(passing, self._called))
+        self._clock_resolution = 1e-6  # of the rig, not of this machine
+
+    def time(self) -> float:
+        """Return the time in seconds."""
+        return self._passing.time_s
+
+    def _called(self) -> bool:
+        """Say whether something is to be called at once, by whom that may be."""
+        ready: object = vars(self).get("_ready")
+        return bool(ready)
+
+
+@contextmanager
+def bench_loops(passing: Passing) -> Iterator[None]:
+    """Let `asyncio.run` and all that makes an event loop make one in the time of a rig.
+
+    Args:
+        passing: whose time passes, in this thread alone.
+    """
+    owner, original = get_ident(), asyncio.events.new_event_loop
+
+    def new_event_loop() -> asyncio.AbstractEventLoop:
+        return BenchLoop(passing) if get_ident() == owner else original()
+
+    asyncio.events.new_event_loop = asyncio.new_event_loop = new_event_loop
+    try:
+        yield
+    finally:
+        asyncio.events.new_event_loop = asyncio.new_event_loop = original
+
+
+class _PassingSelector(selectors.BaseSelector):
+    """A selector that lets the time of a rig pass instead of waiting."""
+
+    def __init__(self, passing: Passing, called: Callable[[], bool]) -> None:
+        self._passing, self._called = passing, called
+        self._inner = selectors.DefaultSelector()
+
+    def register(self, fileobj: Any, events: int, data: Any = None) -> SelectorKey:
+        return self._inner.register(fileobj, events, data)
+
+    def unregister(self, fileobj: Any) -> SelectorKey:
+        return self._inner.unregister(fileobj)
+
+    def modify(self, fileobj: Any, events: int, data: Any = None) -> SelectorKey:
+        return self._inner.modify(fileobj, events, data)
+
+    def get_map(self) -> Mapping[Any, SelectorKey]:
+        return self._inner.get_map()
+
+    def close(self) -> None:
+        self._inner.close()
+
+    def select(self, timeout: float | None = None) -> Events:
+        """Return what is there; if nothing is, let time pass until something is, or the timeout."""
+        found: Events = self._inner.select(0)
+
+        def come() -> bool:
+            found[:] = self._inner.select(0)
+            return bool(found) or self._called()
+
+        if found or (timeout is not None and timeout <= 0):
+            return found
+        timeout_s = None if timeout is None else ceil(timeout * 1e6) / 1e6
+        if not self._passing.wait(come, timeout_s) and timeout is None:
+            raise RuntimeError(
+                "an event loop waits for ever: nothing that happens on the bench ends it, and"
+                " neither threads nor sockets are waited for in virtual time"
+            )
+        return found
