@@ -1,1 +1,1 @@
-"""Runs recorded and replayed: wire logs, traces, candump files."""
+"""Runs recorded, replayed and compared: wire logs, traces, candump files."""

@@ -1,1 +1,1 @@
-"""What people write and read: times, sizes, values, files of their own, log lines; no commands."""
+"""What people write and read: times, sizes, values, files of their own, traces; no commands."""

@@ -15,6 +15,7 @@ from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 
 EDS = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
+EXAMPLES = Path(__file__).parents[4] / "examples"
 
 
 def replayed(bench: Bench, path: Path) -> str:
@@ -58,3 +59,20 @@ def test_a_bench_of_devices_that_a_test_has_made_replays(tmp_path: Path) -> None
         bench.press("rrc/power_button", for_="100ms")
         bench.run_for("1s")
         assert replayed(bench, tmp_path / "run.trace").startswith("identical: ")
+
+
+def test_a_device_rtc_of_a_file_replays_while_the_file_is_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "gripper.py"
+    file.write_text((EXAMPLES / "device_rtc_gripper.py").read_text())
+    device = DevicePlan(
+        name="t", kind=DeviceKind.DEVICE_RTC, type=f"{file}:Gripper", wire="bus", node_id=9
+    )
+    with Bench.of_plan(plan_of(device, wires=(BUS,))) as bench:
+        bench.run_for("100ms")
+        assert replayed(bench, tmp_path / "run.trace").startswith("identical: ")
+    file.write_text(file.read_text() + "# changed\n")
+    result = CliRunner().invoke(main, ["replay", str(tmp_path / "run.trace")])
+    assert result.exit_code == 2
+    assert result.stderr.endswith(
+        f"device t: {file} is another file than the one that was recorded\n"
+    )

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.host.live import LiveRrc, live_rrc, pty
+from tests.host.live import LiveRrc, live_rrc, pty, served
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.record.bench_replay import read_bench_recording
@@ -178,6 +178,18 @@ def test_what_was_recorded_of_a_pty_is_compared(
         assert recorder.end()[0] == 0
     result = CliRunner().invoke(main, ["compare", str(recorder.out), *JITTER])
     assert (result.exit_code, found in result.output) == (code, True), result.output
+
+
+@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
+def test_a_port_over_the_network_is_recorded(record: Start, tmp_path: Path, scheme: str) -> None:
+    with served(scheme) as port, live_rrc(port) as rrc:
+        rrc.await_output("state", "WaitPowerOn")
+        recorder = record(port.url, tmp_path / "run.trace", tmp_path / "tty")
+        host = SerialLink(str(recorder.link))
+        said = answer(host, b"version\n", b"Version 1.0\n")
+        assert recorder.end()[0] == 0
+    assert passed(recorder.out, Mark.TO_DEVICE) == b"version\n"
+    assert passed(recorder.out, Mark.FROM_DEVICE).endswith(said)
 
 
 def test_a_port_that_goes_ends_the_recording(record: Start, tmp_path: Path) -> None:
