@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from queue import Queue
+from contextlib import suppress
+from queue import Empty, Queue
 
-from serial import SerialException, rfc2217
+from serial import PortNotOpenError, SerialException, rfc2217
+from serial.serialutil import Timeout
 
 
 class Rfc2217Serial(rfc2217.Serial):
     """A serial port of another machine (RFC 2217).
 
     pyserial agrees with the other end on all settings when one is changed, in 50 ms at least; it
-    does so even for a time-out, of which the other end knows nothing. And where the other end
-    refuses in a line of text, as ser2net and ours do, it passes the line over.
+    does so even for a time-out, of which the other end knows nothing. Where the other end
+    refuses in a line of text, as ser2net and ours do, it passes the line over. And it forgets
+    what came before a connection ended.
 
     Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
     """
@@ -36,6 +39,35 @@ class Rfc2217Serial(rfc2217.Serial):
             said = received.decode("ascii", "replace").strip()
             instead = f"it said {said!r}" if said else "it said nothing"
             raise SerialException(f"no serial server answers there: {instead}") from error
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes, fewer if the time-out is over or the connection has ended.
+
+        Raises:
+            SerialException: it has ended, and all that came was read.
+        """
+        if not self.is_open or (queue := self._queue) is None:
+            raise PortNotOpenError
+        received = bytearray()
+        timeout = Timeout(self.timeout)  # type: ignore[arg-type] # None is for ever
+        with suppress(Empty):
+            while len(received) < size:
+                if (piece := queue.get(timeout=timeout.time_left())) is None:
+                    queue.put(None)  # the next look finds the end too
+                    if received:
+                        break
+                    raise SerialException("the connection has ended")
+                received += piece
+        return bytes(received)
+
+    def _telnet_read_loop(self) -> None:
+        """Take what comes, in a thread; what is no telnet ends it, as the end of the line does."""
+        try:
+            with suppress(TypeError, OSError):
+                super()._telnet_read_loop()  # type: ignore[misc] # not in typeshed
+        finally:
+            if (queue := self._queue) is not None:
+                queue.put(None)
 
     @property
     def _queue(self) -> Queue[bytes | None] | None:

@@ -46,11 +46,12 @@ class SerialLink:
             self._port = _open_port(url, baud, exclusive=exclusive)
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkClosed(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
-        connection = getattr(self._port, "_socket", None)
-        if isinstance(connection, socket.socket):
+        found = getattr(self._port, "_socket", None)
+        self._connection = found if isinstance(found, socket.socket) else None
+        if self._connection is not None:
             with suppress(OSError):  # gone already, as the first look will tell
-                tune(connection)
-                give_up_unanswered(connection)
+                tune(self._connection)
+                give_up_unanswered(self._connection)
 
     @property
     def now_us(self) -> int:
@@ -93,6 +94,8 @@ class SerialLink:
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+        if self._connection is not None:
+            self._connection.close()  # pyserial forgets one that the other end has reset
 
     def _take_rest(self) -> bytes:
         if not self._uncounted:

@@ -11,6 +11,7 @@ import pytest
 
 from tests.host.live import served
 from tickrig.emulators.serial.network.network_port import NetworkPort
+from tickrig.emulators.serial.network.rfc2217_connection import Rfc2217Connection
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.reopening_link import ReopeningLink
@@ -94,6 +95,47 @@ def test_a_server_that_is_silent_is_told() -> None:
         url = "rfc2217://{}:{}?timeout=0.1".format(*server.getsockname())
         with pytest.raises(LinkClosed, match="no serial server answers there: it said nothing"):
             SerialLink(url)
+
+
+@pytest.mark.parametrize("scheme", ["rfc2217", "socket"])
+def test_what_came_before_the_end_is_read_first(scheme: str) -> None:
+    with served(scheme) as port, polled(port) as stop:
+        link = SerialLink(port.url)
+        link.send(b"#")
+        assert answer(link, 1) == b"#"
+        stop()
+        port.send(0, b"last words")
+    with closing(link):
+        assert answer(link, 10) == b"last words"
+        for _ in range(2):
+            with pytest.raises(LinkClosed, match="cannot read from"):
+                link.receive(10_000_000)
+
+
+def test_what_is_no_telnet_ends_a_link_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failed: list[threading.ExceptHookArgs] = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    opened = threading.Event()
+
+    def serve(server: socket.socket) -> None:
+        host = Rfc2217Connection(server.accept()[0], 4_096, 115_200)
+        while not opened.wait(0.001):
+            host.poll(0)
+        host.connection.send(b"EV:Alarm\n\xff\xf0")
+        host.close()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=serve, args=[server])
+        thread.start()
+        with closing(SerialLink("rfc2217://{}:{}".format(*server.getsockname()))) as link:
+            opened.set()
+            assert answer(link, 9) == b"EV:Alarm\n"
+            with pytest.raises(LinkClosed, match="the connection has ended"):
+                link.receive(10_000_000)
+        thread.join()
+    assert not failed
 
 
 @pytest.mark.parametrize("scheme", ["rfc2217", "socket"])
