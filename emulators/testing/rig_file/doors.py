@@ -127,20 +127,16 @@ class DoorReader:
             found = section.read(REAL_BUS)
             return DoorPlan(bus=_bus(section, found) if "interface" in found else None)
         found = section.read(REAL_LINE)
-        serve = found.get("serve", ())
-        for url in serve:
-            try:
-                parse_serve_url(url)
-            except ValueError as error:
-                section.wrong(str(error), "serve")
-        return DoorPlan(link=self._file(found.get("link")), serve=serve)
+        serve = [url for url in found.get("serve", ()) if _is_url(section, url)]
+        return DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
 
     def _check_twice(self, section: Section, doors: Mapping[str, DoorPlan]) -> None:
         """Note links and addresses that two wires would have."""
         seen: dict[object, str] = {}
         for wire, door in doors.items():
             places: list[object] = [door.link] if door.link else []
-            places += [url for url in door.serve if not url.endswith(":0")]
+            served = [url for url in map(parse_serve_url, door.serve) if url.port]
+            places += [f"port {url.port} of {url.host}" for url in served]
             for place in places:
                 if place in seen:
                     section.wrong(f"{place} is that of {seen[place]!r} already", wire)
@@ -148,6 +144,16 @@ class DoorReader:
 
     def _file(self, name: str | None) -> Path | None:
         return None if name is None else self._folder / name
+
+
+def _is_url(section: Section, url: str) -> bool:
+    """Return whether a line can be served there; else it is noted."""
+    try:
+        parse_serve_url(url)
+    except ValueError as error:
+        section.wrong(str(error), "serve")
+        return False
+    return True
 
 
 def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:

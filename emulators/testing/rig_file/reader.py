@@ -87,7 +87,8 @@ class _Reader:
         """Read all of it; what is wrong is noted."""
         top = self._top
         seed = top.read({SEED: TOP[SEED]}, *(name for name in TOP if name != SEED)).get(SEED, 0)
-        if "device" not in top.values and top.notes.document.whole:
+        missing = "device" not in top.values or (not self._devices.plans and not top.notes.all)
+        if missing and top.notes.document.whole:
             top.wrong("no device: a rig file has tables [device.NAME] with a type")
         self._make_probes()
         self._devices.check_stores()

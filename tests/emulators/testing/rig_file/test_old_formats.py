@@ -75,6 +75,7 @@ def test_where_a_real_rrc_is_is_hardware(tmp_path: Path) -> None:
             '[[node]]\nid = "5-6"\nmodel = "epos"\n[[node]]\nid = 6\nmodel = "epos"',
             ["5: node[2].id: node 6 is there twice"],
         ),
+        ("node = []", ["1: no device: a rig file has tables"]),
         ("node = [5]", ["1: node[1]: it is a table [[node]], not 5"]),
         ('[[node]]\nid = 5\nmodel = "epos"\n[bdy]', ["4: no key 'bdy'; did you mean 'body'?"]),
         (

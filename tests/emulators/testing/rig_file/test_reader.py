@@ -241,6 +241,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
     ("text", "expected"),
     [
         ("", ["1: no device: a rig file has tables [device.NAME] with a type"]),
+        ("[device]", ["1: no device: a rig file has tables [device.NAME]"]),
         ("device = 5", ["1: device: it is a table [device], not 5"]),
         ('[device.a]\ntpye = "rrc"', ["2: device.a: no key 'tpye'; did you mean 'type'?"]),
         ("[device.a]\nwire = 'x'", ["1: device.a: no key 'type': what it is", "2: .*no wire 'x'"]),
@@ -327,6 +328,14 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
             "[wire.l]\ntype='serial'\n" + RRC + "wire='l'\n"
             "[hardware]\nl.port = 'x'\nrrc.port = 'x'",
             ["8: hardware.rrc.port: the port of wire 'l' is given twice"],
+        ),
+        (
+            RRC + "[real.rrc]\nserve = ['rfc2217://7000', 'socket://127.0.0.1:7000']",
+            ["3: real.rrc: port 7000 of 127.0.0.1 is that of 'rrc' already"],
+        ),
+        (
+            RRC + "[device.b]\ntype='rrc'\n[real]\nrrc.serve = 'socket://0'\nb.serve = 'socket://'",
+            ["7: real.b.serve: 'socket://': port '' is not in 0..65535"],
         ),
         (RRC + "[hardware.rrc]\nbaud = 9600", ["3: hardware.rrc: no key 'port'"]),
         (
