@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -115,30 +115,23 @@ def _words(points: Sequence[Point], axis: Axis) -> Iterator[Span]:
 
 def _path(points: Sequence[Point], axis: Axis, scale: tuple[float, float], steps: bool) -> str:
     parts: list[str] = []
-    down = False
+    before = ""
     for at_us, value in thinned(points, MOST_POINTS):
         x = f"{axis.part(at_us) * WIDTH / 100:g}"
-        if steps and down:
-            parts.append(f"H{x}")
-        if isinstance(value, int | float):
-            y = f"{_height(value, scale):.4g}"
-            parts.append((f"V{y}" if steps else f"L{x} {y}") if down else f"M{x} {y}")
-        down = isinstance(value, int | float)
-    if steps and down:
+        y = f"{_height(value, scale):.4g}" if isinstance(value, int | float) else ""
+        if not before:
+            parts += [f"M{x} {y}"] if y else []
+        elif not steps:
+            parts += [f"L{x} {y}"] if y else []
+        elif y != before:
+            parts += [f"H{x}", f"V{y}"] if y else [f"H{x}"]
+        before = y
+    if steps and before:
         parts.append(f"H{WIDTH}")
-    return "".join(_merged(parts))
+    return "".join(parts)
 
 
 def _height(value: float, scale: tuple[float, float]) -> float:
     """Return how far a value is from the top; halves, for their difference is never infinite."""
     low, high = scale
     return (high / 2 - value / 2) / (high / 2 - low / 2) * HEIGHT
-
-
-def _merged(parts: Iterable[str]) -> Iterator[str]:
-    """Leave out what draws nothing new."""
-    before = ""
-    for part in parts:
-        if part != before:
-            yield part
-        before = part

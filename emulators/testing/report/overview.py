@@ -17,7 +17,7 @@ LONGEST_ANCHOR: Final = 120
 UNWELL: Final = (Outcome.FAILED, Outcome.ERROR, Outcome.BLOCKED)
 """What somebody has to look at."""
 
-_NO_ANCHOR: Final = re.compile(r"[^A-Za-z0-9]+")
+_NO_ANCHOR: Final = re.compile(r"[\W_]+")
 
 
 @dataclass(frozen=True, slots=True)

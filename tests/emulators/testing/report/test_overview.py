@@ -76,3 +76,9 @@ def test_outcomes_are_counted_in_their_order() -> None:
 def test_the_slowest_come_first() -> None:
     tests = reported(TestRecord(f"t{n}", PASSED, wall_us=n) for n in range(20))
     assert [test.record.wall_us for test in slowest(tests)] == list(range(19, 9, -1))
+
+
+def test_anchors_of_equal_names_are_numbered() -> None:
+    names = ("a", "a", "a", "a-2", "é_1", "", "::")
+    anchors = [test.anchor for test in reported(TestRecord(name, PASSED) for name in names)]
+    assert anchors == ["t-a", "t-a-2", "t-a-3", "t-a-2-2", "t-é-1", "t-", "t--2"]

@@ -61,6 +61,7 @@ def test_a_long_run_keeps_its_spikes_and_takes_bounded_room() -> None:
         sampler.take(now_us)
     (series,) = sampler.series()
     assert len(series.points) <= 50
+    assert len(sampler._points["oven_c"]) <= 100
     assert (31_415, 29.0) in series.points
     assert series.points[-1][0] == 99_999
 
@@ -107,3 +108,17 @@ def test_fewer_samples_are_some_of_them_in_their_order(values: list[Value], most
     numbers = [value for value in values if isinstance(value, int)]
     if numbers and len(numbers) == len(values):
         assert {min(numbers), max(numbers)} <= {value for _, value in kept}
+
+
+def test_of_every_four_the_least_and_the_greatest_stay() -> None:
+    values = [5, 1, 1, 9, 2, 7, 7, 7, 3, 8, 4, 4, 6, 0]
+    points = list(enumerate(values))
+    assert thinned(points, 9) == [(0, 5), (1, 1), (3, 9), (5, 7), (8, 3), (9, 8), (10, 4), (13, 0)]
+    assert thinned(points, 14) == points
+
+
+def test_of_words_the_first_and_the_last_of_four_stay() -> None:
+    points: list[tuple[int, Value]] = list(enumerate(["x", "a", "b", "c", "d", 1, 2, "e", "y"]))
+    assert [value for _, value in thinned(points, 8)] == ["x", "a", "d", 1, "e", "y"]
+    alike: list[tuple[int, Value]] = list(enumerate([0, 4, 4, 4, 4, 4, 0]))
+    assert thinned(alike, 6) == [(0, 0), (1, 4), (4, 4), (5, 4), (6, 0)]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.testing.report.axis import Span
+from tickrig.emulators.testing.report.axis import Axis, Span
 from tickrig.emulators.testing.report.bench_report import (
     JournalLine,
     Outcome,
@@ -15,7 +15,8 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
     Value,
 )
-from tickrig.emulators.testing.report.lane import Lane
+from tickrig.emulators.testing.report.lane import CURVE_PX, SWITCH_PX, Lane
+from tickrig.emulators.testing.report.page_text import DASH
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 
 
@@ -50,6 +51,68 @@ def test_where_nothing_is_known_the_curve_has_a_gap() -> None:
     assert lane((0, 0), (200_000, None), (400_000, 1)).path == "M0 100H200M400 0H1000"
     drawn = lane((0, 0.0), (200_000, None), (400_000, 1.0), (500_000, 0.0), steps=False)
     assert drawn.path == "M0 100M400 0L500 100"
+
+
+def test_a_step_to_the_same_value_is_not_drawn() -> None:
+    assert lane((0, 0), (100_000, 0), (500_000, 9), (600_000, 9)).path == "M0 100H500V0H1000"
+
+
+def test_a_line_of_one_value_is_flat_and_a_gap_is_none_of_it() -> None:
+    assert lane((0, 5), (100_000, None), (200_000, 5)).path == "M0 50H100M200 50H1000"
+
+
+@pytest.mark.parametrize(
+    ("points", "rows"),
+    [
+        (((0, 1), (1, 0.5), (2, 7), (3, 123456.789)), ("1", "0.5", "123457", "123457", "4")),
+        (((0, 3), (1, None), (2, -4)), ("3", "-4", "3", "-4", "3")),
+        (((0, "Off"), (1, "On")), ("Off", DASH, DASH, "On", "2")),
+        (((0, 4), (1, 4)), ("4", "4", "4", "4", "2")),
+    ],
+)
+def test_a_table_has_first_least_greatest_and_last(
+    points: tuple[tuple[int, Value], ...], rows: tuple[str, ...]
+) -> None:
+    assert lane(*points).rows == rows
+
+
+def test_the_label_has_the_range_and_switches_are_low() -> None:
+    drawn = lane((0, 2.5), (1, 7))
+    assert (drawn.low, drawn.high, drawn.scale, drawn.height) == ("2.5", "7", (2.5, 7), CURVE_PX)
+    assert lane((0, 0), (1, 1)).height == SWITCH_PX
+    assert lane((0, 0), (1, 2)).height == CURVE_PX
+
+
+def test_words_that_change_for_ever_are_thinned() -> None:
+    drawn = lane(*((n, f"w{n}") for n in range(1_000)))
+    assert 50 < len(drawn.words) <= 200
+    assert (drawn.words[0].text, drawn.words[-1].text) == ("w0", "w999")
+
+
+def test_the_axis_has_round_times() -> None:
+    assert Axis(0, 2_000_000).ticks == [
+        (0, "0.0"),
+        (25, "0.5"),
+        (50, "1.0"),
+        (75, "1.5"),
+        (100, "2.0"),
+    ]
+    assert Axis(1_000_000, 1_500_000).ticks[1:3] == [(20, "1.1"), (40, "1.2")]
+
+
+@pytest.mark.parametrize(
+    ("left", "width", "place"),
+    [
+        (0, 25, "inside"),
+        (75, 25, "inside"),
+        (50, 24.9, "behind"),
+        (51, 24, "behind"),
+        (51.1, 24, "before"),
+        (99, 1, "before"),
+    ],
+)
+def test_the_name_of_a_fault_is_where_it_has_room(left: float, width: float, place: str) -> None:
+    assert Span(left, width, "cut").place == place
 
 
 def test_words_stand_as_long_as_they_hold() -> None:
@@ -88,6 +151,11 @@ def test_what_is_too_much_to_draw_is_counted() -> None:
     assert line.lanes[0].words[0].text == "x" * 80
 
 
+def test_a_fault_alone_makes_an_axis() -> None:
+    line = line_of(faults=(PlannedFault("cut", 100, 300),), virtual_us=None)
+    assert (line.axis[:], line.faults) == ((0, 300), (Span(33.33, 66.67, "cut"),))
+
+
 def test_actions_and_misses_are_on_the_axis() -> None:
     journal = (
         JournalLine(0, "", "<", "OK"),
@@ -114,6 +182,8 @@ def test_a_test_with_nothing_on_it_has_no_line() -> None:
         (((5, 1),), None, (5, 6)),
         (((0, 1),), 0, (0, 1)),
         (((-5, 1), (5, 1)), None, (-5, 5)),
+        (((40, 1),), 100, (0, 100)),
+        (((60, 1),), 100, (60, 100)),
     ],
 )
 def test_the_axis_holds_what_happened(
