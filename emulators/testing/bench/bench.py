@@ -80,6 +80,7 @@ class Bench(BenchDevice):
 
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
+        self._tasks: list[Task[Any]] = []
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
 
     @classmethod
@@ -219,7 +220,14 @@ class Bench(BenchDevice):
         Returns:
             The task; `await` it, or ask it for its `result()`.
         """
-        return self._mode.act(lambda rig: Task(rig, body))
+        task = self._mode.act(lambda rig: Task(rig, body))
+        self._tasks.append(task)
+        return task
+
+    def check_tasks(self) -> None:
+        """Raise what a task raised whose result nobody has asked for, of the first of these."""
+        for task in self._tasks:
+            task.check()
 
     def run(self, body: Coroutine[Any, Any, T]) -> T:
         """Run an async body to its end, and return what it returns.

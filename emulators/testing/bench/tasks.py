@@ -79,6 +79,7 @@ class Task(Generic[T]):
         self._wait: Wait | None = None
         self._result: list[T] = []
         self._error: BaseException | None = None
+        self._raised = False
         rig.rig.watchers.append(self._look)
         self._go_on(None)
 
@@ -94,10 +95,16 @@ class Task(Generic[T]):
             RuntimeError: it has not ended yet.
         """
         if self._error is not None:
+            self._raised = True
             raise self._error
         if not self._result:
             raise RuntimeError("the task has not ended yet")
         return self._result[0]
+
+    def check(self) -> None:
+        """Raise what it raised, unless somebody has asked for its result."""
+        if self._error is not None and not self._raised:
+            self.result()
 
     def __await__(self) -> Generator[Wait, bool, T]:
         """Wait for its end."""

@@ -115,6 +115,7 @@ class BenchedTest:
         assert self.bench is not None
         with guard(self.bench.mode, self._allowed):
             yield
+        self.bench.check_tasks()
         complaints = self._health.complaints(self._allowed) if self._health else ()
         if found := [*complaints, *unsafe(self.bench, self._safe)]:
             text = "after the test the bench is not as it has to be:"
@@ -122,6 +123,12 @@ class BenchedTest:
 
     def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         """Say what blocked a phase of the test, and tell with a failure what there is to know."""
+        try:
+            self._judge(report, call)
+        except Exception as error:  # whatever broke the bench: the report of the test is made
+            report.sections.append(("bench", f"it is broken: {error!r}"))
+
+    def _judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         if reason := blocked(report, call, self.bench):
             self.blocked = reason
             make_error(report, reason)

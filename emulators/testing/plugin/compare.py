@@ -68,8 +68,9 @@ class Compare:
         """Say how many tests were compared, and the hash of all."""
         lines = [f"{nodeid} {digest}\n" for nodeid, digest in sorted(self._hashes.items())]
         digest = sha256("".join(lines).encode()).hexdigest()
+        same = "1 test was" if len(lines) == 1 else f"{len(lines)} tests were"
         terminalreporter.write_line(
-            f"bench: {len(lines)} tests were the same in both runs; hash of all {digest[:16]}"
+            f"bench: {same} the same in both runs; hash of all {digest[:16]}"
         )
 
 

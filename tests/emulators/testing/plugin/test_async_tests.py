@@ -78,3 +78,30 @@ def test_what_a_bench_cannot_await_is_told(pytester: pytest.Pytester, run: Run) 
         """
     )
     run().stdout.fnmatch_lines(["*a bench waits for bench.sleep, bench.edge and the like, not*"])
+
+
+def test_a_task_that_failed_fails_the_test(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+
+        async def watch(bench):
+            await bench.sleep("100ms")
+            assert bench.get("state") == "Lost"
+
+        def test_nobody_asks(bench):
+            bench.start(watch(bench))
+            bench.run_for("1s")
+
+        async def test_it_is_awaited(bench):
+            with pytest.raises(AssertionError):
+                await bench.start(watch(bench))
+
+        def test_it_is_not_over(bench):
+            bench.start(watch(bench))
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=2, failed=1)
+    result.stdout.fnmatch_lines([">*assert bench.get('state') == 'Lost'".replace("'", '"')])

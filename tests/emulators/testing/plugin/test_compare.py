@@ -44,7 +44,7 @@ def test_runs_that_are_the_same_pass(pytester: pytest.Pytester, run: Run) -> Non
     )
     result = run("--bench-compare", "--junitxml=out.xml")
     result.assert_outcomes(passed=2, failed=1, skipped=1)
-    result.stdout.fnmatch_lines(["bench: 1 tests were the same in both runs; hash of all *"])
+    result.stdout.fnmatch_lines(["bench: 1 test was the same in both runs; hash of all *"])
     properties = re.findall('<property name="(\\w+)"', (pytester.path / "out.xml").read_text())
     assert properties == ["req", "bench_hash"]
 

@@ -237,3 +237,80 @@ def test_a_signal_without_a_value_fails_the_test(pytester: pytest.Pytester, run:
     result = run("--bench", "rig.toml")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["*signal chair/gauge: nan is no value at 2.010000 s"])
+
+
+@pytest.mark.realtime
+def test_a_failure_on_a_machine_that_stood_still_is_none_of_the_device(
+    pytester: pytest.Pytester, run_apart: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import os
+        import signal
+        import subprocess
+        from tickrig.host import RrcClient
+
+        def stand_still():
+            wake = f"sleep 0.2; kill -CONT {os.getpid()}"
+            with subprocess.Popen(["sh", "-c", wake]):
+                os.kill(os.getpid(), signal.SIGSTOP)
+
+        def test_fails(bench):
+            with RrcClient(bench.link) as client:
+                client.start()
+                stand_still()
+                bench.run_for("20ms")
+                assert bench.get("state") == "Lost"
+
+        def test_passes(bench):
+            bench.run_for("20ms")
+            stand_still()
+            bench.run_for("20ms")
+        """
+    )
+    result = run_apart("--bench-mode", "real", "--junitxml=out.xml")
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(
+        ["*- bench: blocked -*", "the machine was too slow: host up to * ms, emulator up to * late"]
+    )
+    suite = Xml.parse(pytester.path / "out.xml").find("testsuite")
+    assert suite is not None
+    assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
+
+
+@pytest.mark.realtime
+def test_a_bench_that_broke_down_is_told(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.device import Rrc
+
+        class Broken(Rrc):
+            def tick(self, now_us, rx):
+                if now_us > 5_000:
+                    raise ZeroDivisionError("the device is broken")
+                return super().tick(now_us, rx)
+
+        @pytest.fixture
+        def bench_config():
+            return Broken()
+
+        def test_it_is_waited_for(bench):
+            bench.run_for("1s")
+
+        def test_nobody_asks(bench):
+            bench.link.send(b"hello\\n")
+            while bench._mode._thread.running:
+                pass
+            assert 0
+
+        def test_all_is_well(bench):
+            pass
+        """
+    )
+    result = run("--bench-mode", "real")
+    result.assert_outcomes(passed=1, failed=2)
+    result.stdout.fnmatch_lines(
+        ["*ZeroDivisionError: the device is broken", "it is broken: *the device is broken*"]
+    )
