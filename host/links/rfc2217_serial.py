@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from contextlib import suppress
 from queue import Empty, Queue
+from typing import Final
 
 from serial import PortNotOpenError, SerialException, rfc2217
 from serial.serialutil import Timeout
+
+SAID_SHOWN: Final = 200
 
 
 class Rfc2217Serial(rfc2217.Serial):
@@ -37,8 +40,15 @@ class Rfc2217Serial(rfc2217.Serial):
                 raise
             received = b"".join(queue.get() or b"" for _ in range(queue.qsize()))
             said = received.decode("ascii", "replace").strip()
-            instead = f"it said {said!r}" if said else "it said nothing"
+            instead = f"it said {said[:SAID_SHOWN]!r}" if said else "it said nothing"
             raise SerialException(f"no serial server answers there: {instead}") from error
+
+    def close(self) -> None:
+        """Close the port, and its connection even if the other end has reset it."""
+        connection = self._socket  # type: ignore[attr-defined] # not in typeshed
+        super().close()
+        if connection is not None:
+            connection.close()
 
     def read(self, size: int = 1) -> bytes:
         """Return up to `size` bytes, fewer if the time-out is over or the connection has ended.
