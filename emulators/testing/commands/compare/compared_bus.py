@@ -13,7 +13,12 @@ from tickrig.emulators.record.bench_replay import BenchRecording, do, play_devic
 from tickrig.emulators.record.comparison import Said
 from tickrig.emulators.record.tolerance import Tolerance
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.emulators.testing.commands.compare.compared_line import SEARCHED_US, ComparedRun
+from tickrig.emulators.testing.commands.compare.compared_line import (
+    SEARCHED_US,
+    ComparedRun,
+    begin_with,
+    closest,
+)
 from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame
@@ -65,22 +70,25 @@ def compare_bus(
         recording: recorded at a port of the bus.
         make: makes the nodes on a bus.
         tolerance: how long after the end they may still answer.
-        settle_us: how long the nodes have been on when the recording begins, unless it begins
-            with what one of them says.
+        settle_us: how long the nodes have been on when the recording begins. If what was said
+            first is what one of them says by itself when it is switched on, that is tried too,
+            and the closer one counts.
         bit_rate: of the bus in bit/s.
     """
     records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
-    begin_us = settle_us
-    bus = _Bus(make, bit_rate, 0)
-    if records and bus.owns(records[0].traffic):
-        first = records[0]
-        found = bus.play((), SEARCHED_US)
-        times = [x.at_us for x in found if tolerance.same(str(first.traffic), x.text)]
-        begin_us = (times[0] if times else settle_us + first.at_us) - first.at_us
-    bus = _Bus(make, bit_rate, begin_us)
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
-    emulated = bus.play(records, begin_us + until_us)
-    return ComparedRun(bus.recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+
+    def run(begin_us: int) -> ComparedRun:
+        bus = _Bus(make, bit_rate, begin_us)
+        emulated = bus.play(records, begin_us + until_us)
+        return ComparedRun(bus.recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+
+    settled = run(settle_us)
+    begins = []
+    if settled.recorded:
+        alone = _Bus(make, bit_rate, 0).play((), SEARCHED_US)
+        begins = begin_with(settled.recorded[0], alone, tolerance)
+    return closest([settled, *map(run, begins)], recording.until_us, tolerance)
 
 
 class _Bus:
@@ -104,7 +112,8 @@ class _Bus:
         """Return what the nodes say up to a time, from the begin of the recording."""
         for number, record in enumerate(records):
             at_us = max(0, self._begin_us + record.at_us)
-            self._rig.event_queue.put(number, at_us, partial(self._act, record))
+            early = self._begin_us + record.at_us < 0
+            self._rig.event_queue.put(number, at_us, partial(self._act, record, early))
         self._rig.run_to(end_us)
         return self._said
 
@@ -112,13 +121,14 @@ class _Bus:
         """Say whether an emulated node sends such a frame."""
         return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
 
-    def _act(self, record: BenchRecord, now_us: int) -> None:
+    def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
+        """Do what the host or a hand did; `early` is before the nodes were switched on."""
         frame = record.traffic
         if not isinstance(frame, CanFrame):
             self._do(record)
         elif record.mark is Mark.FROM_DEVICE and self.owns(frame):
             self.recorded.append(Said(record.at_us, str(frame), record.line))
-        else:
+        elif not early:
             self._host.send(now_us, (frame,))
 
     def _do(self, record: BenchRecord) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import Final
 
 from tickrig.emulators.commands.device_type import ConfiguredDevice
 from tickrig.emulators.record.bench_replay import BenchRecording, do, play_device, traffic_of
-from tickrig.emulators.record.comparison import Said
+from tickrig.emulators.record.comparison import Said, compare
 from tickrig.emulators.record.tolerance import Tolerance
 from tickrig.emulators.record.wire_log import Splitter, WireLine, line_splitter
 from tickrig.emulators.serial.emulator import Emulator
@@ -67,21 +68,45 @@ def compare_port(
         name: of the device.
         make: makes the device.
         tolerance: how long after the end the emulator may still answer.
-        settle_us: how long the emulator has been on when the recording begins, unless it
-            begins with what the device says: then the emulator says that at the same time.
+        settle_us: how long the emulator has been on when the recording begins. If what the
+            device said first is what it says by itself when it is switched on, that is tried
+            too, and the closer one counts.
     """
-    records, fresh = recording.of(name), make()
-    split = fresh.type.line.splitter or line_splitter
-    recorded = list(cut(split(Mark.FROM_DEVICE), traffic_of(records, Mark.FROM_DEVICE)))
-    begin_us = settle_us
-    if records and records[0].mark is Mark.FROM_DEVICE and recorded:
-        first = recorded[0]
-        alone = _play(make(), (), 0, SEARCHED_US)
-        found = (said.at_us for said in alone if tolerance.same(first.text, said.text))
-        begin_us = next(found, settle_us + first.at_us) - first.at_us
+    records = recording.of(name)
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
-    emulated = _play(fresh, records, begin_us, begin_us + until_us)
-    return ComparedRun(recorded, [said for said in emulated if said.at_us >= -tolerance.time_us])
+    split = make().type.line.splitter or line_splitter
+    recorded = list(cut(split(Mark.FROM_DEVICE), traffic_of(records, Mark.FROM_DEVICE)))
+
+    def run(begin_us: int) -> ComparedRun:
+        emulated = _play(make(), records, begin_us, begin_us + until_us)
+        return ComparedRun(recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+
+    begins = [settle_us]
+    if recorded:
+        begins += begin_with(recorded[0], _play(make(), (), 0, SEARCHED_US), tolerance)
+    return closest(map(run, begins), recording.until_us, tolerance)
+
+
+def begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> list[int]:
+    """Return when a recording began, if the device said that by itself.
+
+    Args:
+        first: what it said first.
+        alone: what the emulator says since it was switched on, if nobody does anything.
+        tolerance: what counts as the same.
+    """
+    found = (said.at_us for said in alone if tolerance.same(first.text, said.text))
+    return [at_us - first.at_us for at_us in islice(found, 1)]
+
+
+def closest(runs: Iterable[ComparedRun], until_us: int, tolerance: Tolerance) -> ComparedRun:
+    """Return the run with the fewest differences, the first of them."""
+
+    def differences(run: ComparedRun) -> int:
+        pairs = compare(run.recorded, run.emulated, until_us, tolerance)
+        return sum(bool(pair.difference) for pair in pairs)
+
+    return min(runs, key=differences)
 
 
 def _play(
@@ -97,9 +122,9 @@ def _play(
 
     emulator.log.listeners.append(hear)
     for number, record in enumerate(records):
-        if record.mark in (Mark.TO_DEVICE, Mark.PHYSICAL):
-            at_us = max(0, begin_us + record.at_us)
-            emulator.event_queue.put(number, at_us, partial(_act, emulator, record))
+        at_us = begin_us + record.at_us
+        if record.mark is Mark.PHYSICAL or (record.mark is Mark.TO_DEVICE and at_us >= 0):
+            emulator.event_queue.put(number, max(0, at_us), partial(_act, emulator, record))
     emulator.event_queue.put("end", end_us, lambda now_us: emulator.stop())
     while emulator.running and emulator.rig.now_us < NEVER:
         emulator.step()

@@ -73,6 +73,34 @@ def test_a_recording_of_the_same_device_is_the_same(tmp_path: Path, on_us: int) 
     assert "rrc EV " in result.stdout
 
 
+COMMANDS = (
+    *(b"version\n", b"device\n", b"output1e00\n", b"watchdog0a\n", b"watchdog32\n", b"beep0101\n"),
+    *(b"poweroff\n", b"junk\n", b"lim", b"\xff\xfe\n"),
+)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_recording_of_any_session_is_the_same(tmp_path: Path, seed: int) -> None:
+    chance = Random(seed)
+    line, rrc = SerialLine(), Rrc()
+    rig = Rig(Station(rrc, line.a))
+    rig.run_for(chance.choice([0, 1, 300_000, chance.randrange(3_000_000)]))
+    link = RecordingLink(SimLink(rig, line.b), tmp_path / "t", type="rrc")
+    for wait_us in (*(chance.randrange(20_000, 900_000) for _ in range(20)), 1_000_000):
+        if chance.random() < 0.25:
+            value = chance.choice([0, 1])
+            rrc.inputs.set("power_button", value)
+            link.note("power_button", value)
+        else:
+            link.send(chance.choice(COMMANDS))
+        until_us = link.now_us + wait_us
+        while link.now_us < until_us:
+            link.receive(until_us - link.now_us)
+    link.close()
+    result = compared(tmp_path / "t")
+    assert result.exit_code == 0, result.output
+
+
 def test_another_duration_is_found_with_its_line(tmp_path: Path) -> None:
     record_rrc(tmp_path / "t", RrcConfig(power_on_ticks=80))
     result = compared(tmp_path / "t")
