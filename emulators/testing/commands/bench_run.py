@@ -25,7 +25,7 @@ from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.plan_rig import rig_of
 from tickrig.emulators.testing.rig_file.plan import RigPlan
-from tickrig.emulators.testing.rig_file.summary import device_text
+from tickrig.emulators.testing.rig_file.summary import bus_text, device_text
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.trace import Mark
@@ -141,7 +141,7 @@ class BenchRun(EmulatorRun):
         door = self._plan.real.doors.get(mount.name)
         if isinstance(mount, BusMount):
             bus = door.bus if door else None
-            return f"{bus.interface} {bus.channel or ''}".strip() if bus else NOWHERE
+            return bus_text(bus) if bus else NOWHERE
         ports = self._outside.ports[mount.name] if self._outside else []
         pty = door.link if door and door.link else None
         return " ".join(

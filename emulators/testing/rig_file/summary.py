@@ -8,12 +8,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.canopen.node.node_spec import LSS
-from tickrig.emulators.testing.rig_file.plan import (
-    DevicePlan,
-    RigPlan,
-    WirePlan,
-    WireType,
-)
+from tickrig.emulators.testing.rig_file.plan import BusPlan, DevicePlan, RigPlan, WirePlan, WireType
 
 WIRES: Final = {WireType.SERIAL: "serial line", WireType.RS485: "RS485", WireType.CAN: "CAN"}
 
@@ -40,6 +35,8 @@ def summary(plan: RigPlan) -> Iterator[str]:
     for wire in plan.wires.values():
         devices = ", ".join(on_wires[wire.name])
         yield f"  {wire.name:{width}}  {wire_text(wire)}: {devices or 'nothing'}"
+        if places := "; ".join(_places(plan, wire.name)):
+            yield f"  {'':{width}}  {places}"
 
 
 def wire_text(wire: WirePlan) -> str:
@@ -65,6 +62,26 @@ def device_text(device: DevicePlan) -> str:
     node = {None: "", UNCONFIGURED: f", waits for {LSS.upper()}"}
     about = node.get(device.node_id, f", node-ID {device.node_id}")
     return f"{device.name} ({Path(device.type).name}{about})"
+
+
+def _places(plan: RigPlan, wire: str) -> Iterator[str]:
+    """Yield where a wire is in real time and on hardware, as far as the file says it."""
+    if door := plan.real.doors.get(wire):
+        bus = [bus_text(door.bus)] if door.bus else []
+        yield f"real: {', '.join([*([str(door.link)] if door.link else []), *door.serve, *bus])}"
+    if plan.hardware is not None:
+        port, outside = plan.hardware.ports.get(wire), plan.hardware.buses.get(wire)
+        place = port.port if port else bus_text(outside) if outside else "not said where"
+        yield f"hardware: {place}"
+
+
+def bus_text(bus: BusPlan) -> str:
+    """Say which bus of python-can it is.
+
+    >>> bus_text(BusPlan(interface="socketcan", channel="can0"))
+    'socketcan can0'
+    """
+    return bus.interface if bus.channel is None else f"{bus.interface} {bus.channel}"
 
 
 def _driven(device: DevicePlan) -> int:

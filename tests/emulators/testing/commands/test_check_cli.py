@@ -34,6 +34,23 @@ def test_a_good_file_is_summed_up(folder: Path) -> None:
     )
 
 
+def test_where_wires_are_is_summed_up(folder: Path) -> None:
+    (folder / "rig.toml").write_text(
+        GOOD + '[real]\nrrc = { link = "rrc.pty", serve = "socket://7000" }\n'
+        'can0.interface = "socketcan"\n[hardware]\nrrc.port = "/dev/ttyACM0"\n'
+        'can0 = { interface = "slcan", channel = "COM3" }\n'
+    )
+    assert run("rig.toml")[1].splitlines() == [
+        "rig.toml: ok: 3 devices, 3 wires, hardware",
+        "  can0  CAN 500000 bit/s: left (epos, waits for LSS)",
+        "        real: socketcan; hardware: slcan COM3",
+        "  rrc   serial line: rrc (rrc)",
+        "        real: rrc.pty, socket://7000; hardware: /dev/ttyACM0",
+        "  base  serial line: base (rh3-base)",
+        "        hardware: not said where",
+    ]
+
+
 def test_all_mistakes_of_all_files_are_told(folder: Path) -> None:
     (folder / "a.toml").write_text(GOOD.replace('"epos"', '"eops"').replace("rrc]", "r-c]"))
     (folder / "b.toml").write_bytes(b"\n\xff")
