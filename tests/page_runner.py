@@ -19,7 +19,7 @@ from tests.environment import Environment
 
 BLOCK: Final = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 FILE: Final = re.compile(r"# ([\w./-]+\.(?:py|toml|txt|csv|ini))\n")
-INSTALLING: Final = ("python3 -m venv", ". .venv", "pip install")
+INSTALLING: Final = ("python3 -m venv", ". .venv", "pip install 'tickrig")
 TIMEOUT_S: Final = 60
 
 
@@ -41,16 +41,29 @@ class PageRunner:
     def run(self, page: Path) -> None:
         """Do all that a page says; AssertionError if something else comes of it."""
         try:
-            whole = page.read_text("utf-8").replace("/tmp/", f"{self.folder}/")
-            for language, text in BLOCK.findall(whole):
-                if (name := FILE.match(text)) is not None:
-                    path = self.folder / name[1]
-                    path.parent.mkdir(parents=True, exist_ok=True)
-                    path.write_text(text[name.end() :].lstrip("\n"), "utf-8")
-                elif language == "console":
+            for language, text in self._blocks(page):
+                if not self._write(text) and language == "console":
                     self._type_all(text)
         finally:
             self.close()
+
+    def write_files(self, page: Path) -> None:
+        """Write the files of a page, and type nothing."""
+        for _, text in self._blocks(page):
+            self._write(text)
+
+    def _blocks(self, page: Path) -> list[tuple[str, str]]:
+        whole = page.read_text("utf-8").replace("/tmp/", f"{self.folder}/")
+        return BLOCK.findall(whole)
+
+    def _write(self, text: str) -> bool:
+        """Write a block that is a file; say whether it is one."""
+        if (name := FILE.match(text)) is None:
+            return False
+        path = self.folder / name[1]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text[name.end() :].lstrip("\n"), "utf-8")
+        return True
 
     def close(self) -> None:
         """End what still runs."""

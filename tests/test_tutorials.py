@@ -1,0 +1,67 @@
+"""The tutorials, word for word, in an environment of their own with our wheel."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.environment import ROOT, Environment, make_environment
+from tests.page_runner import PageRunner
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
+
+OURS = (
+    "nobody says what is on the bench",
+    "nothing will ever happen for which this body waits",
+    "a second thread cannot make virtual time pass",
+    "the machine was too slow: ",
+)
+"""What the page on trouble says of us, word for word."""
+
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    return make_environment(tmp_path_factory.mktemp("tutorials"))
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("page", TUTORIALS, ids=[page.stem for page in TUTORIALS])
+def test_a_tutorial_works(page: Path, environment: Environment, tmp_path: Path) -> None:
+    runner = PageRunner(environment, tmp_path)
+    runner.run(page)
+    assert len(runner.typed) > 2
+    shutil.rmtree(tmp_path)
+
+
+@pytest.mark.parametrize("page", ["real-hardware.md", "ci.md"])
+def test_the_rig_files_of_a_page_are_right(page: str, tmp_path: Path) -> None:
+    runner = PageRunner(Environment(tmp_path), tmp_path)
+    runner.write_files(ROOT / "docs" / page)
+    for path in tmp_path.glob("*.toml"):
+        if path.name != "pyproject.toml":
+            read_rig_file(path)
+
+
+@pytest.mark.realtime
+def test_the_commands_of_the_page_on_ci_work(environment: Environment, tmp_path: Path) -> None:
+    runner = PageRunner(environment, tmp_path)
+    runner.write_files(ROOT / "docs" / "tutorials" / "first-hil-test.md")
+    (tmp_path / "test_noise.py").unlink()
+    runner.run(ROOT / "docs" / "ci.md")
+    assert len(runner.typed) == 2
+
+
+def test_the_messages_of_the_page_on_trouble_are_there() -> None:
+    page = (ROOT / "docs" / "troubleshooting.md").read_text("utf-8")
+    sources = "".join(
+        path.read_text("utf-8")
+        for floor in ("emulators", "host")
+        for path in (ROOT / floor).rglob("*.py")
+    )
+    flat = " ".join(sources.replace('"\n', "").split())
+    for message in OURS:
+        assert f"`{message}" in page
+        assert message.rstrip(". :") in flat, message
