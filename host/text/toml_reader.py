@@ -126,7 +126,8 @@ class _Reader:
     def _take(self, sign: str, behind: str) -> None:
         self._skip(_BLANK)
         if not self._is(sign):
-            raise _WrongError(self._at, f"{sign!r} is missing behind {behind}")
+            shown = behind if behind.isprintable() else ascii(behind)
+            raise _WrongError(self._at, f"{sign!r} is missing behind {shown:.60}")
         self._at += len(sign)
 
     # Statements

@@ -22,6 +22,7 @@ Field = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
 
 LONGEST: Final = 60
+LONGEST_NAME: Final = 40
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _FRAMING: Final = re.compile(r"[5-8][NEOMS](1|1\.5|2)")
 
@@ -160,6 +161,8 @@ def node_id(value: object) -> int:
 
 def check_name(name: str) -> None:
     """Raise ValueError unless a device, wire or signal can be called so."""
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"a name of {len(name)} letters; {LONGEST_NAME} are enough")
     if not _NAME.fullmatch(name):
         fitting = re.sub(r"\W", "_", name, flags=re.ASCII)
         hint = f", as {fitting}" if _NAME.fullmatch(fitting) else ""

@@ -70,6 +70,7 @@ def test_the_values_are_those_of_the_standard_library() -> None:
             [f"1: {ONE_LINE}"],
         ),
         ("a = {x = 1,}", ["1: ',' is too much at the end of an inline table"]),
+        ('"he\ufeffllo" world\n', ["1: '=' is missing behind 'he\\ufeffllo'"]),
         ("hello world\n", ["1: '=' is missing behind hello"]),
         ("a =\n", ["1: a value is missing before the end of the line"]),
         ("[a.b\nc = 1", ["1: ']' is missing behind a.b"]),

@@ -249,6 +249,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         ("[device.a]\ntype = 5", ["2: device.a.type: it takes a text, not 5"]),
         ("device.a = 5", ["1: device.a: it is a table [device.a], not 5"]),
         ('[device.a-b]\ntype = "rrc"', ["1: .*a name is letters, digits and _.*, as a_b"]),
+        (f'[device.{"a" * 41}]\ntype = "rrc"', ["1: .*a name of 41 letters; 40 are enough"]),
         ('[device.can]\ntype = "rrc"', ["1: device.can: control, .* are no names of devices"]),
         (RRC + "node_id = 5", ["3: device.rrc: no key 'node_id'; known: type, wire,"]),
         (RRC + 'profile = "402"', ["3: device.rrc: no key 'profile'; "]),
