@@ -37,7 +37,7 @@ class EmulatorControl(RequestDispatcher):
                 "fault": (self._fault, ("spec",)),
                 "clear": (self._clear, ("name",)),
                 "lines": (self._lines, ("since",)),
-                "status": (self._status, ()),
+                "status": (self._status, ("since",)),
                 "stop": (self._stop, ()),
             }
         )
@@ -109,7 +109,11 @@ class EmulatorControl(RequestDispatcher):
         }
 
     def _status(self, request: Object) -> Object:
-        return dict(self._emulator.status())
+        status: Object = dict(self._emulator.status())
+        if "since" in request:
+            since_us = whole(request["since"], "since", 0, NEVER)
+            status["late_us"] = self._emulator.rig.late_since(since_us)
+        return status
 
     def _stop(self, request: Object) -> Object:
         self._emulator.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final, Generic, Protocol, TypeVar, overload
@@ -17,6 +18,9 @@ from tickrig.wire.instant import NEVER
 
 LATE_US: Final = 1_000
 """A step that begins later than this counts as late."""
+
+LATE_KEPT: Final = 1_000
+"""So many of the latest late steps are known by their times."""
 
 
 T = TypeVar("T")
@@ -117,6 +121,7 @@ class Rig(Copyable):
         event_queue: EventQueue | None = None,
     ) -> None:
         self.now_us = self.worst_late_us = self.late_ticks = 0
+        self._late: deque[tuple[int, int]] = deque(maxlen=LATE_KEPT)
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
         self.hosts: Listeners[Host] = Listeners()
@@ -337,8 +342,8 @@ class Rig(Copyable):
     def _run(self, now_us: int) -> None:
         late_us = self._clock.wait_until(now_us)
         self.now_us = self._open_us = now_us
-        self.worst_late_us = max(self.worst_late_us, late_us)
-        self.late_ticks += late_us > LATE_US
+        if late_us > 0:
+            self._note_late(late_us)
         for bridge in self._bridges:
             bridge.take_in(now_us)
         for wire in self._wires:
@@ -354,6 +359,22 @@ class Rig(Copyable):
     def _watch(self, now_us: int) -> None:
         for watch in tuple(self.watchers):
             watch(now_us)
+
+    def late_since(self, t_us: int) -> int:
+        """Return by how much the worst step was late from a time on, of those beyond `LATE_US`.
+
+        Args:
+            t_us: the time; if more than `LATE_KEPT` steps were late since then, all count.
+        """
+        if len(self._late) == LATE_KEPT and self._late[0][0] > t_us:
+            return self.worst_late_us
+        return max((late_us for at_us, late_us in self._late if at_us >= t_us), default=0)
+
+    def _note_late(self, late_us: int) -> None:
+        self.worst_late_us = max(self.worst_late_us, late_us)
+        if late_us > LATE_US:
+            self.late_ticks += 1
+            self._late.append((self.now_us, late_us))
 
     def _tick(self, now_us: int) -> None:
         """Let all devices with work compute, then send."""

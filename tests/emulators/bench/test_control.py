@@ -73,6 +73,11 @@ def test_lines_are_those_of_the_wire(emulator: Emulator) -> None:
     assert ask(emulator, "lines", since=1)["lines"] == []
 
 
+def test_late_steps_are_those_since_a_time(emulator: Emulator) -> None:
+    assert ask(emulator, "status", since=0)["late_us"] == 0
+    assert not ask(emulator, "status", since=-1)["ok"]
+
+
 def test_status_and_stop(emulator: Emulator) -> None:
     status = ask(emulator, "status")
     assert (status["now_us"], status["late_steps"], status["lost_bytes"]) == (0, 0, 0)

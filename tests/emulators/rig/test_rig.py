@@ -10,7 +10,7 @@ from tests.emulators.can.can_bench import frames
 from tests.emulators.can.test_can_rig import Node
 from tests.emulators.echo import Echo
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import LATE_KEPT, Rig, Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 
@@ -100,6 +100,22 @@ def test_a_late_step_is_counted_and_never_skipped() -> None:
     rig.run_for(50_000)
     assert echo.ticks == [10_000, 20_000, 30_000, 40_000, 50_000]
     assert (rig.worst_late_us, rig.late_ticks) == (5_000, 5)
+
+
+def test_late_steps_are_known_by_their_times() -> None:
+    clock = SlowClock(late_us=9_000)
+    rig = Rig(Station(Echo(period_us=10_000), SerialLine().a), clock=clock)
+    rig.run_for(20_000)
+    clock.worst_late_us = 2_000
+    rig.run_for(20_000)
+    assert [rig.late_since(t_us) for t_us in (0, 20_000, 30_000, 50_000)] == [
+        9_000,
+        9_000,
+        2_000,
+        0,
+    ]
+    rig.run_for(10_000 * LATE_KEPT)
+    assert (rig.late_since(20_000), rig.late_since(rig.now_us - 100_000)) == (9_000, 2_000)
 
 
 def test_a_rig_in_real_time_wakes_at_each_tick_but_runs_only_those_with_work() -> None:

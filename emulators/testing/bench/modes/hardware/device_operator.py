@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.host.text.values import Setting
 
 
@@ -25,6 +26,12 @@ class DeviceOperator(Protocol):
     def late_us(self) -> int:
         """How late the device was, as far as anybody knows."""
         ...
+
+    def prepare(self, like: HasSignals) -> None:
+        """Bring the device to where such a one begins, without its power, if that can be done."""
+
+    def begin(self) -> None:
+        """Give it its power, if `prepare` took it."""
 
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Set an input, or all inputs of a group."""

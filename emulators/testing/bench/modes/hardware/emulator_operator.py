@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 from typing import Final
 
+from tickrig.device.physical import SignalType
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.names import known
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.bench.errors import MachineTooSlow, NotOnThisBench, PortGone
 from tickrig.emulators.testing.bench.modes.emulated_mode import POWER
 from tickrig.emulators.testing.rig_file.plan import DevicePlan
@@ -18,6 +21,9 @@ from tickrig.wire.instant import NEVER
 
 NO_ANSWER_US: Final = round(TIMEOUT_S * 1e6)
 """How late an emulator is that does not answer."""
+
+OBJECT: Final = "0x"
+"""So objects of a dictionary begin; they are new whenever the power comes."""
 
 
 class EmulatorOperator:
@@ -41,21 +47,52 @@ class EmulatorOperator:
             self._client = ControlClient(path)
         except OSError as error:
             raise PortGone(f"{plan.name}: no emulator at {path}: {error.strerror}") from None
-        self._inputs, names = self._describe()
-        self._prefix = _prefix_of(plan, names, path)
-        self._wire = plan.wire
-        self._steps_before, _ = self._pace()
+        described = self._request("describe")
+        inputs, outputs, wire_faults = (
+            _names_of(described, key) for key in ("inputs", "outputs", "wire_faults")
+        )
+        self._prefix, self._wire = _prefix_of(plan, inputs | outputs, path), plan.wire
+        self._inputs, self._tick_us = inputs | wire_faults, int(str(described["tick_us"]))
+        self._wire_faults = [name for name in wire_faults if self._is_of_wire(name)]
+        self._begun_us = self._now_us
 
     @property
     def late_us(self) -> int:
-        """The worst, 0 if no step was late since this was made, or the emulator is gone."""
+        """How late its worst step was since this was made; 0 if it is gone."""
         try:
-            steps, late_us = self._pace()
+            late_us = self._request("status", since=self._begun_us)["late_us"]
         except MachineTooSlow:
             return NO_ANSWER_US
         except PortGone:
             return 0
-        return late_us if steps > self._steps_before else 0
+        assert isinstance(late_us, int)
+        return late_us
+
+    def prepare(self, like: HasSignals) -> None:
+        """Bring it to where a new one begins: nothing is broken, all inputs are as at the start.
+
+        Its power is off then. The world around it stays: where a drive has turned to it is still.
+        """
+        for name in self._wire_faults:
+            self._request("clear", name=name)
+        for item in like.inputs.table.values():
+            if self._prefix + item.name not in self._inputs or item.name.startswith(OBJECT):
+                continue
+            if item.type is SignalType.FAULT:
+                self.clear(item.name)
+            elif item.name not in POWER and self.get(item.name) != like.inputs[item.name]:
+                self.set(item.name, (like.inputs[item.name],))
+        if self._power is not None:
+            self.switch_power(on=False)
+        self._off_us = self._now_us
+
+    def begin(self) -> None:
+        """Give it its power, when it has seen that it had none."""
+        if self._power is None:
+            return
+        while self._now_us < self._off_us + 2 * self._tick_us:
+            time.sleep(self._tick_us / 1e6)
+        self.switch_power(on=True)
 
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Set an input, or all inputs of a group."""
@@ -78,11 +115,9 @@ class EmulatorOperator:
         text = self._fault_name(spec.name) + ("" if spec.rate is None else f"={spec.rate!r}")
         timed = (spec.from_us, spec.to_us, for_us) != (0, NEVER, None)
         if timed:
-            emulator_us = self._request("status")["now_us"]
-            assert isinstance(emulator_us, int)
+            ahead_us = self._now_us - now_us
             from_us = max(spec.from_us, now_us)
             to_us = spec.to_us if for_us is None else from_us + for_us
-            ahead_us = emulator_us - now_us
             text += f"@{format_time(from_us + ahead_us)}s"
             text += "" if to_us == NEVER else f"-{format_time(to_us + ahead_us)}s"
         self._request("fault", spec=text)
@@ -101,10 +136,9 @@ class EmulatorOperator:
 
     def switch_power(self, *, on: bool) -> None:
         """Give or take the supply."""
-        name = next((name for name in POWER if self._prefix + name in self._inputs), None)
-        if name is None:
+        if self._power is None:
             raise NotOnThisBench("this device has no input that is its supply")
-        self.set(name, (POWER[name] if on else 1 - POWER[name],))
+        self.set(self._power, (POWER[self._power] if on else 1 - POWER[self._power],))
 
     def close(self) -> None:
         """Hang up."""
@@ -114,20 +148,19 @@ class EmulatorOperator:
         names = (self._prefix + name, f"{self._wire}/{name}", name)
         return next((full for full in names if full in self._inputs), name)
 
-    def _describe(self) -> tuple[frozenset[str], frozenset[str]]:
-        """Return the names of inputs and faults, and those of inputs and outputs."""
-        found = self._request("describe")
-        inputs, outputs, faults = (
-            _names_of(found, key) for key in ("inputs", "outputs", "wire_faults")
-        )
-        return inputs | faults, inputs | outputs
+    def _is_of_wire(self, fault: str) -> bool:
+        return "/" not in fault or fault.startswith(f"{self._wire}/")
 
-    def _pace(self) -> tuple[int, int]:
-        status = self._request("status")
-        steps, late_us = status["late_steps"], status["late_us"]
-        assert isinstance(steps, int)
-        assert isinstance(late_us, int)
-        return steps, late_us
+    @property
+    def _power(self) -> str | None:
+        """The input that is its supply, None if there is none."""
+        return next((name for name in POWER if self._prefix + name in self._inputs), None)
+
+    @property
+    def _now_us(self) -> int:
+        now_us = self._request("status")["now_us"]
+        assert isinstance(now_us, int)
+        return now_us
 
     def _request(self, do: str, **fields: object) -> Object:
         try:

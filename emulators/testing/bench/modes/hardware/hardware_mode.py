@@ -69,7 +69,7 @@ class HardwareMode:
         self._terminal, self._begun_ns = terminal or Terminal(), time.monotonic_ns()
         self._like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
         self._pace, self._pending = HostPace(), list[tuple[Condition, Begin]]()
-        self._looking = False
+        self._looking = self._begun = False
         self._journal = DoorJournal(lambda: self.now_us, self._look)
         mounts = self._like.state.mounts
         places = places_of(plan, self._where, mounts)
@@ -154,6 +154,7 @@ class HardwareMode:
 
     def wait_until(self, done: Condition, within_us: int) -> bool:
         """Let time pass until something is so; False if it was not in time."""
+        self._begin_with(None)
         until_us = self.now_us + within_us
         while True:
             left_us = until_us - self.now_us
@@ -168,23 +169,23 @@ class HardwareMode:
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a host: bytes on a serial line, frames on a bus."""
-        return self._doors.link(wire)
+        return self._begin_with(self._doors.link(wire))
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a serial line by pyserial."""
-        return self._doors.serial(wire, options)
+        return self._begin_with(self._doors.serial(wire, options))
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can."""
-        return self._doors.can_bus(wire, options)
+        return self._begin_with(self._doors.can_bus(wire, options))
 
     def canopen_network(self, wire: str) -> canopen.Network:
         """Connect the canopen library to a bus."""
-        return self._doors.canopen_network(wire)
+        return self._begin_with(self._doors.canopen_network(wire))
 
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""
-        return self._doors.address(wire)
+        return self._begin_with(self._doors.address(wire))
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return what passed the doors last, and what the operator did."""
@@ -208,6 +209,13 @@ class HardwareMode:
     def close(self) -> None:
         """Close all ports, and let the operator go."""
         self._stack.close()
+
+    def _begin_with(self, door: T) -> T:
+        """Give the devices their power, now that somebody hears them."""
+        if not self._begun:
+            self._begun = True
+            self._operators.begin()
+        return door
 
     def _look(self) -> None:
         """Do what has waited for a condition that is true now."""

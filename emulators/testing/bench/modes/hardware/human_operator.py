@@ -47,6 +47,16 @@ class HumanOperator:
         no_faults = AssemblyFaults({})
         self._record = Operator(physical.inputs, physical.tick_us, EventQueue(), no_faults)
 
+    def prepare(self, like: HasSignals) -> None:
+        """Switch it off, if a command can; nobody is asked to bring it anywhere."""
+        if self._power is not None:
+            self._power.switch(on=False)
+
+    def begin(self) -> None:
+        """Switch it on, if a command can."""
+        if self._power is not None:
+            self._power.switch(on=True)
+
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Have an input set, or all inputs of a group, and held."""
         pairs = self._record.check_set(name, *values)

@@ -53,7 +53,14 @@ class Operators:
             undo.callback(self.close)
             for name in plan.devices:
                 self._operators[name] = self._operator_of(name)
+            for name, operator in self._operators.items():
+                operator.prepare(like.state.assembly.parts[name])
             undo.pop_all()
+
+    def begin(self) -> None:
+        """Give the devices their power that were brought to where they begin."""
+        for operator in self._operators.values():
+            operator.begin()
 
     @property
     def said_no(self) -> bool:

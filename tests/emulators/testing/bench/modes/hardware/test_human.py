@@ -134,17 +134,28 @@ def test_power_is_switched_by_hand_or_by_command(bench_of: BenchOf, tmp_path: Pa
     bench = bench_of(human)
     bench.switch_off()
     assert human.asked[0].startswith("rrc: switch it off, then")
-    mark = tmp_path / "on"
-    touch = (sys.executable, "-c", f"open({str(mark)!r}, 'w')")
-    fails = (sys.executable, "-c", "import sys; sys.exit('no such relay')")
-    bench = bench_of(Answers(), HardwarePlan(power={"rrc": PowerPlan(on=touch, off=fails)}))
-    bench["rrc"].switch_on()
-    assert mark.exists()
-    with pytest.raises(BenchBlocked, match=r"rrc was not switched off: .*: no such relay"):
-        bench.switch_off()
-    bench = bench_of(Answers(), HardwarePlan(power={"rrc": PowerPlan(on=("/no",), off=("/no",))}))
-    with pytest.raises(BenchBlocked, match="rrc was not switched on: /no: No such file"):
-        bench.switch_on()
+    bench = bench_of(Answers(), switched(tmp_path, "on", "off"))
+    assert [path.name for path in tmp_path.iterdir()] == ["off"]
+    bench.run_for("1ms")
+    assert {path.name for path in tmp_path.iterdir()} == {"off", "on"}
+    (tmp_path / "off").unlink()
+    bench["rrc"].switch_off()
+    assert (tmp_path / "off").exists()
+
+
+def switched(folder: Path, on: str, off: str) -> HardwarePlan:
+    """An RRC that is switched by commands, each of which makes a file."""
+    program = "import sys; open(sys.argv[1], 'w')"
+    commands = ((sys.executable, "-c", program, str(folder / name)) for name in (on, off))
+    return HardwarePlan(power={"rrc": PowerPlan(on=next(commands), off=next(commands))})
+
+
+def test_a_command_that_fails_says_nothing_of_the_device(bench_of: BenchOf, tmp_path: Path) -> None:
+    with pytest.raises(BenchBlocked, match=r"rrc was not switched off: .*: exit status 1: .*/no/"):
+        bench_of(Answers(), switched(tmp_path, "on", "no/file"))
+    missing = PowerPlan(on=("/no",), off=("/no",))
+    with pytest.raises(BenchBlocked, match="rrc was not switched off: /no: No such file"):
+        bench_of(Answers(), HardwarePlan(power={"rrc": missing}))
 
 
 @pytest.mark.parametrize(
