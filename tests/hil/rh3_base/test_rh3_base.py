@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from math import hypot
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ ADDRESS = 1
 ENABLED, MOVING, FAULT, WATCHDOG = 1, 2, 4, 8
 SPEED = 20_000
 """Counts/s."""
+
+PLACE = ("x_m", "y_m", "angle_left_rad")
 
 
 @pytest.fixture
@@ -170,8 +173,10 @@ def test_a_cut_line_stops_it_by_its_watchdog(base: Master) -> None:
 
 @pytest.mark.needs("output:x_m")
 def test_it_is_where_its_wheels_say(base: Master) -> None:
+    x_m, y_m, angle_rad = (float(base.bench.get(name)) for name in PLACE)
     drive(base, SPEED, SPEED)
     base.write(Address.COMMAND, Command.STOP)
     assert stands(base)
-    angle = float(base.bench.get("angle_left_rad"))
-    assert float(base.bench.get("x_m")) == pytest.approx(0.0995 * angle, rel=0.05)
+    now_x_m, now_y_m, now_angle_rad = (float(base.bench.get(name)) for name in PLACE)
+    way_m = hypot(now_x_m - x_m, now_y_m - y_m)
+    assert way_m == pytest.approx(0.0995 * (now_angle_rad - angle_rad), rel=0.05)

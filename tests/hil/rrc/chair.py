@@ -16,6 +16,9 @@ PATIENCE_US: Final = 5_000_000
 PRESS_US: Final = 30_000
 """How long a button is pressed: several periods of the RRC."""
 
+SETTLE_US: Final = 200_000
+"""From what an operator does to the last event that it causes."""
+
 SAMPLE_US: Final = 10_000
 EDGE_US: Final = 50_000  # how far a sampled edge of a tone may be off
 
@@ -121,6 +124,12 @@ class Chair:
     def leave(self) -> None:
         """Bring VR2 off, whatever state it is in: the next test begins there."""
         self.link.spoil = lambda line: line
+        self.bench.perform(
+            "switch VR2 off, unless it is off, and wait until it is dark", self._leave
+        )
+        self.client.run_for(SETTLE_US)
+
+    def _leave(self) -> None:
         self.bench.set("stick", 0, 0)
         while (state := self.bench.get("state")) != OFF_STATE:
             if state in ON_STATES:

@@ -51,10 +51,6 @@ class Host(LineHost):
 
 @pytest.fixture
 def host(bench: Bench) -> Host:
-    if bench.mode == "hardware":  # it is as the test before has left it
-        bench.switch_off()
-        bench.run_for("100ms")
-        bench.switch_on()
     bench.run_for("100ms")
     return Host(bench)
 
