@@ -146,11 +146,6 @@ class SerialRun(EmulatorRun):
             refuse_path("--serve", error)
         stack.callback(port.close)
         self._places.append(port.url)
-        if port.is_open_to_others:
-            say(
-                f"Whoever reaches port {port.port} of {port.address} can drive this device: there"
-                " is no password. Leave out the host to serve this machine alone."
-            )
         return port
 
     def _show_setting(self, setting: str) -> None:

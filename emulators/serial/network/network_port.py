@@ -27,6 +27,11 @@ MAX_BAUD: Final = 4_000_000
 
 MAX_DISMISSED: Final = 8
 
+OPEN_TO_OTHERS: Final = (
+    "Whoever reaches port %s of %s can drive this device: there is no password."
+    " Leave out the host to serve this machine alone."
+)
+
 _log = logging.getLogger(__name__)
 
 
@@ -35,7 +40,8 @@ class NetworkPort(NonCopyable):
 
     A second host is told so in a line of text and is left, unless the present one sends no
     more, or has not read for 30 s. While there is no host, what the device sends is gone, as
-    on a line without one. Nothing here ever waits, and what is kept for a host is bounded.
+    on a line without one. Nothing here ever waits, and what is kept for a host is bounded. There
+    is no password: a port that other machines can reach is warned of.
 
     Args:
         url: where to listen.
@@ -62,16 +68,13 @@ class NetworkPort(NonCopyable):
         self._setting: HostSetting | None = None
         self.address, self.port = self._listener.getsockname()[:2]
         self.url = str(replace(url, host=_reachable(self.address), port=self.port))
+        if not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback:
+            _log.warning(OPEN_TO_OTHERS, self.port, self.address)
 
     @property
     def due_us(self) -> int:
         """Unknown to anybody but the host."""
         return NEVER
-
-    @property
-    def is_open_to_others(self) -> bool:
-        """Whether other machines can connect."""
-        return not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback
 
     @property
     def lost(self) -> int:

@@ -59,7 +59,6 @@ def test_bytes_pass_as_they_are_both_ways_and_the_url_says_where() -> None:
         port.send(0, every)
         assert host.recv(1_000) == every
         assert port.host_setting == ""
-        assert not port.is_open_to_others
 
 
 def test_what_is_sent_without_a_host_is_gone_and_not_lost() -> None:
@@ -102,6 +101,14 @@ def test_of_many_hosts_that_were_refused_few_are_kept() -> None:
         assert refused[-1].recv(100).startswith(port.url.encode())
         with pytest.raises(ConnectionError):
             send_on(refused[0])
+
+
+def has_ipv6() -> bool:
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
 
 
 def send_on(host: socket.socket) -> None:
@@ -199,13 +206,19 @@ def test_a_host_whose_telnet_is_none_is_told_and_left(caplog: pytest.LogCaptureF
         greeted(port).close()
 
 
-@pytest.mark.parametrize("place", ["0.0.0.0:0", "[::]:0"])
-def test_a_port_open_to_others_says_so_and_where_this_machine_finds_it(place: str) -> None:
+@pytest.mark.parametrize("place", ["0.0.0.0:0", "[::]:0", "[::1]:0", "127.0.0.1:0"])
+def test_a_port_open_to_others_is_warned_of_and_says_where_this_machine_finds_it(
+    place: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    if "[" in place and not has_ipv6():
+        pytest.skip("this machine has no IPv6")
     with closing(NetworkPort(parse_serve_url(f"socket://{place}"))) as port:
-        assert port.is_open_to_others
         assert port.address == place.rpartition(":")[0].strip("[]")
         host, _, number = port.url.removeprefix("socket://").rpartition(":")
         assert (host, int(number)) in [("127.0.0.1", port.port), ("[::1]", port.port)]
+        warned = [record.getMessage() for record in caplog.records]
+    open_to_others = f"Whoever reaches port {port.port} of {port.address} can drive this device: "
+    assert [text.startswith(open_to_others) for text in warned] == [True] * ("1" not in place)
 
 
 def test_a_port_that_is_taken_is_free_again_after_close() -> None:
