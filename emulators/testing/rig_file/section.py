@@ -69,8 +69,9 @@ class Notes:
 
     @property
     def all(self) -> tuple[Mistake, ...]:
-        """All mistakes by their lines, none of them twice."""
-        return tuple(sorted({*self.document.mistakes, *self.mistakes}))
+        """All mistakes by their lines, none of them twice, as they can be shown."""
+        found = {*self.document.mistakes, *self.mistakes}
+        return tuple(sorted(Mistake(line, printable(reason)) for line, reason in found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +152,17 @@ def is_broken(value: object) -> bool:
         case list():
             return any(map(is_broken, value))
     return value is BROKEN
+
+
+def printable(text: str) -> str:
+    r"""Escape what no terminal shows.
+
+    >>> printable("us\ufeffd")
+    'us\\ufeffd'
+    """
+    if text.isprintable():
+        return text
+    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
 def dotted(keys: TomlPath) -> str:

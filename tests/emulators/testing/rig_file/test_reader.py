@@ -291,6 +291,10 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         (RRC + "start.gauge = {ramp=[0, 1], ovr='1s'}", ["3: .*gauge.ovr: not a key of ramp"]),
         (RRC + "start.gauge = {ramp=[1, 11], over='1s'}", ["3: .*it reaches 11, and gauge"]),
         (RRC + "[signal]\na.formula = 'b'", ["4: signal.a.formula: no signal, input or output b"]),
+        (
+            RRC + "[signal]\n'b\ufeff' = 1\na.formula = 'c'",
+            ["4: .*a name is letters", "5: .*no signal, input or output c; known: b\\ufeff, a,"],
+        ),
         (RRC + "[signal]\na = 1979-05-27", ["4: signal.a: it is a number, a text, or a table"]),
         (RRC + "[fault]\nrcr = 'cut'", ["4: fault.rcr: no device or wire 'rcr'; did you mean 'r"]),
         (RRC + "[fault]\nrrc = 5", ["4: fault.rrc: it takes a text or a list of texts, not 5"]),
