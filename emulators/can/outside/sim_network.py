@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from typing import Final
 
 import canopen
@@ -18,7 +17,6 @@ from tickrig.emulators.rig.retimed import retime, retimed
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import EPOCH_S, SimCondition, SimQueue, SimQueues, SimTime
 from tickrig.host.links.can_message import to_message
-from tickrig.host.links.errors import LinkClosed
 from tickrig.wire.can import STANDARD_MAX, CanFrame
 
 LIBRARY: Final = "canopen"
@@ -80,11 +78,6 @@ class SimNetwork(canopen.Network):
     def run_for(self, duration_us: int) -> None:
         """Let time pass, and deliver what comes meanwhile."""
         self._wait_until(lambda: False, self.host.now_us + duration_us)
-
-    def deliver(self) -> None:
-        """Call callbacks with what has arrived; no time passes, and a closed one has no more."""
-        with suppress(LinkClosed):
-            self.run_for(0)
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
         """Let time pass until `done()`; False if the timeout was first."""

@@ -12,6 +12,7 @@ from threading import get_ident
 from typing import Any
 
 from tickrig.emulators.rig.sim_waits import Passing
+from tickrig.emulators.testing.host_clock.errors import HostTimeError
 
 Events = list[tuple[SelectorKey, int]]
 
@@ -94,7 +95,7 @@ class _PassingSelector(selectors.BaseSelector):
             return found
         timeout_s = None if timeout is None else ceil(timeout * 1e6) / 1e6
         if not self._passing.wait(come, timeout_s) and timeout is None:
-            raise RuntimeError(
+            raise HostTimeError(
                 "an event loop waits for ever: nothing that happens on the bench ends it, and"
                 " neither threads nor sockets are waited for in virtual time"
             )

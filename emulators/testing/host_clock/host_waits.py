@@ -8,12 +8,17 @@ import threading
 import time
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any, Final
 
 from tickrig.emulators.rig.sim_waits import LOOK_US, Passing, SimTime
+from tickrig.emulators.testing.host_clock.errors import HostTimeError
 from tickrig.emulators.testing.host_clock.host_code import place_of
 from tickrig.emulators.testing.host_clock.kept_names import LOOKS
 from tickrig.emulators.testing.host_clock.switches import Acts
+
+FOR_EVER: Final = (
+    "waits for ever: nothing that happens on the bench ends it, and another thread cannot"
+)
 
 
 class HostWaits:
@@ -22,10 +27,14 @@ class HostWaits:
     Args:
         passing: whose time passes.
         clock: its functions of `time`.
+
+    Attributes:
+        refusals: who waited where nobody can: in another thread, or called back by the rig.
     """
 
     def __init__(self, passing: Passing, clock: SimTime) -> None:
         self._passing, self._clock = passing, clock
+        self.refusals: list[str] = []
         self._standing = SimTime(_Standing(passing))
         self._owner = threading.get_ident()
         self._others = {thread.ident for thread in threading.enumerate()} - {self._owner}
@@ -57,15 +66,15 @@ class HostWaits:
             thread = threading.get_ident()
             if thread in self._others:
                 return original(*args, **kwargs)
-            if thread != self._owner:
-                _refuse_thread(name, frame)
             try:
+                if thread != self._owner:
+                    raise HostTimeError(_other_thread())
                 return wait(original, *args, **kwargs)
-            except _ForEver:
-                raise RuntimeError(
-                    f"{place_of(frame)}: {name} waits for ever: nothing that happens on the bench"
-                    " ends it, and another thread cannot"
-                ) from None
+            except _ForEver as error:
+                raise HostTimeError(f"{place_of(frame)}: {name} {error}") from None
+            except HostTimeError as error:
+                self.refusals.append(f"{place_of(frame)}: {name}: {error}")
+                raise HostTimeError(self.refusals[-1]) from None
 
         return act
 
@@ -86,7 +95,7 @@ class HostWaits:
         if done() or self._passing.wait(done, timeout_s):
             return True
         if timeout_s is None:
-            raise _ForEver
+            raise _ForEver(FOR_EVER)
         return False
 
     def _wait_event(
@@ -164,8 +173,9 @@ class _ForEver(Exception):  # noqa: N818 - it is told in another one
     """What is waited for without a timeout does not come."""
 
 
-def _refuse_thread(name: str, frame: FrameType) -> NoReturn:
-    raise RuntimeError(
-        f"{place_of(frame)}: thread {threading.current_thread().name!r} waits ({name}), and only"
-        " the thread of the test makes virtual time pass: run a host with threads in real time"
+def _other_thread() -> str:
+    name = threading.current_thread().name
+    return (
+        f"only the thread of the test makes virtual time pass, not {name!r}:"
+        " run a host with threads in real time"
     )

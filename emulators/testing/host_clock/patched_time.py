@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from tickrig.emulators.rig.sim_waits import Passing, SimTime
+from tickrig.emulators.testing.host_clock.errors import HostTimeError
 from tickrig.emulators.testing.host_clock.host_waits import HostWaits
 from tickrig.emulators.testing.host_clock.switches import Switches
 
@@ -34,10 +35,17 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
 
     Yields:
         The clock.
+
+    Raises:
+        HostTimeError: another thread waited, or something that the rig had called back; it is
+            raised there, and once more at the end: such things are swallowed easily.
     """
     clock = SimTime(passing)
-    with Switches(HostWaits(passing, clock).acts()), _loops(passing):
+    waits = HostWaits(passing, clock)
+    with Switches(waits.acts()), _loops(passing):
         yield clock
+    if waits.refusals:
+        raise HostTimeError(waits.refusals[0])
 
 
 def _loops(passing: Passing) -> AbstractContextManager[None]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import FrameType
 from typing import Final
 
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US
+from tickrig.emulators.testing.host_clock.errors import HostTimeError
 
 LONGEST_US: Final = 3_600_000_000
 """Who waits without a timeout waits an hour at most."""
@@ -21,12 +22,10 @@ class RigPassing:
 
     Args:
         rig: stepped while somebody waits.
-        deliver: called between its steps; hands hosts what has arrived, as a thread of theirs
-            would do: `network.deliver` of a `SimNetwork`.
     """
 
-    def __init__(self, rig: Rig, deliver: Sequence[Callable[[], None]] = ()) -> None:
-        self._rig, self._deliver, self._delivering = rig, deliver, False
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
 
     @property
     def time_s(self) -> float:
@@ -39,29 +38,14 @@ class RigPassing:
         Without a timeout it is False once nothing happens any more, or after an hour.
 
         Raises:
-            RuntimeError: it is the rig that has called, in the middle of a step.
+            HostTimeError: it is the rig that has called, in the middle of a step.
         """
         timeout_us = LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
-        if _in_a_step():
-            if timeout_us > LOOK_US:
-                raise RuntimeError("what is called back while time passes cannot wait itself")
-            return done()
-
-        def handled() -> bool:
-            self._deliver_all()
-            return done()
-
-        return self._rig.run_until(handled if self._deliver else done, timeout_us)
-
-    def _deliver_all(self) -> None:
-        if self._delivering:  # a callback waits: the next one has to
-            return
-        self._delivering = True
-        try:
-            for deliver in self._deliver:
-                deliver()
-        finally:
-            self._delivering = False
+        if not _in_a_step():
+            return self._rig.run_until(done, timeout_us)
+        if timeout_us > LOOK_US:
+            raise HostTimeError("what is called back while time passes cannot wait itself")
+        return done()
 
 
 def _in_a_step() -> bool:

@@ -10,6 +10,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final
 
+from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
 from tickrig.emulators.testing.host_clock.host_code import is_installed, package_of, place_of
 from tickrig.emulators.testing.host_clock.switch import Switch
 from tickrig.emulators.testing.host_clock.switches import Switches
@@ -24,10 +25,6 @@ WHAT_TO_DO: Final = (
     "in virtual time the clock of this machine means nothing: use the fixture bench_time"
     " (time.perf_counter measures this machine)"
 )
-
-
-class UnpatchedTimeError(RuntimeError):
-    """A host has looked at the clock of this machine."""
 
 
 @contextmanager

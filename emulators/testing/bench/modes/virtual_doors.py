@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,6 @@ class VirtualDoors:
 
     Args:
         rig: the rig.
-
-    Attributes:
-        deliver: called between steps while a host sleeps; hands hosts what has arrived.
     """
 
     def __init__(self, rig: BenchRig) -> None:
@@ -36,7 +32,6 @@ class VirtualDoors:
         self._sides: dict[str, SerialSide] = {}
         self._addresses: dict[str, Address] = {}
         self._offered = ExitStack()
-        self.deliver: list[Callable[[], None]] = []
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a link."""
@@ -64,9 +59,7 @@ class VirtualDoors:
         """Connect the canopen library to a bus."""
         from tickrig.emulators.can.outside.sim_network import SimNetwork  # noqa: PLC0415 - slow
 
-        network = SimNetwork(self._rig, self._bus(wire).open_end())
-        self.deliver.append(network.deliver)
-        return network
+        return SimNetwork(self._rig, self._bus(wire).open_end())
 
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""

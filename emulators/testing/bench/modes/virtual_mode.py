@@ -97,7 +97,7 @@ class VirtualMode(EmulatedMode):
             patched_time,
         )
 
-        return patched_time(RigPassing(self._rig.rig, self._doors.deliver))
+        return patched_time(RigPassing(self._rig.rig))
 
     def too_slow(self) -> str:
         """Say nothing: virtual time is always kept."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import queue
 import re
 import select
+import socket
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from types import ModuleType
 
 import pytest
@@ -20,6 +22,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.sim_waits import EPOCH_S
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.testing.host_clock.errors import HostTimeError
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.host_clock.rig_passing import RigPassing
 
@@ -85,6 +88,8 @@ def test_a_loop_that_only_looks_ends(in_virtual_time: RrcBench) -> None:
 
 def test_what_the_host_has_kept_is_patched_too(in_virtual_time: RrcBench) -> None:
     host = Host(in_virtual_time.port)  # the default of `pause` is patched
+    user_host.nap(1.0)
+    assert in_virtual_time.rig.now_us == 1_000_000
     assert host.rest(10.0) == pytest.approx(10.0001, abs=1e-6)
     assert Host.stamp() == pytest.approx(EPOCH_S + in_virtual_time.rig.now_us / 1e6, abs=1e-3)
     first, second = user_host.now_ns(), user_host.now_ns()
@@ -135,6 +140,11 @@ def test_sleeping_a_wrong_time_is_refused_as_ever(in_virtual_time: RrcBench) -> 
 
 def test_a_select_of_nothing_is_a_sleep(in_virtual_time: RrcBench) -> None:
     assert select.select([], [], [], 1.5) == ([], [], [])
+    assert in_virtual_time.rig.now_us == 1_500_000
+    near, far = socket.socketpair()
+    with near, far:
+        near.send(b"x")
+        assert select.select([far], [], [], 5) == ([far], [], [])
     assert in_virtual_time.rig.now_us == 1_500_000
 
 
@@ -191,17 +201,23 @@ def test_conditions_and_queues_too(in_virtual_time: RrcBench) -> None:
         condition.wait(0.1)
 
 
-def test_another_thread_that_waits_is_told_so(in_virtual_time: RrcBench) -> None:
+def test_another_thread_that_waits_is_told_so(bench: RrcBench) -> None:
     watchdog = user_host.Watchdog()
-    watchdog.start()
-    watchdog.join()
+
+    def run() -> None:
+        watchdog.start()
+        watchdog.join()
+
+    with pytest.raises(HostTimeError) as caught, patched_time(bench.passing):
+        run()
     assert re.fullmatch(
-        r"tests/.*/user_host\.py:\d+: thread 'watchdog' waits \(time\.sleep\), and only the thread"
-        r" of the test makes virtual time pass: run a host with threads in real time",
+        r"tests/.*/user_host\.py:\d+: time\.sleep: only the thread of the test makes virtual time"
+        r" pass, not 'watchdog': run a host with threads in real time",
         str(watchdog.error),
     )
+    assert str(caught.value) == str(watchdog.error)
     assert watchdog.looked == EPOCH_S
-    assert in_virtual_time.rig.now_us == 0
+    assert bench.rig.now_us == 0
 
 
 def test_threads_that_run_already_keep_their_time(bench: RrcBench) -> None:
@@ -223,35 +239,41 @@ def test_threads_that_run_already_keep_their_time(bench: RrcBench) -> None:
     assert bench.rig.now_us == 0
 
 
-def test_what_is_called_back_may_look_but_not_wait(in_virtual_time: RrcBench) -> None:
+def test_what_is_called_back_may_look_but_not_wait(bench: RrcBench) -> None:
     said: list[object] = []
 
     def called_back(now_us: int) -> None:
         said.append(time.time() - EPOCH_S)
-        try:
+        with suppress(RuntimeError):
             time.sleep(1)
-        except RuntimeError as error:
-            said.append(str(error))
+        said.append(bench.rig.now_us)
 
-    in_virtual_time.rig.event_queue.put("x", 50_000, called_back)
-    time.sleep(0.2)
-    assert said == [
-        pytest.approx(0.05, abs=2e-6),
-        "what is called back while time passes cannot wait itself",
-    ]
+    bench.rig.event_queue.put("x", 50_000, called_back)
+    with (
+        pytest.raises(HostTimeError, match="what is called back while time passes cannot wait"),
+        patched_time(bench.passing),
+    ):
+        time.sleep(0.2)
+    assert said == [pytest.approx(0.05, abs=2e-6), 49_999]
 
 
-def test_a_network_hands_out_while_its_host_sleeps() -> None:
+@pytest.mark.parametrize("own", [True, False])
+def test_a_network_calls_back_while_its_host_sleeps(own: bool) -> None:
+    sim, seen = SimBench(), list[int]()
+    sim.network.subscribe(0x705, lambda can_id, data, stamp: seen.append(data[0]))
+    with patched_time(sim.network if own else RigPassing(sim.rig)):
+        time.sleep(0.1)
+    assert seen[0] == 0
+
+
+def test_a_callback_that_sleeps_is_told_so_though_the_library_swallows_it() -> None:
     bench = SimBench()
-    seen: list[int] = []
-    bench.network.subscribe(0x705, lambda can_id, data, stamp: seen.append(data[0]))
-    for passing in (bench.network, RigPassing(bench.rig, [bench.network.deliver])):
-        bench.slave.reset()
-        bench.network.nmt.state = "OPERATIONAL"
-        with patched_time(passing):
-            time.sleep(0.1)
-        assert 0 in seen
-        seen.clear()
+    bench.network.subscribe(0x705, lambda can_id, data, stamp: user_host.nap(0.25))
+    with (
+        pytest.raises(HostTimeError, match=r"user_host\.py:\d+: time\.sleep: what is called back"),
+        patched_time(RigPassing(bench.rig)),
+    ):
+        time.sleep(0.1)
 
 
 def test_it_costs_nothing_where_nobody_looks(bench: RrcBench) -> None:

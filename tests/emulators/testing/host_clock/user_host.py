@@ -65,6 +65,10 @@ def wait_for_event(event: threading.Event, timeout_s: float | None) -> bool:
     return event.wait(timeout_s)
 
 
+def nap(seconds: float, *, pause: Callable[[float], None] = time.sleep) -> None:
+    pause(seconds)
+
+
 def now_ns() -> tuple[int, int, int]:
     return time.time_ns(), time.monotonic_ns(), time.perf_counter_ns()
 
