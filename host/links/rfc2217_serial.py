@@ -11,6 +11,9 @@ from serial.serialutil import Timeout
 
 SAID_SHOWN: Final = 200
 
+WRITE_S: Final = 1.0
+"""How long a write waits for room; pyserial's own waits for 5 s."""
+
 
 class Rfc2217Serial(rfc2217.Serial):
     """A serial port of another machine (RFC 2217).
@@ -42,6 +45,7 @@ class Rfc2217Serial(rfc2217.Serial):
             said = received.decode("ascii", "replace").strip()
             instead = f"it said {said[:SAID_SHOWN]!r}" if said else "it said nothing"
             raise SerialException(f"no serial server answers there: {instead}") from error
+        self._socket.settimeout(WRITE_S)  # type: ignore[attr-defined] # not in typeshed
 
     def close(self) -> None:
         """Close the port, and its connection even if the other end has reset it."""

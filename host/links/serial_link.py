@@ -65,7 +65,7 @@ class SerialLink:
             traffic: the bytes.
 
         Raises:
-            LinkClosed: the port is gone, or takes none for 1 s (5 s of RFC 2217).
+            LinkClosed: the port is gone, or takes none for 1 s.
         """
         try:
             self._port.write(traffic)

@@ -112,6 +112,14 @@ def test_what_came_before_the_end_is_read_first(scheme: str) -> None:
                 link.receive(10_000_000)
 
 
+@pytest.mark.parametrize("scheme", ["rfc2217", "socket"])
+def test_a_server_that_takes_nothing_is_as_one_that_is_gone(scheme: str) -> None:
+    with served(scheme) as port, polled(port) as stop, closing(SerialLink(port.url)) as link:
+        stop()
+        with pytest.raises(LinkClosed, match="cannot write to"):
+            link.send(bytes(20_000_000))
+
+
 def test_what_is_no_telnet_ends_a_link_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
