@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tests.host.live import live_rrc, pty
 from tickrig.emulators.testing.report.report_file import read_run
 
@@ -41,6 +41,7 @@ def test_tests_run_on_real_devices(pytester: pytest.Pytester, run: Run) -> None:
         pytester.makefile(".toml", rig=text)
         options = ("--bench", "rig.toml", "--bench-mode", "hardware")
         result = run(*options, "--bench-report", "run.json", "--bench-artifacts", "kept")
+    skip_if_too_slow(result)
     result.assert_outcomes(passed=1, failed=1, skipped=2)
     result.stdout.fnmatch_lines(
         [

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
 
 pytest_plugins = ("pytester",)
@@ -122,6 +122,7 @@ def test_each_test_runs_in_each_mode(pytester: pytest.Pytester, run: Run) -> Non
         """
     )
     result = run("--bench-mode", "virtual,real")
+    skip_if_too_slow(result)
     result.assert_outcomes(passed=4, skipped=1)
     result.stdout.fnmatch_lines_random(
         ["PASSED *::test_state[[]virtual]", "PASSED *::test_state[[]real]"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tickrig.emulators.testing.plugin import pytest_plugin
 from tickrig.emulators.testing.plugin.needs import ALLOWED, HAND, KINDS
 from tickrig.emulators.testing.plugin.settings import MODES, OPTIONS
@@ -41,6 +41,7 @@ def column(head: str) -> list[str]:
 @pytest.mark.parametrize("command", commands())
 def test_its_commands_run(run: Run, command: str) -> None:
     result = run(*shlex.split(command))
+    skip_if_too_slow(result)
     if "real" in command:
         result.assert_outcomes(passed=15, skipped=1)
     else:
