@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Final
+
 import pytest
 
+import tickrig
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked
+
+PACKAGE: Final = Path(tickrig.__file__).parent
 
 
 def blocked(report: pytest.TestReport, call: pytest.CallInfo[None], bench: Bench | None) -> str:
@@ -24,6 +30,7 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
     if report.when == "call":
         report.when = "setup"  # pytest and JUnit call it an error then
     report.sections.append(("bench: blocked", reason))
+    _cut(report)
     crash = getattr(report.longrepr, "reprcrash", None)
     if crash is None:
         report.longrepr = f"blocked: {reason}\n{report.longreprtext}".rstrip()
@@ -31,3 +38,17 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
         crash.message = f"blocked: {reason}"
     else:
         crash.message = f"blocked: {reason}: {crash.message}"
+
+
+def _cut(report: pytest.TestReport) -> None:
+    """Leave those parts of a traceback away that are ours: they tell nothing of the reason."""
+    traceback = getattr(report.longrepr, "reprtraceback", None)
+    entries = getattr(traceback, "reprentries", [])
+    theirs = [entry for entry in entries if not _is_ours(entry)]
+    if traceback is not None and theirs:
+        traceback.reprentries = theirs
+
+
+def _is_ours(entry: object) -> bool:
+    place = getattr(entry, "reprfileloc", None)
+    return place is not None and Path(place.path).absolute().is_relative_to(PACKAGE)

@@ -6,6 +6,7 @@ import pytest
 
 from tests.emulators.testing.plugin.conftest import Run
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
+from tickrig.emulators.testing.report.report_file import read_run
 
 pytest_plugins = ("pytester",)
 
@@ -94,6 +95,38 @@ def test_what_blocks_a_test_is_no_failure_of_the_device(
     suite = Xml.parse(pytester.path / "out.xml").find("testsuite")
     assert suite is not None
     assert (suite.get("errors"), suite.get("failures")) == ("2", "0")
+
+
+def test_the_traceback_of_what_blocks_a_test_is_that_of_the_test(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makefile(
+        ".toml", rig='[device.rrc]\ntype = "rrc"\n[hardware.rrc]\nport = "/dev/nowhere"\n'
+    )
+    pytester.makepyfile("def test_one(bench):\n    bench.link\n")
+    result = run("--bench", "rig.toml", "--bench-mode", "hardware")
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([">       bench.link", "", "test_*.py:2: *"])
+    result.stdout.no_fnmatch_line("*hardware_mode.py*")
+
+
+def test_ctrl_c_leaves_a_report_of_what_has_run(pytester: pytest.Pytester, run_apart: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        def test_one(bench):
+            pass
+
+        def test_two(bench):
+            raise KeyboardInterrupt
+
+        def test_three(bench):
+            pass
+        """
+    )
+    result = run_apart("--bench-report", "run.json")
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    assert [test.nodeid[-3:] for test in read_run(pytester.path / "run.json").tests] == ["one"]
 
 
 def test_blocked_tests_are_run_again_with_lf(pytester: pytest.Pytester, run: Run) -> None:
