@@ -14,6 +14,7 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
 from tickrig.emulators.testing.bench.bench_rig import Parts
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
@@ -219,8 +220,15 @@ class Bench(BenchDevice):
 
         Returns:
             The task; `await` it, or ask it for its `result()`.
+
+        Raises:
+            NotOnThisBench: real devices; `run` runs a body alone.
         """
-        task = self._mode.act(lambda rig: Task(rig, body))
+        try:
+            task = self._mode.act(lambda rig: Task(rig, body))
+        except NotOnThisBench:
+            body.close()
+            raise
         self._tasks.append(task)
         return task
 

@@ -4,26 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import ExitStack
+from typing import TYPE_CHECKING, Final
 
 from tickrig.emulators.rig.rig import OutsideBridge
 from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.network.network_port import NetworkPort
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
-from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_hub import SerialHub
 from tickrig.emulators.testing.bench.modes.real.doors import LinePlace
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
 from tickrig.host.control.clock import ServingClock
 
-IN_PROCESS = "virtual"
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tickrig.emulators.serial.pty_port import PtyPort
+
+IN_PROCESS: Final = "virtual"
 """The bus of python-can that has both ends in one process."""
+
+WITHOUT_PTYS: Final = "socket://0"
+"""Where a line is on a system without ptys, for this machine alone."""
 
 
 class Outside:
     """Where hosts find the wires of a bench in real time.
 
-    A serial line is at a pty, and at what it is served by too. A CAN bus is joined with one of
+    A serial line is at a pty, on a system without ptys at a TCP port, and at what it is served by
+    too. A CAN bus is joined with one of
     python-can: unless told otherwise one in this process, on a channel of its own.
 
     Args:
@@ -58,15 +67,27 @@ class Outside:
             undo.pop_all()
 
     def _open_line(self, mount: LineMount, door: DoorPlan) -> None:
-        pty = PtyPort(door.link)
+        own = self._own_port(door.link)
+        served = [self._serve(url) for url in door.serve]
+        self.ports[mount.name] = [own, *served]
+        self.bridges.append(Bridge(mount.line.b, SerialHub([own, *served]) if served else own))
+        url = own.url if isinstance(own, NetworkPort) else own.path
+        self.places[mount.name] = LinePlace(url, mount.settings.baud)
+
+    def _own_port(self, link: Path | None) -> PtyPort | NetworkPort:
+        """Open the port for hosts of this process: a TCP port where there are no ptys."""
+        try:
+            from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
+        except ImportError:
+            return self._serve(WITHOUT_PTYS)
+        pty = PtyPort(link)
         self._stack.callback(pty.close)
-        ports = self.ports[mount.name] = [pty]
-        for url in door.serve:
-            served = NetworkPort(parse_serve_url(url))
-            self._stack.callback(served.close)
-            ports.append(served)
-        self.bridges.append(Bridge(mount.line.b, SerialHub(ports) if door.serve else pty))
-        self.places[mount.name] = LinePlace(pty.path, mount.settings.baud)
+        return pty
+
+    def _serve(self, url: str) -> NetworkPort:
+        port = NetworkPort(parse_serve_url(url))
+        self._stack.callback(port.close)
+        return port
 
     def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
         from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow

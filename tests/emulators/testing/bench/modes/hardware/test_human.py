@@ -180,6 +180,9 @@ def test_what_real_devices_cannot_do_is_told(bench_of: BenchOf) -> None:
         bench.fork()
     with pytest.raises(NotOnThisBench, match="on emulated devices alone"):
         bench.save_trace("run.trace")
+    with pytest.raises(NotOnThisBench, match="on emulated devices alone"):
+        bench.start(bench.sleep("1ms"))
+    bench.run(bench.sleep("1ms"))
     names = [item["name"] for item in bench.describe()["inputs"]]  # type: ignore[attr-defined]
     assert "power_button" in names
 

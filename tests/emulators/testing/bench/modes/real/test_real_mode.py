@@ -227,3 +227,11 @@ def test_what_cannot_be_opened_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         Bench.of_plan(plan(real), "real")
     assert [path.name for path in tmp_path.iterdir()] == ["ctl"]
+
+
+def test_a_line_is_at_a_tcp_port_where_there_are_no_ptys(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "tickrig.emulators.serial.pty_port", None)
+    with Bench(Rrc(), mode="real") as bench:
+        assert bench.serial(timeout=5).read_until() == b"EV:Initialized\n"
+    with Bench(Rrc(), mode="real") as bench:
+        assert bench.link.receive(5_000_000).startswith(b"EV:")
