@@ -14,6 +14,7 @@ from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.emulators.testing.rig_file.schema import PAGE, rows
 
 FILE = Path(__file__).parents[4] / "docs" / "rig-file.md"
+RIGS = sorted(FILE.parents[1].glob("examples/rigs/*.toml"))
 TEXT = FILE.read_text("utf-8")
 
 
@@ -53,3 +54,8 @@ def test_the_mistakes_are_those_of_the_page(
     (wrong,), (shown,) = blocks("toml mistakes"), blocks("text mistakes")
     Path("bench.toml").write_text(wrong)
     assert run("tickrig check bench.toml") == shown
+
+
+@pytest.mark.parametrize("file", RIGS, ids=[file.stem for file in RIGS])
+def test_an_example_of_ours_is_right(file: Path) -> None:
+    assert run(f"tickrig check {file}").startswith(f"{file}: ok: ")
