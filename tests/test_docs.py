@@ -41,6 +41,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/rtc-canopen.md",
         "docs/canopen-io-module.md",
         "docs/servo.md",
+        "docs/signals.md",
         "docs/urg.md",
     ],
 )

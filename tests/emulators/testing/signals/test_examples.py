@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.emulators.testing.bench.test_recorded_device import replayed
 from tests.emulators.testing.signals.signal_bench import signals_of
 from tickrig import open_bench
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -93,6 +94,13 @@ def test_a_bench_does_the_same(name: str) -> None:
             for key, device in example.devices.items():
                 inputs = {one: device.inputs[one] for one in example.driven(key)}
                 assert inputs == {one: bench[key].get(one) for one in inputs}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_trace_replays_without_any_signal(name: str, tmp_path: Path) -> None:
+    with open_bench(RIGS / f"{name}.toml") as bench:
+        bench.run_for("2s")
+        assert replayed(bench, tmp_path / "run.trace").startswith("identical: ")
 
 
 def held(samples: list[tuple[int, float]], every_us: int, until_us: int) -> Iterator[float]:
