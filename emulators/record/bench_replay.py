@@ -63,10 +63,10 @@ class BenchRecording:
 
 
 def read_bench_recording(data: bytes) -> BenchRecording:
-    """Read a trace, also one whose writer was killed in the middle of a line.
+    """Read a trace of either version, also one whose writer was killed in the middle of a line.
 
     Raises:
-        TraceError: not a trace of this version, or a line of it is damaged.
+        TraceError: not a trace, or a line of it is damaged.
     """
     if not data.startswith(PREFIX.encode()):
         return as_bench(read_recording(data))

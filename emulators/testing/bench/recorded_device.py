@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
@@ -19,7 +20,7 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.store_file import drop_misfits, memory_values, parse_memory
 from tickrig.emulators.commands.device_type import build_recorded
 from tickrig.host.cli.refused import Refused
-from tickrig.host.text.bench_header import DeviceEntry
+from tickrig.host.text.bench_header import BenchHeader, DeviceEntry
 from tickrig.host.text.trace import Header
 from tickrig.host.text.user_file import SUFFIX
 
@@ -54,21 +55,24 @@ def node_entry(
     )
 
 
-def make_recorded(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Any:
+def make_recorded(header: BenchHeader, name: str, folder: Path, cache: EdsCache) -> Any:
     """Make the device that was recorded, as it was when the recording began.
 
     Args:
+        header: of the trace.
         name: of the device.
-        entry: what the trace says of it.
         folder: of the trace; its files are looked for here too.
         cache: of EDS files.
 
     Raises:
         ValueError: it cannot be made; the text is for people.
     """
+    entry, on_can = header.devices[name], header.on_can(name)
     try:
         if not entry.type:
             raise ValueError("it was made by a program, not of a type")
+        if on_can is (entry.node_id is None):
+            raise ValueError(f"{entry.type} cannot be on wire {entry.wire}")
         if entry.node_id is None:
             return build_recorded(Header(entry.type, entry.config))
         return _node(name, entry, folder, cache)
@@ -76,6 +80,11 @@ def make_recorded(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) 
         raise ValueError(f"device {name}: {refused}") from None
     except ValueError as error:
         raise ValueError(f"device {name}: {error}") from None
+
+
+def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
+    """Return what may be a `FILE.py:Class` of a user in devices of a trace."""
+    return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 
 def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:

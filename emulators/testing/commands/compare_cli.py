@@ -72,14 +72,18 @@ def compare_command(
     tickrig compare run.trace --tolerance 50ms --ignore 'Version*' --number 'EV:batt*=5'
     """  # noqa: D301 - click wants the backspace
     with loading():
+        from tickrig.emulators.commands.run import mistakes_in  # noqa: PLC0415 - slow
         from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
         from tickrig.emulators.record.comparison import compare  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.bench.recorded_device import user_code  # noqa: PLC0415
         from tickrig.emulators.testing.commands.compare.comparison_text import report  # noqa: PLC0415
 
     tolerance = _read_tolerance(options)
     try:
         recording = read_bench_recording(file.read_bytes())
-        runs = dict(_runs(file, recording, tolerance, options))
+        mine = [*user_code(recording.header.devices.values()), *_given_code(options)]
+        with mistakes_in(mine):
+            runs = dict(_runs(file, recording, tolerance, options))
     except OSError as error:
         refuse_path("trace", error)
     except ValueError as error:
@@ -96,6 +100,11 @@ def compare_command(
     for line in lines:
         click.echo(line)
     context.exit(0 if same else 1)
+
+
+def _given_code(options: Mapping[str, Any]) -> list[str]:
+    """Return what may be a `FILE.py:Class` of a user in --node and --config."""
+    return [text.partition("=")[2] for text in (*options["nodes"], *options["config"])]
 
 
 def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
@@ -129,11 +138,12 @@ def _ticked(
     from tickrig.emulators.testing.commands.compare.compared_bus import compare_node_ticks  # noqa: PLC0415
     from tickrig.emulators.testing.commands.compare.compared_line import compare_ticks  # noqa: PLC0415
 
-    entry = recording.header.devices[name]
-    if options["type_name"]:
+    header = recording.header
+    entry, on_can = header.devices[name], header.on_can(name)
+    if options["type_name"] and not on_can:
         return compare_ticks(recording, name, _configured(options, ""))
-    device = make_recorded(name, entry, file.parent, EdsCache())
-    if recording.header.on_can(name):
+    device = make_recorded(header, name, file.parent, EdsCache())
+    if on_can:
         return compare_node_ticks(recording, name, device)
     configured = ConfiguredDevice(DEVICES.load(entry.type), device, entry.config)
     return compare_ticks(recording, name, configured)

@@ -66,9 +66,9 @@ def record_command(  # noqa: PLR0913 - options
     usual_baud, inputs = _known(type_name)
     with ExitStack() as stack:
         stack.enter_context(warnings_shown())
+        pty = _open_pty(stack, link, baud or usual_baud)
         recorded = _open_port(port, baud or usual_baud, out, type_name)
         stack.callback(recorded.close)
-        pty = _open_pty(stack, link, baud or usual_baud)
         tap = PortTap(recorded, pty, _typing(recorded, inputs), _late)
         stack.enter_context(stopped_by_signals(tap.stop))
         _greet(str(link or pty.path), port)

@@ -50,10 +50,12 @@ def _replay(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
     """Replay a trace of one device on a serial line."""
     with loading():
         from tickrig.emulators.commands.device_type import build_recorded  # noqa: PLC0415 - slow
+        from tickrig.emulators.commands.run import mistakes_in  # noqa: PLC0415
         from tickrig.emulators.record.replay import read_recording, replay  # noqa: PLC0415
 
     recording = read_recording(data)
-    difference = replay(recording, build_recorded(recording.header))
+    with mistakes_in(recording.header.config.values()):
+        difference = replay(recording, build_recorded(recording.header))
     _warn(file, ended=recording.ended)
     return recording.ticks, "", difference
 
@@ -77,9 +79,12 @@ def _replay_bench(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | 
 def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Difference[Any] | None]]:
     from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
     from tickrig.emulators.record.bench_replay import replay_device  # noqa: PLC0415
-    from tickrig.emulators.testing.bench.recorded_device import make_recorded  # noqa: PLC0415
+    from tickrig.emulators.testing.bench.recorded_device import (  # noqa: PLC0415
+        make_recorded,
+    )
 
-    devices, cache = recording.header.devices, EdsCache()
+    header, cache = recording.header, EdsCache()
+    devices = header.devices
     typed = {name: entry for name, entry in devices.items() if entry.type}
     if devices and not typed:
         raise ValueError("its devices were made by a program, not of types: it cannot be replayed")
@@ -87,7 +92,12 @@ def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Diffe
         if name not in typed:
             click.echo(f"{file}: {name} was made by a program, not of a type: left out", err=True)
     return [
-        (name, replay_device(recording, name, make_recorded(name, entry, file.parent, cache)))
+        (
+            name,
+            replay_device(
+                recording, name, make_recorded(recording.header, name, file.parent, cache)
+            ),
+        )
         for name, entry in typed.items()
     ]
 

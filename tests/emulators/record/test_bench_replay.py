@@ -82,10 +82,15 @@ class Bench:
 
 def differences(trace: bytes) -> dict[str, Difference[Any]]:
     recording, cache = read_bench_recording(trace), EdsCache()
+    header = recording.header
     return {
         name: found
-        for name, entry in recording.header.devices.items()
-        if (found := replay_device(recording, name, make_recorded(name, entry, EDS.parent, cache)))
+        for name in header.devices
+        if (
+            found := replay_device(
+                recording, name, make_recorded(recording.header, name, EDS.parent, cache)
+            )
+        )
     }
 
 
@@ -240,25 +245,32 @@ def test_a_killed_writer_costs_the_last_tick_only(trace: bytes) -> None:
         assert differences(trace[:size]) == {}
 
 
+def made(entry: DeviceEntry, folder: Path) -> object:
+    """Make a device of a trace that is beside it in a folder."""
+    return make_recorded(BenchHeader({"a": entry}, WIRES), "a", folder, EdsCache())
+
+
 def test_what_cannot_be_made_again_is_said_in_a_line(trace: bytes, tmp_path: Path) -> None:
     header = read_bench_recording(trace).header
-    entry, cache = header.devices["file"], EdsCache()
+    entry = header.devices["file"]
     with pytest.raises(ValueError, match=r"device a: its file .*nope.eds is not here, nor beside"):
-        make_recorded("a", replace(entry, type="nope.eds"), tmp_path, cache)
+        made(replace(entry, type="nope.eds"), tmp_path)
     (tmp_path / "nope.eds").write_text("other")
     with pytest.raises(ValueError, match="is another file than the one that was recorded"):
-        make_recorded("a", replace(entry, type="nope.eds"), tmp_path, cache)
+        made(replace(entry, type="nope.eds"), tmp_path)
     with pytest.raises(ValueError, match="was made by a program, not of a type"):
-        make_recorded("a", replace(entry, type=""), tmp_path, cache)
+        made(replace(entry, type=""), tmp_path)
     with pytest.raises(ValueError, match="recorded on 'toaster'"):
-        make_recorded("a", replace(entry, type="toaster", node_id=None), tmp_path, cache)
+        made(DeviceEntry("line", "toaster"), tmp_path)
+    with pytest.raises(ValueError, match="device a: rrc cannot be on wire can"):
+        made(replace(entry, type="rrc", node_id=None), tmp_path)
     (tmp_path / EDS.name).write_bytes(EDS.read_bytes())
     moved = replace(entry, type=f"/elsewhere/{EDS.name}")
-    assert isinstance(make_recorded("a", moved, tmp_path, cache), Node)
+    assert isinstance(made(moved, tmp_path), Node)
     right = header.devices["right"]
     for stored in ({}, {"parameters": {"1017:00": "05"}, "node_id": None, "bit_rate_index": None}):
         with pytest.raises(ValueError, match=r"device a: (what it had stored is|it has no room)"):
-            make_recorded("a", replace(right, stored=stored or {"a": 1}), tmp_path, cache)
+            made(replace(right, stored=stored or {"a": 1}), tmp_path)
 
 
 def test_an_input_that_a_device_does_not_have_is_refused(trace: bytes) -> None:

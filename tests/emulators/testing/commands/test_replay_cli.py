@@ -13,9 +13,12 @@ from tickrig.emulators.commands.cli import main
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rrc.device_type import RRC
+from tickrig.emulators.rtc_lite.device_type import RTC_LITE
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, WireEntry, WireType
 from tickrig.host.text.trace import Header
+from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import LiteFrame
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +129,33 @@ def rrc_trace(path: Path) -> bytes:
     rig.run_for(200_000)
     trace.close(rig.now_us)
     return path.read_bytes()
+
+
+COMPONENT = """
+from tickrig.device.rtc_lite.component import LiteComponent
+
+
+class Mine(LiteComponent):
+    type_name = "Mine"
+
+    def on_activated(self):
+        {body}
+"""
+
+
+@pytest.mark.parametrize("verb", ["replay", "compare"])
+def test_what_a_file_of_a_user_raises_is_said_in_a_line(tmp_path: Path, verb: str) -> None:
+    file = tmp_path / "mine.py"
+    config = {"node": f"{file}:Mine"}
+    trace, path = TraceFile(tmp_path / "t", Header("rtc-lite", config)), tmp_path / "t"
+    line = SerialLine()
+    file.write_text(COMPONENT.format(body="pass"))
+    rig = Rig(Station(TracedDevice(RTC_LITE.build(config), trace), line.a))
+    for command in (LiteCommand.INITIALIZE, LiteCommand.STARTUP, LiteCommand.ACTIVATE):
+        line.b.send(rig.now_us, LiteFrame(command).encode())
+        rig.run_for(100_000)
+    trace.close(rig.now_us)
+    file.write_text(COMPONENT.format(body="raise KeyError('oh')"))
+    result = CliRunner().invoke(main, [verb, str(path)])
+    assert result.exit_code == 2
+    assert result.stderr == f"Error: {file}:Mine: line 9: KeyError: 'oh'\n"
