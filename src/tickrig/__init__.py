@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     from tickrig.emulators.serial.serial_line import SerialLine as SerialLine
     from tickrig.emulators.testing.bench.bench import Bench as Bench
     from tickrig.emulators.testing.bench.bench import open_bench as open_bench
+    from tickrig.emulators.testing.bench.errors import BenchBlocked as BenchBlocked
+    from tickrig.emulators.testing.bench.errors import BenchError as BenchError
+    from tickrig.emulators.testing.bench.errors import MachineTooSlow as MachineTooSlow
+    from tickrig.emulators.testing.bench.errors import NotOnThisBench as NotOnThisBench
+    from tickrig.emulators.testing.bench.errors import OperatorRefused as OperatorRefused
+    from tickrig.emulators.testing.bench.errors import PortGone as PortGone
+    from tickrig.emulators.testing.rig_file.section import RigFileError as RigFileError
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
@@ -52,6 +59,15 @@ else:
             "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
             "tickrig.emulators.serial.serial_line": ("SerialLine",),
             "tickrig.emulators.testing.bench.bench": ("Bench", "open_bench"),
+            "tickrig.emulators.testing.bench.errors": (
+                "BenchBlocked",
+                "BenchError",
+                "MachineTooSlow",
+                "NotOnThisBench",
+                "OperatorRefused",
+                "PortGone",
+            ),
+            "tickrig.emulators.testing.rig_file.section": ("RigFileError",),
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),
