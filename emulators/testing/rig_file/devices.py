@@ -62,6 +62,8 @@ class DeviceReader:
         for name, plan in self.plans.items():
             if plan is not None and plan.store is not None:
                 try:
+                    if plan.store.exists() and not plan.store.is_file():
+                        raise StoreError(f"{plan.store}: not a file")
                     StoreFile(plan.store)
                 except StoreError as error:
                     self.sections[name].wrong(str(error), "store")

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from tickrig.emulators.testing.rig_file.fields import Field, closest, near, shown
 from tickrig.host.text.toml_document import BROKEN, Mistake, TomlDocument, TomlPath
+
+MOST: Final = 500
+"""Characters of a mistake."""
 
 
 class RigFileError(ValueError):
@@ -155,14 +158,14 @@ def is_broken(value: object) -> bool:
 
 
 def printable(text: str) -> str:
-    r"""Escape what no terminal shows.
+    r"""Escape what no terminal shows, and let it be no longer than a few lines.
 
     >>> printable("us\ufeffd")
     'us\\ufeffd'
     """
-    if text.isprintable():
-        return text
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    if not text.isprintable():
+        text = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    return text if len(text) <= MOST else f"{text[: MOST - 3]}..."
 
 
 def dotted(keys: TomlPath) -> str:

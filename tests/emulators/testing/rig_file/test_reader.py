@@ -258,6 +258,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         (NODE.replace("5", "0"), ["3: device.node.node_id: it takes 1..127, or lss"]),
         (NODE + NODE.replace("node]", "b]"), ["6: .*node-ID 5 is that of 'node' already"]),
         ('[device.a]\ntype = "x.eds"', ["2: .*x.eds: No such file"]),
+        (f'[device.a]\ntype = "{"x" * 999}.eds"', ["2: device.a.type: file .*xxx..."]),
         ('[device.a]\ntype = "x.py:A"', ["2: .*x.py: No such file"]),
         ('[device.a]\ntype = "x\\u0000.eds"', ["2: device.a.type: no device"]),
         ('[device.a]\ntype = "urg"\nconfig.rom = 1', ["3: .*no option 'rom'; .*'room'?"]),
@@ -397,7 +398,7 @@ def test_a_store_that_is_none_is_told(tmp_path: Path) -> None:
     first, second = (f"{line}: {reason}" for line, reason in caught.value.mistakes)
     assert first.startswith("4: device.store.store: ")
     assert "store.json: not a store file" in first
-    assert second == f"8: device.folder.store: {tmp_path}/folder: Is a directory"
+    assert second == f"8: device.folder.store: {tmp_path}/folder: not a file"
 
 
 def test_what_an_eds_has_wrong_is_told(tmp_path: Path) -> None:
