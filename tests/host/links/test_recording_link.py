@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tickrig import Bench
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.outside.host import CanHost
@@ -104,3 +105,12 @@ def test_a_full_disk_ends_the_recording_and_not_the_link(
             "recording ended: /dev/full: No space left on device; the link goes on",
         )
     ]
+
+
+def test_the_link_of_a_bench_is_recorded(tmp_path: Path) -> None:
+    with Bench(Rrc()) as bench:
+        bench.run_for("500ms")
+        link = RecordingLink(bench.link, tmp_path / "t", type="rrc")
+        RrcClient(link).version()
+        link.close()
+    assert r"< OK:version\nVersion 1.0\n" in (tmp_path / "t").read_text()
