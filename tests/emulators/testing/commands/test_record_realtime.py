@@ -231,6 +231,20 @@ def test_a_stopped_recorder_loses_nothing_and_says_so(
     assert "stopped for " in err
 
 
+def test_a_killed_recorder_leaves_what_passed_and_another_takes_its_place(
+    port: PtyPort, rrc: LiveRrc, record: Start, tmp_path: Path
+) -> None:
+    for name in ("first", "second"):
+        recorder = record(port.path, tmp_path / name, tmp_path / "tty")
+        answer(SerialLink(str(recorder.link)), b"version\n", b"Version 1.0\n")
+        recorder.wait_for("Version 1.0")
+        recorder.process.kill()
+        recorder.process.wait(PATIENCE_S)
+        recording = read_bench_recording(recorder.out.read_bytes())
+        assert not recording.ended
+        assert passed(recorder.out, Mark.TO_DEVICE) == b"version\n"
+
+
 def test_what_cannot_be_opened_is_said_in_a_line(tmp_path: Path) -> None:
     with pty() as port:
         for words, message in (
