@@ -32,6 +32,9 @@ def mounts_of(
         devices: by name.
         seed: of all chance.
         line: what the serial lines are like; that of their type, or 115 200 8N1, unless given.
+
+    Raises:
+        ValueError: something is no device, and no type of one.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -40,11 +43,22 @@ def mounts_of(
             assert isinstance(mount, BusMount)
             mount.add(name, device, node_entry(BUS, device))
             continue
+        if not isinstance(device, str | DeviceType):
+            _check_device(name, device)
         made = _of_type(device, seed)
         mounts[name] = lone = LineMount(name, line or made.line)
         entry = DeviceEntry(name, made.type, made.config)
         lone.add(name, made.device, entry, seed_of(seed, name, alone=len(devices) == 1))
     return list(mounts.values())
+
+
+def _check_device(name: str, device: object) -> None:
+    """Raise ValueError unless something can be a device: classes and numbers cannot."""
+    if isinstance(device, type) or not all(hasattr(device, each) for each in ("tick", "inputs")):
+        raise ValueError(
+            f"{name} is {device!r:.60}, and that is no device: on a bench are devices, device "
+            "types and names of types"
+        )
 
 
 class _Made(NamedTuple):

@@ -110,7 +110,10 @@ class Wanted(NamedTuple):
             return self.seed
         if isinstance(self.source, Path):
             return plan_of(self.source).seed
-        return int(self._options.get("seed", 0))
+        seed = self._options.get("seed", 0)
+        if not isinstance(seed, int):
+            raise ValueError(f"seed is a number, not {seed!r}")
+        return seed
 
     @property
     def text(self) -> str:

@@ -121,6 +121,10 @@ def test_a_project_may_build_on_the_fixture(pytester: pytest.Pytester, run: Run)
         ("{}", "a bench has at least one device"),
         ("'teapot'", "teapot"),
         ("ONE", "a device that a test has used"),
+        ("5", "int is 5, and that is no device"),
+        ("dict(left=Rrc)", "left is <class *Rrc'>, and that is no device"),
+        ("dict(left=Rrc(), sed=1)", "sed is 1, and that is no device"),
+        ("dict(left=Rrc(), seed='x')", "seed is a number, not 'x'"),
     ],
 )
 def test_what_cannot_be_on_a_bench_is_told_in_a_line(
