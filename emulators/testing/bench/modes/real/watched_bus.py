@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 from time import monotonic_ns
-from typing import Any
+from typing import Any, Final
 
 import can
 
@@ -13,6 +16,9 @@ from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links.can_link import keep_to_group
 from tickrig.host.links.can_message import to_frame
 from tickrig.host.text.trace import Mark
+
+GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
+"""What the kernel says of an adapter that was pulled out, or switched off."""
 
 
 class BusGone(PortGone, can.CanOperationError):
@@ -27,7 +33,8 @@ class _Watched(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         self._watch.used()
         begun_ns = monotonic_ns()
-        message = super().recv(timeout)
+        with self._told_if_gone():
+            message = super().recv(timeout)
         if message is not None:
             self._pass_on(Mark.FROM_DEVICE, message)
         elif timeout is not None:
@@ -36,8 +43,19 @@ class _Watched(can.BusABC):
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self._watch.used()
-        super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
+        with self._told_if_gone():
+            super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
         self._pass_on(Mark.TO_DEVICE, msg)
+
+    @contextmanager
+    def _told_if_gone(self) -> Iterator[None]:
+        try:
+            yield
+        except (can.CanOperationError, OSError) as error:
+            code = error.error_code if isinstance(error, can.CanError) else error.errno
+            if code not in GONE:
+                raise
+            raise BusGone(f"{self.channel_info}: {error}", code) from error
 
     def _pass_on(self, mark: Mark, message: can.Message) -> None:
         if frame := to_frame(message):
