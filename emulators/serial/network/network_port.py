@@ -27,6 +27,9 @@ MAX_BAUD: Final = 4_000_000
 
 MAX_DISMISSED: Final = 8
 
+QUIET_US: Final = 10_000_000
+"""After a warning there is none for so long."""
+
 OPEN_TO_OTHERS: Final = (
     "Whoever reaches port %s of %s can drive this device: there is no password."
     " Leave out the host to serve this machine alone."
@@ -64,7 +67,7 @@ class NetworkPort(NonCopyable):
         self._buffer_bytes, self._baud = buffer_bytes, 115_200
         self._host: HostConnection | None = None
         self._dismissed: list[DismissedHost] = []
-        self._lost, self._peer, self._has_refused = 0, "", False
+        self._lost, self._peer, self._quiet_until_us = 0, "", 0
         self._setting: HostSetting | None = None
         self.address, self.port = self._listener.getsockname()[:2]
         self.url = str(replace(url, host=_reachable(self.address), port=self.port))
@@ -153,16 +156,14 @@ class NetworkPort(NonCopyable):
         return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
 
     def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:
-        """Send a second host away; people are told of the first such."""
+        """Send a second host away."""
         reason = f"{self.url} has a host already: {self._peer}"
-        if not self._has_refused:
-            _log.warning("%s; %s was refused", reason, peer)
-        self._has_refused = True
+        self._warn(now_us, f"{reason}; {peer} was refused")
         self._dismiss(connection, now_us, reason)
 
     def _leave(self, host: HostConnection, now_us: int) -> None:
         """Send a host away that cannot be understood."""
-        _log.warning("%s: host %s was left: %s", self.url, self._peer, host.mistake)
+        self._warn(now_us, f"{self.url}: host {self._peer} was left: {host.mistake}")
         self._dismiss(host.connection, now_us, host.mistake)
         self._forget(host)
 
@@ -178,7 +179,13 @@ class NetworkPort(NonCopyable):
 
     def _forget(self, host: HostConnection) -> None:
         self._lost += host.lost
-        self._host, self._has_refused = None, False
+        self._host = None
+
+    def _warn(self, now_us: int, text: str) -> None:
+        """Tell people, but not all that a host does over and over."""
+        if now_us >= self._quiet_until_us:
+            self._quiet_until_us = now_us + QUIET_US
+            _log.warning("%s", text)
 
 
 def _listen(url: ServeUrl) -> socket.socket:
