@@ -49,18 +49,21 @@ class Operators:
         self._plan, self._where, self._like = plan, where, like
         self._terminal, self._journal = terminal, journal
         self._operators: dict[str, DeviceOperator] = {}
+        self._waiting: list[str] = []
         with ExitStack() as undo:
             undo.callback(self.close)
             for name in plan.devices:
                 self._operators[name] = self._operator_of(name)
             for name, operator in self._operators.items():
                 operator.prepare(like.state.assembly.parts[name])
+                self._waiting.append(name)
             undo.pop_all()
 
     def begin(self) -> None:
         """Give the devices their power that were brought to where they begin."""
-        for operator in self._operators.values():
-            operator.begin()
+        for device in self._waiting:
+            self._operators[device].begin()
+        self._waiting.clear()
 
     @property
     def said_no(self) -> bool:
@@ -145,6 +148,8 @@ class Operators:
         """Have the supply of a device switched, of all if it is empty."""
         for device in [owner] if owner else self._plan.devices:
             self._operator_at(device).switch_power(on=on)
+            if device in self._waiting:  # the test says itself what it is to have
+                self._waiting.remove(device)
             self._journal.note(device, f"switched {'on' if on else 'off'}")
 
     def sees(self, owner: str, text: str) -> bool | None:

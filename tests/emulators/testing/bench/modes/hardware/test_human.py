@@ -143,6 +143,13 @@ def test_power_is_switched_by_hand_or_by_command(bench_of: BenchOf, tmp_path: Pa
     assert (tmp_path / "off").exists()
 
 
+def test_what_a_test_has_switched_off_stays_off(bench_of: BenchOf, tmp_path: Path) -> None:
+    bench = bench_of(Answers(), switched(tmp_path, "on", "off"))
+    bench.switch_off()
+    bench.run_for("1ms")
+    assert [path.name for path in tmp_path.iterdir()] == ["off"]
+
+
 def switched(folder: Path, on: str, off: str) -> HardwarePlan:
     """An RRC that is switched by commands, each of which makes a file."""
     program = "import sys; open(sys.argv[1], 'w')"
