@@ -171,6 +171,11 @@ class AssemblyFaults(Copyable):
         self._bare = len(self._wires) == 1
 
     @property
+    def wires(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self._wires)
+
+    @property
     def fault_types(self) -> Mapping[str, WireFault]:
         """The faults that can be armed."""
         return {

@@ -21,7 +21,7 @@ from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.plan_rig import rig_of
 from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
-from tickrig.emulators.testing.bench.triggers import Condition
+from tickrig.emulators.testing.bench.triggers import Condition, check_condition
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
@@ -172,6 +172,7 @@ class Bench(BenchDevice):
         Returns:
             False if the time was over first.
         """
+        check_condition(done)
         return self._mode.wait_until(done, us_of(within))
 
     def describe(self) -> Object:

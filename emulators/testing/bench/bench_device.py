@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
-from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger
+from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger, check_condition
 from tickrig.host.text.values import Setting, parse_time_us
 
 if TYPE_CHECKING:
@@ -25,11 +25,17 @@ SOON: Final = "100ms"
 
 
 def us_of(duration: Duration) -> int:
-    """Return a duration in microseconds; ValueError if it is none.
+    """Return a duration in microseconds.
+
+    Raises:
+        TypeError: a number that is not whole: nobody knows its unit.
+        ValueError: a text that is no time, or a negative number.
 
     >>> us_of("1.5s"), us_of(250)
     (1500000, 250)
     """
+    if isinstance(duration, bool) or not isinstance(duration, int | str):
+        raise TypeError(f'{duration!r} is not a time: write "1.5s", or whole microseconds')
     duration_us = parse_time_us(duration) if isinstance(duration, str) else duration
     if duration_us < 0:
         raise ValueError(f"a duration is not negative, got {duration_us} us")
@@ -103,8 +109,12 @@ class BenchDevice:
             ValueError: there is no such fault, or it cannot be like this.
             NotOnThisBench: it cannot be made here.
         """
-        for_us = None if for_ is None else us_of(for_)
-        self._mode.fault(self.name, parse_fault_spec(spec), when, for_us)
+        for_us, wanted = None if for_ is None else us_of(for_), parse_fault_spec(spec)
+        if when is not None:
+            check_condition(when)
+            if "@" in spec:
+                raise ValueError(f"{spec}: it waits for something, so it has no time; see for_")
+        self._mode.fault(self.name, wanted, when, for_us)
 
     def clear(self, name: str) -> None:
         """Let a fault go, and its future too.
@@ -223,5 +233,7 @@ class BenchDevice:
         return self._mode.wires[0]
 
     def _full(self, name: str) -> str:
-        alone = not self.name or len(self._mode.devices) == 1
-        return name if alone else f"{self.name}/{name}"
+        """Return the full name of a signal; that of a lone device may have the device before it."""
+        if len(self._mode.devices) == 1:
+            return name.removeprefix(f"{self._mode.devices[0]}/")
+        return f"{self.name}/{name}" if self.name else name

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tickrig.device.twin import Copyable
+from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives
@@ -31,13 +32,32 @@ class BenchOperator(Operator):
     """The hands at several devices."""
 
     _assembly: Assembly
+    _wires: tuple[str, ...]
 
     @classmethod
     def at(cls, assembly: Assembly, rig: Rig, faults: AssemblyFaults) -> BenchOperator:
         """Return the hands at the devices of a rig."""
         hands = cls(assembly.inputs, assembly.tick_us, rig.event_queue, faults)
-        hands._assembly = assembly
+        hands._assembly, hands._wires = assembly, faults.wires
         return hands
+
+    def fault(self, now_us: int, spec: FaultSpec) -> None:
+        """Let a fault come; one of a lone device or wire may have its name before it."""
+        super().fault(now_us, replace(spec, name=self._known(spec.name)))
+
+    def clear(self, name: str) -> None:
+        """Let a fault go."""
+        super().clear(self._known(name))
+
+    def check_clear(self, name: str) -> None:
+        """Raise ValueError unless there is a fault of this name."""
+        super().check_clear(self._known(name))
+
+    def _known(self, name: str) -> str:
+        """Return how a fault is called, which need not have its device or wire before it."""
+        owner, _, bare = name.rpartition("/")
+        owned = owner in self._assembly.parts or owner in self._wires
+        return bare if owned and name not in self.faults and bare in self.faults else name
 
     def _tick_us_of(self, name: str) -> int:
         return self._assembly.tick_us_of(name)

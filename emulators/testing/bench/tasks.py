@@ -143,7 +143,10 @@ class Task(Generic[T]):
 
 def _wait_of(wait: object) -> Wait:
     if not isinstance(wait, Wait):
-        raise TypeError(f"a bench waits for bench.sleep, bench.edge and the like, not for {wait!r}")
+        raise TypeError(
+            "a bench waits for bench.sleep, bench.until, bench.edge, and for tasks of bench.start,"
+            f" which run beside the body; not for {wait!r:.60}"
+        )
     return wait
 
 

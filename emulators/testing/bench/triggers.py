@@ -47,6 +47,13 @@ class LineTrigger:
             self.count += self._pattern.fullmatch(escape(line.data)) is not None
 
 
+def check_condition(condition: object) -> None:
+    """Raise TypeError unless something can be asked again and again."""
+    if not callable(condition):
+        wanted = 'a function, as lambda: bench.get("state") == "Off", or bench.on_line("OK:*")'
+        raise TypeError(f"{condition!r:.60} cannot be waited for: give {wanted}")
+
+
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
     """Act once, between two ticks, as soon as something is so: now, or after a later step."""
 

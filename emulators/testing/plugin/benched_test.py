@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,13 +11,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
 from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
-from tickrig.emulators.testing.plugin.safe_state import SafeState, unsafe
+from tickrig.emulators.testing.plugin.safe_state import SafeState, check_safe, unsafe
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.time_of_test import guard
@@ -72,6 +75,8 @@ class BenchedTest:
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
+        check_safe(bench, self._safe)
+        _offer(bench)
         self._health = Health(bench)
         if self._settings.report:
             from tickrig.emulators.testing.plugin.evidence.bench_evidence import (  # noqa: PLC0415
@@ -151,6 +156,20 @@ def benched(
         yield _opened(test)
     finally:
         test.close()
+
+
+def _offer(bench: Bench) -> None:
+    """Let hosts that open a port or a bus by themselves find the wires under their names."""
+    mode = bench._mode
+    for wire, library in mode.act(_libraries) if bench.mode == VIRTUAL else ():
+        if library in sys.modules:
+            mode.address(wire)
+
+
+def _libraries(rig: BenchRig) -> list[tuple[str, str]]:
+    """Return by what hosts open each wire."""
+    mounts = rig.state.mounts.values()
+    return [(one.name, "serial" if isinstance(one, LineMount) else "can") for one in mounts]
 
 
 def _opened(test: BenchedTest) -> Bench:

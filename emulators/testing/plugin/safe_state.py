@@ -11,6 +11,12 @@ SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
 """Values of outputs by name, or a check: False, or a text that says what is unsafe."""
 
 
+def check_safe(bench: Bench, safe: SafeState) -> None:
+    """Raise ValueError if something is asked for that the bench has not."""
+    for name in safe if isinstance(safe, Mapping) and bench.mode != "hardware" else ():
+        bench.get(name)
+
+
 def unsafe(bench: Bench, safe: SafeState) -> list[str]:
     """Return what is not as it has to be when a test is over, each in a line."""
     if safe is None:

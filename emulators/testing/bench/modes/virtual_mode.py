@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.device.twin import twin
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
@@ -42,7 +43,7 @@ class VirtualMode(EmulatedMode):
 
     def __init__(self, rig: BenchRig) -> None:
         super().__init__(rig, EXACT)
-        self._doors = VirtualDoors(rig)
+        self._doors, self._closed = VirtualDoors(rig), False
 
     @property
     def now_us(self) -> int:
@@ -56,6 +57,7 @@ class VirtualMode(EmulatedMode):
 
     def run_for(self, duration_us: int) -> None:
         """Let time pass."""
+        self._check_open()
         self._rig.rig.run_for(duration_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
@@ -64,12 +66,17 @@ class VirtualMode(EmulatedMode):
         It is looked at after each step, and now and then between: a host that is polled in it
         may have something to do.
         """
+        self._check_open()
         rig, look_us = self._rig.rig, max(LOOK_US, within_us // LOOKS)
         until_us = rig.now_us + within_us
         while not rig.run_until(done, min(look_us, until_us - rig.now_us)):
             if rig.now_us >= until_us or (until_us >= NEVER and rig.next_us == NEVER):
                 return False
         return True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise BenchError("the bench is closed: no time passes")
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a host: bytes on a serial line, frames on a bus."""
@@ -108,5 +115,6 @@ class VirtualMode(EmulatedMode):
         return VirtualMode(BenchRig(self._rig.name, twin(self._rig.state)))
 
     def close(self) -> None:
-        """Give everything back."""
+        """Give everything back; no time passes any more."""
+        self._closed = True
         self._doors.close()

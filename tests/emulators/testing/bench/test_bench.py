@@ -6,7 +6,7 @@ import can
 import pytest
 import serial
 
-from tickrig import Bench
+from tickrig import Bench, BenchError
 from tickrig.device import Rrc, make_epos, make_f_palette
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.host import RrcClient
@@ -54,6 +54,11 @@ def test_a_group_is_set_at_once() -> None:
         (lambda bench: bench.run_for("soon"), "'soon' is not a time"),
         (lambda bench: bench.run_for(-1), "a duration is not negative, got -1 us"),
         (lambda bench: bench.on_line("OK", nth=0), "nth counts from 1, got 0"),
+        (
+            lambda bench: bench.fault("cut@1s", when=lambda: True),
+            "cut@1s: it waits for something, so it has no time; see for_",
+        ),
+        (lambda bench: bench.fault("other/cut"), "no fault 'other/cut'"),
         (lambda bench: bench.can_bus(), "rrc is a serial line, not a CAN bus"),
     ],
 )
@@ -229,3 +234,36 @@ def test_two_benches_have_addresses_of_their_own() -> None:
         assert third.url == "tickrig://rrc"
         with pytest.raises(ValueError, match="rrc is a serial line, which has no bus: see url"):
             third.bus_options  # noqa: B018 - it is what is asked
+
+
+@pytest.mark.parametrize(
+    ("act", "text"),
+    [
+        (lambda bench: bench.run_for(1.5), '1.5 is not a time: write "1.5s", or whole micro'),
+        (lambda bench: bench.fault("cut", for_=0.5), "0.5 is not a time"),
+        (lambda bench: bench.wait_until(True, "1s"), "True cannot be waited for: give a function"),
+        (lambda bench: bench.fault("cut", when="OK"), "'OK' cannot be waited for: give a function"),
+    ],
+)
+def test_what_is_of_another_type_is_told(act, text: str) -> None:  # type: ignore[no-untyped-def]
+    with Bench(Rrc()) as bench, pytest.raises(TypeError, match=text):
+        act(bench)
+
+
+def test_names_of_a_lone_device_may_have_it_before_them() -> None:
+    with Bench(chair=Rrc()) as bench:
+        bench.set("chair/stick", 10, 0)
+        bench.fault("chair/cut")
+        assert bench.get("chair/stick_v_pct") == bench["chair"].get("stick_v_pct") == 10
+        assert "chair ! cut" in bench.transcript()
+        bench.clear("chair/cut")
+    with Bench(left=make_epos(1), right=make_epos(2)) as bench:
+        bench.fault("left/short")
+        bench.clear("can/short")
+
+
+def test_no_time_passes_on_a_bench_that_is_closed() -> None:
+    bench = Bench(Rrc())
+    bench.close()
+    with pytest.raises(BenchError, match="the bench is closed: no time passes"):
+        bench.run_for("1s")

@@ -12,7 +12,7 @@ from tickrig.emulators.bench.child import running
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
 PAGE = "docs/bench.md"
-BODY, VIRTUAL, REAL, HARDWARE, SEVERAL = blocks(PAGE, "python")
+BODY, VIRTUAL, REAL, HARDWARE, FAULTS, SEVERAL = blocks(PAGE, "python")
 REAL_PORT, PLAYED = blocks(PAGE, "toml")
 
 
@@ -23,7 +23,7 @@ def run(*programs: str) -> None:
 
 
 def test_the_programs_in_virtual_time_run() -> None:
-    run(BODY, VIRTUAL, SEVERAL)
+    run(BODY, VIRTUAL, FAULTS, SEVERAL)
 
 
 @pytest.mark.realtime

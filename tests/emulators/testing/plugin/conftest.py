@@ -22,6 +22,13 @@ IMPORTED_ONCE = (benched_test, journal_text, decoder, can, canopen, serial)
 """A run of its own forgets what it has imported, and what is imported twice has two classes."""
 
 
+@pytest.fixture(autouse=True)
+def _as_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let pytest cut its summary, which it does not on a server for CI."""
+    for name in ("CI", "BUILD_NUMBER"):
+        monkeypatch.delenv(name, raising=False)
+
+
 def skip_if_too_slow(result: pytest.RunResult) -> None:
     """Skip a test in real time where the machine could not keep it."""
     if "blocked: the machine was too slow" in result.stdout.str():

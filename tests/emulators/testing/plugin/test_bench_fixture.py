@@ -152,3 +152,48 @@ def test_what_cannot_be_on_a_bench_is_told_in_a_line(
     assert result.parseoutcomes()["errors"] >= 1
     result.stdout.fnmatch_lines([f"no bench: *{said}*"])
     result.stdout.no_fnmatch_line("*Traceback*")
+
+
+def test_a_host_opens_the_line_by_its_name(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        import serial
+        from tickrig.device import Rrc
+
+        @pytest.fixture
+        def bench_config():
+            return {"chair": Rrc()}
+
+        def test_it(bench):
+            with serial.serial_for_url("tickrig://chair", 115_200, timeout=1) as port:
+                port.write(b"device\\n")
+                assert port.read_until(b"RRC\\n").endswith(b"RRC\\n")
+        """
+    )
+    run().assert_outcomes(passed=1)
+
+
+def test_a_safe_output_that_is_not_there_is_told_before_the_test(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+        from tickrig.device import Rrc
+
+        @pytest.fixture
+        def bench_config():
+            return Rrc()
+
+        @pytest.fixture
+        def bench_safe():
+            return {"sate": "Off"}
+
+        def test_it(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(['*no bench: no input or output "sate"; known: *'])
