@@ -94,11 +94,12 @@ def test_its_tests_pass_in_real_time(environment: Environment) -> None:
 def test_its_tests_pass_over_rfc_2217(environment: Environment, tmp_path: Path) -> None:
     emu = ("tickrig", "emu", "kettle", "--serve", "rfc2217://0", "--control", "control")
     with environment.start(*emu, cwd=tmp_path) as process:
-        assert process.stdout is not None
-        url = process.stdout.readline().decode().strip()
-        environment.run("tickrig", "ctl", "control", "set", "water_ml", "100", cwd=tmp_path)
-        rig = tmp_path / "rig.toml"
-        rig.write_text(KETTLE + HARDWARE.format(folder=tmp_path, url=url))
-        said = run_until_judged(environment, "--bench", str(rig), "--bench-mode", "hardware")
-        process.terminate()
+        try:
+            assert process.stdout is not None
+            url = process.stdout.readline().decode().strip()
+            rig = tmp_path / "rig.toml"
+            rig.write_text(KETTLE + HARDWARE.format(folder=tmp_path, url=url))
+            said = run_until_judged(environment, "--bench", str(rig), "--bench-mode", "hardware")
+        finally:
+            process.terminate()
     assert "4 passed, 6 skipped" in said, said

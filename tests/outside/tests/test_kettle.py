@@ -12,6 +12,7 @@ pytestmark = pytest.mark.needs("device:kettle")
 
 @pytest.mark.req("BOIL-1")
 def test_water_gets_hot(bench: Bench, kettle: KettleHost) -> None:
+    bench["kettle"].set("water_ml", 100)
     assert kettle.temperature_c() == 20
     kettle.heat()
     bench.run_for("1s")

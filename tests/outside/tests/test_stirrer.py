@@ -78,6 +78,7 @@ def test_a_motor_that_restarts_is_set_up_again(bench: Bench, master: Master) -> 
 
 @pytest.mark.needs("fault:drop")
 def test_a_boot_up_that_is_lost_is_no_end(bench: Bench, master: Master) -> None:
+    assert until(master, lambda: master.boots > 0, 1)
     bench["stirrer"].fault("drop=1", for_="300ms")
     bench["stirrer"].fault("power_off", for_="100ms")
     master.boots = 0

@@ -77,7 +77,9 @@ def test_what_a_bench_cannot_await_is_told(pytester: pytest.Pytester, run: Run) 
             await asyncio.sleep(0)
         """
     )
-    run().stdout.fnmatch_lines(["*a bench waits for bench.sleep, bench.until, bench.edge, and for tasks*"])
+    run().stdout.fnmatch_lines(
+        ["*a bench waits for bench.sleep, bench.until, bench.edge, and for tasks*"]
+    )
 
 
 def test_a_task_that_failed_fails_the_test(pytester: pytest.Pytester, run: Run) -> None:
