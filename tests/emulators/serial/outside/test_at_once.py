@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.emulators.serial.outside.lines import BAUD, SETTING
@@ -71,6 +71,7 @@ def play(
 
 
 @given(sends, steps, st.lists(st.integers(1, 30_000), max_size=3))
+@example([(6_037, b">>\n")], [("read_until", b"\n")], [6_240])
 def test_it_reads_the_same_at_the_same_times(
     sends: list[tuple[int, bytes]], steps: list[tuple[str, Any]], cancels: list[int]
 ) -> None:
