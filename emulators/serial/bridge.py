@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Generic
 
 from tickrig.device.core import W
-from tickrig.device.twin import itself
+from tickrig.device.twin import Copyable, Listeners, itself
 from tickrig.emulators.rig.port import ByteEnd, Port
 from tickrig.host.text.trace import Mark
 
@@ -118,20 +118,19 @@ class HostEnd:
         self._end.send(now_us, traffic)
 
 
-class Tap(Generic[W]):
-    """A port with a listener, seen from the host's side.
+class Tap(Copyable, Generic[W]):
+    """A port with listeners: what is polled is on its way to the device, what is sent from it.
+
+    It may be the device's end of a wire, or the port where the host is. Nobody listens to a twin.
 
     Args:
-        port: the port behind it, where the host is.
-        hear: called with the time, the direction and the traffic.
+        port: the port.
+        listeners: called with the time, the direction and the traffic.
     """
 
-    def __init__(self, port: Port[W], hear: Callable[[int, Mark, W], None]) -> None:
-        self._port, self._hear = port, hear
-
-    def __reduce__(self) -> tuple[Callable[[Port[W]], Port[W]], tuple[Port[W]]]:
-        """Copy the port alone: nobody listens to a twin."""
-        return itself, (self._port,)
+    def __init__(self, port: Port[W], *listeners: Callable[[int, Mark, W], None]) -> None:
+        self._port = port
+        self.listeners: Listeners[Callable[[int, Mark, W], None]] = Listeners(listeners)
 
     @property
     def due_us(self) -> int:
@@ -146,5 +145,10 @@ class Tap(Generic[W]):
 
     def send(self, now_us: int, traffic: W, /) -> None:
         """Hand on what the device sent."""
-        self._hear(now_us, Mark.FROM_DEVICE, traffic)
+        if traffic:
+            self._hear(now_us, Mark.FROM_DEVICE, traffic)
         self._port.send(now_us, traffic)
+
+    def _hear(self, now_us: int, mark: Mark, traffic: W) -> None:
+        for hear in self.listeners:
+            hear(now_us, mark, traffic)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Final, Generic
+from collections.abc import Iterator, Mapping
+from typing import Final
 from zlib import crc32
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.core import W
-from tickrig.device.twin import Copyable, Listeners
+from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
@@ -17,50 +16,14 @@ from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.port import ByteLine, Port
+from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.rig.rig import Station
+from tickrig.emulators.serial.bridge import Tap
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.text.bench_header import DeviceEntry, WireEntry, WireType
-from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
 BIT_RATE: Final = 1_000_000
-
-
-class DeviceTap(Copyable, Generic[W]):
-    """A device's end of a wire, with listeners.
-
-    Args:
-        port: the end.
-
-    Attributes:
-        listeners: called with the time, the direction and the traffic.
-    """
-
-    def __init__(self, port: Port[W]) -> None:
-        self._port = port
-        self.listeners: Listeners[Callable[[int, Mark, W], None]] = Listeners()
-
-    @property
-    def due_us(self) -> int:
-        """When the next traffic will have arrived."""
-        return self._port.due_us
-
-    def poll(self, now_us: int, /) -> W:
-        """Take what the host sent."""
-        if traffic := self._port.poll(now_us):
-            self._hear(now_us, Mark.TO_DEVICE, traffic)
-        return traffic
-
-    def send(self, now_us: int, traffic: W, /) -> None:
-        """Send what the device says."""
-        if traffic:
-            self._hear(now_us, Mark.FROM_DEVICE, traffic)
-        self._port.send(now_us, traffic)
-
-    def _hear(self, now_us: int, mark: Mark, traffic: W) -> None:
-        for hear in self.listeners:
-            hear(now_us, mark, traffic)
 
 
 class LineMount(Copyable):
@@ -83,7 +46,7 @@ class LineMount(Copyable):
         self.name, self.settings = name, settings
         self.line = line or settings.wire(settings.baud)
         self._free = [self.line.a, *getattr(self.line, "ends", ())[2:]]
-        self.tap = DeviceTap(self._free[0])
+        self.tap = Tap(self._free[0])
         self.devices: dict[str, Emulated[bytes]] = {}
         self.entries: dict[str, DeviceEntry] = {}
         self._ports: list[FaultyPort[bytes]] = []
