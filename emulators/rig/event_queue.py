@@ -35,6 +35,10 @@ class EventQueue:
         heappush(self._heap, (t_us, self._number, key, action))
         self._note_due()
 
+    def wake(self, key: Hashable, t_us: int) -> None:
+        """Let the rig stop at a time, for its watchers to look; as `put` of doing nothing."""
+        self.put(key, t_us, _nothing)
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without what was forgotten: it need not be copied."""
         return {**vars(self), "_heap": sorted(filter(self._holds, self._heap))}
@@ -60,3 +64,7 @@ class EventQueue:
 
     def _holds(self, entry: _Entry) -> bool:
         return self._entered.get(entry[2]) == entry[1]
+
+
+def _nothing(now_us: int) -> None:
+    """Do nothing."""

@@ -53,7 +53,6 @@ class CanHost:
         rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self._repeats: list[Repeat] = []
-        rig.watchers.append(self._send_due)
 
     @property
     def now_us(self) -> int:
@@ -74,6 +73,8 @@ class CanHost:
             raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
         repeat = Repeat(frames, period_us, self.now_us)
         self.send(repeat.take())
+        if not self._repeats:
+            self._rig.watchers.append(self._send_due)
         self._repeats.append(repeat)
         self._wake()
         return repeat
@@ -108,9 +109,9 @@ class CanHost:
 
     def close(self) -> None:
         """Close the link; the rig stays as it is."""
-        if not self._closed:
-            self._rig.watchers.remove(self._send_due)
         self._closed = True
+        if self._repeats:
+            self._rig.watchers.remove(self._send_due)
         self._repeats.clear()
 
     def _step(self, deadline_us: int) -> None:
@@ -126,20 +127,18 @@ class CanHost:
         self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
         if self._repeats:
             due_us = min(repeat.due_us for repeat in self._repeats)
-            self._rig.event_queue.put(("repeat", id(self)), due_us, _nothing)
+            self._rig.event_queue.wake(("repeat", id(self)), due_us)
+        else:
+            self._rig.watchers.remove(self._send_due)
 
     def _send_due(self, now_us: int) -> None:
         """Send what is due; called after each step of the rig."""
         due = [repeat for repeat in self._repeats if repeat.due_us <= now_us]
         for repeat in due:
             self._end.send(now_us, repeat.take())
-        if due:
+        if due or all(repeat.due_us == NEVER for repeat in self._repeats):
             self._wake()
 
     def _check_open(self) -> None:
         if self._closed:
             raise LinkClosed("the link was closed")
-
-
-def _nothing(now_us: int) -> None:
-    """Be a time at which the rig stops."""

@@ -133,7 +133,7 @@ class Task(Generic[T]):
             self._end()
         else:
             if self._wait.until_us < NEVER:
-                self._rig.event_queue.put(("task", id(self)), self._wait.until_us, _nothing)
+                self._rig.event_queue.wake(("task", id(self)), self._wait.until_us)
 
     def _end(self) -> None:
         self._wait = None
@@ -148,7 +148,3 @@ def _wait_of(wait: object) -> Wait:
             f" which run beside the body; not for {wait!r:.60}"
         )
     return wait
-
-
-def _nothing(now_us: int) -> None:
-    """Be a time at which tasks are looked at."""
