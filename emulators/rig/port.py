@@ -1,4 +1,4 @@
-"""Ports: one device's end of a wire, or of the outside world."""
+"""Ports: ends of wires, of devices and of whoever is outside."""
 
 from __future__ import annotations
 
@@ -104,3 +104,32 @@ class WirePort(Port[W], Protocol[W]):
 
     def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
         """Serve a device: call `wake` with the time when traffic has arrived for it."""
+
+
+class OutsideBridge(Protocol):
+    """A bridge between a wire and the outside world: `Bridge`, `CanBridge`."""
+
+    @property
+    def due_us(self) -> int:
+        """When there is something to be handed out."""
+        ...
+
+    def take_in(self, now_us: int, /) -> None:
+        """Put on the wire what the outside sent."""
+
+    def give_out(self, now_us: int, /) -> None:
+        """Hand out what has arrived."""
+
+
+class Host(Protocol):
+    """An end of a wire at which no station is, but somebody who waits."""
+
+    @property
+    def wire(self) -> Wire:
+        """The wire it is an end of."""
+        ...
+
+    @property
+    def arrived_us(self) -> int:
+        """When what waits there had arrived, `NEVER` if nothing does."""
+        ...

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Final, Generic, Protocol, TypeVar, overload
+from typing import Any, Final, Generic, TypeVar, overload
 
 from tickrig.device.core import Device, W
 from tickrig.device.twin import Copyable, Listeners, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.port import Port, Wire, WirePort
+from tickrig.emulators.rig.port import Host, OutsideBridge, Port, Wire, WirePort
 from tickrig.emulators.rig.timetable import Timetable
 from tickrig.wire.instant import NEVER
 
@@ -25,35 +25,6 @@ LATE_KEPT: Final = 1_000
 
 T = TypeVar("T")
 U = TypeVar("U")
-
-
-class OutsideBridge(Protocol):
-    """A bridge between a wire and the outside world: `Bridge`, `CanBridge`."""
-
-    @property
-    def due_us(self) -> int:
-        """When there is something to be handed out."""
-        ...
-
-    def take_in(self, now_us: int, /) -> None:
-        """Put on the wire what the outside sent."""
-
-    def give_out(self, now_us: int, /) -> None:
-        """Hand out what has arrived."""
-
-
-class Host(Protocol):
-    """An end of a wire at which no station is, but somebody who waits."""
-
-    @property
-    def wire(self) -> Wire:
-        """The wire it is an end of."""
-        ...
-
-    @property
-    def arrived_us(self) -> int:
-        """When what waits there had arrived, `NEVER` if nothing does."""
-        ...
 
 
 class Station(Generic[W]):

@@ -15,7 +15,8 @@ from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
-from tickrig.emulators.rig.rig import OutsideBridge, Rig
+from tickrig.emulators.rig.port import OutsideBridge
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import Journal

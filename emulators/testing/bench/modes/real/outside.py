@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Final
 
-from tickrig.emulators.rig.rig import OutsideBridge
+from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.network.network_port import NetworkPort
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
