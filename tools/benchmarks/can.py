@@ -73,8 +73,8 @@ def network() -> None:
         count[0] += 1
 
     wire.observers.append(hear)
-    stations = [Station(Node(node_id), wire.end()) for node_id in range(1, NODES + 1)]
-    rig = Rig(Station(SyncProducer(), wire.end()), *stations)
+    stations = [Station(Node(node_id), wire.end(Node.accepts)) for node_id in range(1, NODES + 1)]
+    rig = Rig(Station(SyncProducer(), wire.end(SyncProducer.accepts)), *stations)
     rig.run_for(1_000_000)
     count[0] = 0
     rig.run_for(1_000_000)

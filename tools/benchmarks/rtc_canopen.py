@@ -135,12 +135,12 @@ def periods() -> None:
     alive = heartbeats(server, NmtState.OPERATIONAL)
     values = []
     for _ in range(RUNS):
-        start, begin_us = time.perf_counter(), server.now_us
+        start, begin_us = time.process_time(), server.now_us
         for period in range(1, SECONDS * 100 + 1):
             heard = (*pdos, *alive) if period % 10 == 0 else pdos
             at_us = begin_us + period * PERIOD_US
             server.tick(at_us, stamped(at_us, heard))
-        values.append(NODES * SECONDS / (time.perf_counter() - start))
+        values.append(NODES * SECONDS / (time.process_time() - start))
     row("proxies at 100 Hz that one core serves, a PDO and a port write each period", values, "")
 
 

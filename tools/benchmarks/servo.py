@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
-from benchmarks.table import RUNS, row
+from benchmarks.table import RUNS, row, seconds
 from tickrig.device.servo.presets import PRESETS
 from tickrig.device.servo.servo import STEP_US, Servo
 
@@ -59,11 +58,13 @@ def rest(name: str) -> None:
 
 def cost(what: str, servo: Servo, demand: Callable[[int], None] = lambda ms: None) -> None:
     """Print what a step of a servo takes."""
-    values = []
-    for _ in range(RUNS):
-        start = time.perf_counter()
+
+    def work() -> None:
         for ms in range(STEPS):
             demand(ms)
             servo.step_to(servo.now_us + STEP_US)
-        values.append((time.perf_counter() - start) / STEPS * 1e6)
+
+    values = []
+    for _ in range(RUNS):
+        values.append(seconds(work)[0] / STEPS * 1e6)
     row(what, values, "us/ms")
