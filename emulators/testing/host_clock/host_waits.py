@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from tickrig.emulators.rig.sim_waits import LOOK_US, Passing, SimTime
 from tickrig.emulators.testing.host_clock.errors import HostTimeError
-from tickrig.emulators.testing.host_clock.host_code import place_of
+from tickrig.emulators.testing.host_clock.host_code import line_of
 from tickrig.emulators.testing.host_clock.kept_names import LOOKS
 from tickrig.emulators.testing.host_clock.switches import Acts
 
@@ -71,9 +71,9 @@ class HostWaits:
                     raise HostTimeError(_other_thread())
                 return wait(original, *args, **kwargs)
             except _ForEver as error:
-                raise HostTimeError(f"{place_of(frame)}: {name} {error}") from None
+                raise HostTimeError(f"{line_of(frame)}: {name} {error}") from None
             except HostTimeError as error:
-                self.refusals.append(f"{place_of(frame)}: {name}: {error}")
+                self.refusals.append(f"{line_of(frame)}: {name}: {error}")
                 raise HostTimeError(self.refusals[-1]) from None
 
         return act

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any, Final
 
 from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
-from tickrig.emulators.testing.host_clock.host_code import is_installed, package_of, place_of
+from tickrig.emulators.testing.host_clock.host_code import is_installed, line_of, package_of
 from tickrig.emulators.testing.host_clock.switch import Switch
 from tickrig.emulators.testing.host_clock.switches import Switches
 
@@ -49,7 +49,7 @@ def unpatched_time_fails(allowed: Collection[str] = ()) -> Iterator[None]:
         stamped = name in STAMPS and is_installed(frame.f_code.co_filename)
         if stamped or package_of(frame) in allowed or threading.get_ident() in others:
             return original(*args, **kwargs)
-        refusals.append(f"{place_of(frame)}: time.{name} is called, but {WHAT_TO_DO}")
+        refusals.append(f"{line_of(frame)}: time.{name} is called, but {WHAT_TO_DO}")
         raise UnpatchedTimeError(refusals[-1])
 
     with Switches({(time, name): partial(refuse, name) for name in (*WAITS, *STAMPS)}):

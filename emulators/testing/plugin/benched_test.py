@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,15 +14,17 @@ from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
+from tickrig.emulators.testing.plugin.checks.dead_threads import THREADS, dead_threads
+from tickrig.emulators.testing.plugin.checks.health import Health
+from tickrig.emulators.testing.plugin.checks.never_awaited import never_awaited
+from tickrig.emulators.testing.plugin.checks.safe_state import SafeState, check_safe, unsafe
+from tickrig.emulators.testing.plugin.checks.time_of_test import guard
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
 from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
-from tickrig.emulators.testing.plugin.health import Health
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
-from tickrig.emulators.testing.plugin.safe_state import SafeState, check_safe, unsafe
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
-from tickrig.emulators.testing.plugin.time_of_test import guard
 from tickrig.emulators.testing.plugin.verdict import blocked, make_error
 from tickrig.host.cli.refused import Refused
 
@@ -46,6 +48,7 @@ class BenchedTest:
         fingerprint: what happens on it, if that is compared.
         evidence: what a report shows of it, when it is closed.
         blocked: why the test came to no verdict, empty if it did.
+        unheard: what went wrong beside its body and was not told yet, each in a line.
         kept: files that were kept of it.
         not_kept: why other files were not, each in a line.
     """
@@ -60,6 +63,8 @@ class BenchedTest:
         self.blocked = ""
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
+        self._passed, self._stack = False, ExitStack()
+        self.unheard: list[str] = []
         self.kept: list[Path] = []
         self.not_kept: list[str] = []
 
@@ -72,6 +77,7 @@ class BenchedTest:
         """
         needs, self._allowed = needs_of(self.item), allowed_of(self.item)
         check_mode(needs, self.wanted.mode)
+        self._listen()
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
@@ -88,10 +94,23 @@ class BenchedTest:
             self.fingerprint = bench._mode.act(Fingerprint)
         return bench
 
+    def _listen(self) -> None:
+        """Hear of what goes wrong where no assert looks, from before the bench is open."""
+        if THREADS not in self._allowed:
+            self._stack.enter_context(dead_threads(self.unheard.append))
+        self._stack.enter_context(never_awaited(self.unheard.append))
+
     def close(self) -> None:
-        """Keep what is to be kept of a passed test too; give everything back."""
-        if self.bench is None:
-            return
+        """Give everything back; a test that has passed fails of what went wrong since."""
+        since = self.take_unheard() if self._passed else []
+        with self._stack:
+            if self.bench is not None:
+                self._close(self.bench)
+        if since:
+            pytest.fail("\n".join(since), pytrace=False)
+
+    def _close(self, bench: Bench) -> None:
+        """Keep what is to be kept of a passed test too; close the bench."""
         try:
             if self.fingerprint is not None:
                 self.fingerprint.end()
@@ -100,7 +119,13 @@ class BenchedTest:
             if self._witness is not None:
                 self.evidence = self._witness.evidence()
         finally:
-            self.bench.close()
+            bench.close()
+
+    def take_unheard(self) -> list[str]:
+        """Return what went wrong beside the body of the test, and was not told yet."""
+        told = list(self.unheard)
+        del self.unheard[: len(told)]
+        return told
 
     def _keep(self) -> None:
         """Keep what is to be kept, once."""
@@ -121,10 +146,13 @@ class BenchedTest:
         with guard(self.bench.mode, self._allowed):
             yield
         self.bench.check_tasks()
+        if unheard := self.take_unheard():
+            pytest.fail("\n".join(unheard), pytrace=False)
         complaints = self._health.complaints(self._allowed) if self._health else ()
         if found := [*complaints, *unsafe(self.bench, self._safe)]:
             text = "after the test the bench is not as it has to be:"
             pytest.fail("\n".join([text, *found]), pytrace=False)
+        self._passed = True
 
     def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         """Say what blocked a phase of the test, and tell with a failure what there is to know."""

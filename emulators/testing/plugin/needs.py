@@ -9,14 +9,15 @@ import pytest
 
 from tickrig.emulators.bench.names import known
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.plugin.health import ERRORS, LOST
+from tickrig.emulators.testing.plugin.checks.dead_threads import THREADS
+from tickrig.emulators.testing.plugin.checks.health import ERRORS, LOST
+from tickrig.emulators.testing.plugin.checks.time_of_test import CLOCK
 from tickrig.emulators.testing.plugin.settings import MODES
-from tickrig.emulators.testing.plugin.time_of_test import CLOCK
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
 
-ALLOWED: Final = (ERRORS, LOST, CLOCK)
+ALLOWED: Final = (ERRORS, LOST, CLOCK, THREADS)
 HAND: Final = "hand"
 OR: Final = " or "
 

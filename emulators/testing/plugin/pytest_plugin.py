@@ -17,14 +17,15 @@ from tickrig.emulators.testing.plugin.stash import BENCHED, skipped_where_it_can
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
     from tickrig.emulators.testing.plugin.bench_source import BenchSource
-    from tickrig.emulators.testing.plugin.safe_state import SafeState
+    from tickrig.emulators.testing.plugin.checks.safe_state import SafeState
 
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
     "'fault:cut', 'input:stick', 'output:state', 'device:rrc', 'virtual or real' (tickrig)",
     "req(*names): the test shows these requirements; JUnit files and reports name them (tickrig)",
     "allows(*what): what may happen though no fault ordered it: 'lost' for what found a buffer "
-    "full, 'error frames', and 'clock' for looks at the machine's in virtual time (tickrig)",
+    "full, 'error frames', 'threads' that die, and 'clock' for looks at the machine's in virtual "
+    "time (tickrig)",
 )
 
 OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")

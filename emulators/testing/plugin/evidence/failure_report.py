@@ -27,6 +27,8 @@ def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
         return [("bench", f"none was opened; {test.wanted.mode}"), command]
     last = last_lines(test.bench, LINES) or "nothing happened"
     sections = [("bench", _wanted(test)), ("bench: what happened last", last), command]
+    if unheard := test.take_unheard():
+        sections.insert(1, ("bench: beside the test", "\n".join(unheard)))
     if test.kept or test.not_kept:
         sections.append(("bench: what was kept", _kept(test)))
     return sections

@@ -1,0 +1,1 @@
+"""What fails a test that has passed its own asserts."""
