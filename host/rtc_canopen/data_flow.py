@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc_canopen.events import Notify, ServerEventType
@@ -29,6 +30,7 @@ class PdoDataFlow:
         self._nodes, self._send, self._notify = nodes, send, notify
         self._sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
         self._connected: tuple[tuple[ServedNode, PdoSink], ...] = ()
+        self._written = set[int]()  # places in _connected: 126 sinks are not looked at each tick
 
     def route(self) -> None:
         """Collect anew which PDO goes to which OutPorts, and which InPorts have connectors."""
@@ -42,6 +44,11 @@ class PdoDataFlow:
             for node, sink in self._sinks()
             if any(port.connectors for port in sink.ports)
         )
+        self._written = set(range(len(self._connected)))
+        for place, (_, sink) in enumerate(self._connected):
+            for port in sink.ports:
+                for connector in port.connectors:
+                    connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
         """Collect anew whenever an InPort of a new proxy gets or loses a connector."""
@@ -55,8 +62,8 @@ class PdoDataFlow:
         """Take a frame; False if it is no PDO of a proxy."""
         routes = self._sources.get(frame.can_id, ())
         for node, source in routes:
-            if len(frame.data) < source.layout.size:
-                text = f"{source.layout.name}: {len(frame.data)} of {source.layout.size} bytes"
+            if len(frame.data) < source.size:
+                text = f"{source.layout.name}: {len(frame.data)} of {source.size} bytes"
                 self._notify(ServerEventType.PDO_TOO_SHORT, node.entry.id, text)
             elif node.proxy is not None and node.proxy.passing:
                 source.receive(now_us, frame.data)
@@ -64,7 +71,11 @@ class PdoDataFlow:
 
     def send_values(self) -> None:
         """Send what came to InPorts; what cannot be sent now is dropped."""
-        for node, sink in self._connected:
+        if not self._written:
+            return
+        connected, places = self._connected, sorted(self._written)
+        self._written.clear()
+        for node, sink in map(connected.__getitem__, places):
             for port, value in sink.take():
                 if self._send_value(node, sink, port, value) is ReturnCode.BAD_PARAMETER:
                     text = f"{node.entry.name}.{port}: {value}"

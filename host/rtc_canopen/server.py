@@ -121,7 +121,8 @@ class RtcCanopenServer:
             self._start()
         elif late_us >= LATE_US:
             self._be_late(late_us)
-        self._on_bus_states()
+        if self._bus_states:
+            self._on_bus_states()
         for at_us, frame in rx:
             if not (frame.remote or frame.extended or self._data.receive(at_us, frame)):
                 self._receiver.receive(now_us, at_us, frame)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
+from tickrig.host.rtc.execution.execution_contexts import ExecutionContexts
 from tickrig.host.rtc.execution.participant import Callback, Participant
 from tickrig.host.rtc.states import ExecutionKind, LifeCycleState, ReturnCode
 from tickrig.wire.instant import NEVER
@@ -33,7 +34,6 @@ class ExecutionContext:
         rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
 
     Attributes:
-        now_us: the time of the latest tick; what callbacks take as the present.
         due_us: when the next period begins; `NEVER` while it is stopped.
         rate_hz: periods a second.
         period_us: one period.
@@ -48,9 +48,17 @@ class ExecutionContext:
     def __init__(self, rate_hz: float = 1_000.0) -> None:
         if not _possible(rate_hz):
             raise ValueError(f"rate {rate_hz} Hz is not in {MIN_RATE_HZ}..{MAX_RATE_HZ} Hz")
-        self.now_us, self.due_us, self.running = 0, NEVER, False
+        self._ticked_us, self.due_us, self.running = 0, NEVER, False
+        self._others = ExecutionContexts()
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         self._participants: tuple[Participant, ...] = ()
+        self._by_id: dict[int, Participant] = {}
+
+    @property
+    def now_us(self) -> int:
+        """The time of the latest tick; what callbacks take as the present."""
+        ticked_us, quiet_us = self._ticked_us, self._others.quiet_us
+        return ticked_us if ticked_us > quiet_us else quiet_us  # noqa: FURB136 - twice as fast
 
     @property
     def components(self) -> tuple[RtComponent, ...]:
@@ -63,7 +71,7 @@ class ExecutionContext:
         Args:
             now_us: the present.
         """
-        self.now_us = now_us
+        self._ticked_us = now_us
         if now_us < self.due_us:
             return
         self._plan()
@@ -95,8 +103,17 @@ class ExecutionContext:
         if not self.running:
             return ReturnCode.PRECONDITION_NOT_MET
         self.running, self.due_us = False, NEVER
+        self._others.replan()
         self._notify(lambda component: component.on_shutdown)
         return ReturnCode.RTC_OK
+
+    def join(self, others: ExecutionContexts) -> None:
+        """Go on with others from now on; a `Manager` sees to it.
+
+        Args:
+            others: are told when it is due at another time.
+        """
+        self._ticked_us, self._others = self.now_us, others
 
     def close(self) -> None:
         """Deactivate all participants at once, stop, and let them go."""
@@ -134,7 +151,8 @@ class ExecutionContext:
         """
         if self._find(component) is not None:
             return ReturnCode.PRECONDITION_NOT_MET
-        self._participants += (Participant(component, self),)
+        participant = self._by_id[id(component)] = Participant(component, self)
+        self._participants += (participant,)
         component.contexts.append(self)
         return ReturnCode.RTC_OK
 
@@ -244,17 +262,17 @@ class ExecutionContext:
     def _release(self, participant: Participant) -> None:
         participant.leave()
         self._participants = tuple(p for p in self._participants if p is not participant)
+        del self._by_id[id(participant.component)]
         participant.component.contexts.remove(self)
 
     def _find(self, component: RtComponent) -> Participant | None:
-        for participant in self._participants:
-            if participant.component is component:
-                return participant
-        return None
+        return self._by_id.get(id(component))
 
     def _plan(self) -> None:
         """Plan the next period."""
-        self.due_us = self.now_us - self.now_us % self.period_us + self.period_us
+        now_us = self.now_us
+        self.due_us = now_us - now_us % self.period_us + self.period_us
+        self._others.replan()
 
     def _notify(self, callback: Callable[[RtComponent], Callback]) -> None:
         for participant in self._participants:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Generic, TypeVar
@@ -72,15 +73,19 @@ class RingBuffer(Generic[T]):
     """Values in the order of their arrival, up to a length.
 
     Nothing waits: where OpenRTM would block, its time-out is over at once.
+
+    Attributes:
+        on_write: called after a value was put into it.
     """
 
-    __slots__ = ("_last", "_options", "_skip", "_values")
+    __slots__ = ("_last", "_options", "_skip", "_values", "on_write")
 
     def __init__(self, options: BufferOptions = BufferOptions()) -> None:
         self._options = options
         self._skip = options.skip_count if options.read is ReadPolicy.SKIP else 0
         self._values: deque[T] = deque(maxlen=options.length)
         self._last: T | None = None
+        self.on_write: Callable[[], None] | None = None
 
     def __len__(self) -> int:
         """Return how many values wait."""
@@ -103,6 +108,8 @@ class RingBuffer(Generic[T]):
             blocks = options.full is FullPolicy.BLOCK
             return PortStatus.BUFFER_TIMEOUT if blocks else PortStatus.BUFFER_FULL
         values.append(value)
+        if self.on_write is not None:
+            self.on_write()
         return PortStatus.PORT_OK
 
     def read(self) -> T | None:

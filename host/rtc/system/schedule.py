@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution.execution_contexts import ExecutionContexts
 from tickrig.host.rtc.ports.connector import Connector
-from tickrig.wire.instant import NEVER
 
 
 class ScheduledItem(Protocol):
@@ -37,7 +37,7 @@ class Schedule:
     def __init__(self) -> None:
         self.now_us = 0
         self._items: tuple[ScheduledItem, ...] = ()
-        self._contexts: list[ExecutionContext] = []
+        self._contexts = ExecutionContexts()
         self._publishing: list[Connector[Any]] = []
         self._deferred: list[Callable[[], None]] = []
         self._ticking = False
@@ -45,7 +45,7 @@ class Schedule:
     @property
     def due_us(self) -> int:
         """The next time at which there is something to do; the present if it is overdue."""
-        due_us = min((context.due_us for context in self._contexts), default=NEVER)
+        due_us = self._contexts.due_us
         for connector in self._publishing:
             due_us = min(due_us, connector.due_us)
         for item in self._items:
@@ -63,8 +63,7 @@ class Schedule:
         self.now_us, self._ticking = now_us, True
         for item in self._items:
             item.tick(now_us)
-        for context in self._contexts:
-            context.tick(now_us)
+        self._contexts.tick(now_us)
         for connector in self._publishing:
             connector.tick(now_us)
         self._ticking = False
@@ -104,9 +103,7 @@ class Schedule:
 
     def add_context(self, context: ExecutionContext) -> None:
         """Run an execution context from now on; one that is run already is no error."""
-        if context not in self._contexts:
-            context.tick(self.now_us)
-            self._contexts.append(context)
+        self._contexts.add(context, self.now_us)
 
     def remove_context(self, context: ExecutionContext) -> None:
         """Run an execution context no more."""

@@ -112,9 +112,11 @@ def _u32(value: int) -> bytes:
     return value.to_bytes(4, "little")
 
 
-EMERGENCY: Final = range(0x081, 0x100)
-SDO_RESPONSES: Final = range(0x581, 0x600)
-ERROR_CONTROL: Final = range(0x701, 0x780)
+EMERGENCY: Final = range(0x080, 0x100)
+SDO_RESPONSES: Final = range(0x580, 0x600)
+ERROR_CONTROL: Final = range(0x700, 0x780)
+"""What nodes send, by node-ID; node 0 is none."""
+
 QUIET_US: Final = 1_000_000
 """Another master that was not heard for so long is told of anew."""
 
@@ -135,23 +137,30 @@ class FrameDispatcher:
         self._notify, self._send = server.notify, server.send
         self._objects = ServerObjects(definition)
         self._foreign_us: int | None = None
+        of_master = {ERROR_CONTROL_COB_ID + self._master_id, REQUEST_COB_ID + self._master_id}
+        of_nodes = {ids[n] for ids in (EMERGENCY, SDO_RESPONSES, ERROR_CONTROL) for n in nodes}
+        self._accepted = frozenset({NMT_COB_ID} | of_master | of_nodes)
 
     def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
         """Take a data frame that was on the bus at a time."""
-        can_id, node = frame.can_id, self._nodes.get(frame.can_id & 0x7F)
+        can_id = frame.can_id
+        if can_id not in self._accepted:
+            return
         if can_id == NMT_COB_ID:
             self._on_nmt_command(at_us, frame.data)
         elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
             self._on_master_heartbeat(at_us)
         elif can_id == REQUEST_COB_ID + self._master_id:
             self._on_sdo_request(frame.data)
-        elif node is None:
-            return
-        elif can_id in ERROR_CONTROL:
+        else:
+            self._on_frame_of(self._nodes[can_id & 0x7F], now_us, at_us, frame)
+
+    def _on_frame_of(self, node: ServedNode, now_us: int, at_us: int, frame: CanFrame) -> None:
+        if frame.can_id in ERROR_CONTROL:
             node.on_error_control(now_us, at_us, frame.data)
-        elif can_id in SDO_RESPONSES:
+        elif frame.can_id in SDO_RESPONSES:
             node.receive_sdo(now_us, frame.data)
-        elif can_id in EMERGENCY:
+        else:
             self._on_emergency(node, frame.data)
 
     def _on_nmt_command(self, at_us: int, data: bytes) -> None:

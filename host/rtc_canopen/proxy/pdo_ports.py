@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc_canopen.proxy.pdo_decoder import pdo_decoder
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoField, PdoLayout
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.rtc_types.basic import Time
@@ -46,20 +47,22 @@ class PdoSource:
 
     Attributes:
         layout: the PDO.
+        size: bytes that a frame has at least.
         ports: the OutPorts.
     """
 
     def __init__(self, layout: PdoLayout, name: str) -> None:
         shape = PortShape(layout, name)
-        self.layout, self._shape = layout, shape
+        self.layout, self.size, self._single = layout, layout.size, shape.single
+        self._decode = pdo_decoder(layout)
         self.ports = tuple(
             OutPort[Any](port, kind) for port, kind in zip(shape.names, shape.types, strict=True)
         )
 
     def receive(self, now_us: int, data: bytes) -> None:
         """Write what a frame carries; its time stamp is that of reception."""
-        tm, values = Time.from_us(now_us), self.layout.decode(data)
-        if self._shape.single:
+        tm, values = Time.from_us(now_us), self._decode(data)
+        if self._single:
             (port,) = self.ports
             if port.connectors:
                 port.write(_sequence(port.data_type, tm, values))

@@ -9,6 +9,7 @@ from tests.emulators.can.can_bench import frames
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.host.rtc import ReturnCode
+from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.wire.rtc_types.basic import Time, TimedOctet, TimedShortSeq
 
@@ -127,3 +128,50 @@ def test_the_server_sends_sync_and_synchronous_pdos_come() -> None:
     assert [text for _, text in heard if text in ("080#", "190#00")] == ["080#", "190#00"] * 5
     syncs = [at for at, text in heard if text == "080#"]
     assert [later - before for before, later in pairwise(syncs)] == [20_000] * 4
+
+
+def test_values_at_several_in_ports_are_sent_in_the_order_of_the_nodes() -> None:
+    bench = running()
+    server = bench.server
+    shorts = add_knob(server.manager, TimedShortSeq, "Knob1")
+    octet = add_knob(server.manager, TimedOctet)
+    server.manager.connect("Knob1.out", "Motor0.rpdo2")
+    server.manager.connect("Knob0.out", "Palette0.rpdo1", {"dataport.subscription_type": "new"})
+    bench.run_ms(5)
+    for number in (1, 2):
+        shorts.out.write(TimedShortSeq(Time(), (number, 0, 0, 0)))
+        octet.out.write(TimedOctet(Time(), number))
+        sent = [str(frame) for frame in server.tick(bench.now_us, ()) if frame.can_id < 0x700]
+        data = f"0{number}"
+        assert sent == [f"210#{data}", f"320#{data}00000000000000"]
+    server.manager.disconnect("Knob0.out", "Palette0.rpdo1")
+    octet.out.write(TimedOctet(Time(), 3))
+    shorts.out.write(TimedShortSeq(Time(), (3, 0, 0, 0)))
+    sent = [str(frame) for frame in server.tick(bench.now_us, ())]
+    assert sent == ["320#0300000000000000"]
+
+
+def test_a_value_that_is_written_while_its_port_is_being_connected_is_sent() -> None:
+    bench = running()
+    knob = add_knob(bench.server.manager, TimedOctet)
+
+    def write(_: ConnectorProfile) -> None:
+        knob.out.write(TimedOctet(Time(), 0x2A))
+
+    knob.out.on_connect.append(write)
+    bench.server.manager.connect("Knob0.out", "Palette0.rpdo1")
+    assert [str(frame) for frame in bench.server.tick(bench.now_us, ())] == ["210#2A"]
+
+
+def test_a_value_that_waits_in_a_buffer_is_sent_once_there_are_enough() -> None:
+    bench = running()
+    knob = add_knob(bench.server.manager, TimedOctet)
+    properties = {"buffer.read.policy": "skip", "buffer.read.skip_count": "1"}
+    bench.server.manager.connect(
+        "Knob0.out", "Palette0.rpdo1", {f"dataport.inport.{k}": v for k, v in properties.items()}
+    )
+    sent = list[str]()
+    for number in range(1, 5):
+        knob.out.write(TimedOctet(Time(), number))
+        sent += map(str, bench.server.tick(bench.now_us, ()))
+    assert sent == ["210#02", "210#04"]
