@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.text.byte_text import escape
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
@@ -74,8 +74,8 @@ class EmulatorControl(RequestDispatcher):
             if not isinstance(name, str) or not (
                 name in device.inputs.table or name in device.outputs
             ):
-                everything = known([*device.inputs.table, *device.outputs])
-                raise ValueError(f"no input or output {short(name)}; known: {everything}")
+                hint = near(str(name), [*device.inputs.table, *device.outputs])
+                raise ValueError(f"no input or output {short(name)}; {hint}")
         return {"values": {name: read_signal(device, name) for name in names}}
 
     def _set(self, request: Object) -> Object:

@@ -49,14 +49,17 @@ def parse_fault_spec(text: str) -> FaultSpec:
     name, rate, start, stop = match.groups()
     return FaultSpec(
         name,
-        None if rate is None else _parse_rate(rate),
+        None if rate is None else _parse_rate(name, rate),
         parse_time_us(start) if start is not None else 0,
         parse_time_us(stop) if stop is not None else NEVER,
     )
 
 
-def _parse_rate(text: str) -> float:
+def _parse_rate(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None
+        of_device = f"; the fault {text} of {name} is {name}/{text}" if text.isidentifier() else ""
+        raise ValueError(
+            f"{text!r} is not a rate: write a number up to 1, as 0.001{of_device}"
+        ) from None

@@ -9,9 +9,9 @@ from typing import ClassVar, Final, Protocol
 from tickrig.device.physical import SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.emulated import Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
@@ -113,7 +113,7 @@ class Operator(Copyable):
         """Return which inputs `set` would set to what, or raise as it does."""
         groups = self._inputs.groups
         if name not in groups and name not in self._inputs.table:
-            raise ValueError(f"no input {name!r}; known: {known([*groups, *self._inputs.table])}")
+            raise ValueError(f"no input {name!r}; {near(name, [*groups, *self._inputs.table])}")
         members = groups.get(name, (name,))
         if len(values) != len(members):
             what = "one value" if len(members) == 1 else f"{len(members)} values"
@@ -139,7 +139,9 @@ class Operator(Copyable):
 
     def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
         """Raise ValueError unless `press` can be done."""
-        self._inputs.find(name, SignalType.BUTTON)
+        buttons = self._inputs.names(SignalType.BUTTON)
+        if name not in buttons:
+            raise ValueError(f"no button {name!r}; {near(name, buttons)}")
         if duration_us < 1:
             raise ValueError(f"a press lasts at least 1 us, not {duration_us} us")
 
@@ -182,7 +184,7 @@ class Operator(Copyable):
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless there is a fault of this name."""
         if name not in self.faults:
-            raise ValueError(f"no fault {name!r}; known: {known(self.faults)}")
+            raise ValueError(f"no fault {name!r}; {near(name, self.faults)}")
 
     @property
     def faults(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from tickrig.emulators.commands.emu_cli import OURS, device_command
 from tickrig.emulators.commands.serial_run import Options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import load
+from tickrig.host.text.names import near
 
 SHARED: Final = frozenset({*(item.name for item in fields(Options)), "fault", "version", "help"})
 """Options that say how a device is run, and nothing of the device."""
@@ -68,7 +69,7 @@ def _words(name: str, options: Mapping[str, click.Option], key: str, value: obje
     """Return an option as a command line has it."""
     option = options.get(key.replace("_", "-"))
     if option is None:
-        raise ValueError(f"{key}: {name} has no such option; known: {', '.join(options)}")
+        raise ValueError(f"{key}: {name} has no such option; {near(key, options)}")
     if option.is_flag:
         if not isinstance(value, bool):
             raise ValueError(f"{key}: {value!r} is not true or false")

@@ -13,6 +13,7 @@ from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
+from tickrig.host.text.names import near
 
 if TYPE_CHECKING:
     from tickrig.device.physical import InputSignal
@@ -59,8 +60,8 @@ class DeviceGroup(LazyGroup):
             from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
 
         if cmd_name not in (names := DEVICES.names()):
-            known = ", ".join(dict.fromkeys([*OURS, *names]))
-            raise Refused(f"no device {cmd_name!r}; known: {known}")
+            hint = near(cmd_name, dict.fromkeys([*OURS, *names]))
+            raise Refused(f"no device {cmd_name!r}; {hint}")
         try:
             return device_command(DEVICES.load(cmd_name))
         except ExtensionError as error:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from tickrig.device.modbus.registers import Register
 from tickrig.device.rh3.register_map import TABLE
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.rh3.frame_log import CRC_BYTES
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
+from tickrig.host.text.names import near
 from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
 from tickrig.wire.modbus.rtu import encode_frame
 
@@ -52,7 +52,7 @@ def _register(word: str) -> int:
     try:
         value = int(word, 0)
     except ValueError:
-        raise ValueError(f"no register {word!r}; known: {known(_BY_NAME)}") from None
+        raise ValueError(f"no register {word!r}; {near(word, _BY_NAME)}") from None
     if not 0 <= value <= WORD:
         raise ValueError(f"register {word} is not in 0..0xFFFF")
     return value

@@ -16,6 +16,7 @@ from tickrig.emulators.rtc_lite.frame_log import frame_splitter
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS, verbs
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.cli.refused import refused_at
+from tickrig.host.text.names import near
 from tickrig.host.text.trace import Config
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType
@@ -88,7 +89,7 @@ def find_component(spec: str) -> type[LiteComponent]:
     if spec in COMPONENTS:
         return COMPONENTS[spec]
     if f"{SUFFIX}:" not in spec:
-        raise ValueError(f"no node {spec!r}; known: {', '.join(COMPONENTS)}, or FILE.py:Class")
+        raise ValueError(f"no node {spec!r}; {near(spec, COMPONENTS)} (or FILE.py:Class)")
     kind: type[LiteComponent] = find_class(spec, LiteComponent)
     try:
         kind()

@@ -10,11 +10,11 @@ from typing import Any, Final
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.faults import FaultType
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.text.byte_text import unescape
+from tickrig.host.text.names import near
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import LiteCommand
@@ -38,8 +38,8 @@ def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
         name, *words = shlex.split(rest) or [""]
         port = component.in_ports.get(name.encode())
         if port is None:
-            names = known(key.decode() for key in component.in_ports) or "none"
-            raise ValueError(f"no in-port {name!r}; known: {names}")
+            hint = near(name, [key.decode() for key in component.in_ports])
+            raise ValueError(f"no in-port {name!r}; {hint}")
         data = LitePortData(port.name, _value(port.port_type, words)).encode()
         return _packed((LiteCommand.WRITE.value if lite else b"S") + data, config)
 

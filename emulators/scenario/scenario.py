@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import PRESS_US, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.host.text.byte_text import unescape
+from tickrig.host.text.names import near
 from tickrig.host.text.steps import Condition, Step, StepError, content_lines
 from tickrig.host.text.values import Setting, parse_setting, parse_time_us
 
@@ -151,7 +151,7 @@ class ScenarioParser:
         if above and isinstance(above[0].what, End):
             raise ValueError(f"{verb} comes after end")
         if verb not in self._verbs:
-            raise ValueError(f"no action {verb!r}; known: {', '.join(self._verbs)}")
+            raise ValueError(f"no action {verb!r}; {near(verb, self._verbs)}")
         action = self._verbs[verb](rest or "")
         if isinstance(action, _Wanted):
             line, within_us = action
@@ -191,7 +191,7 @@ class ScenarioParser:
         names, device = tuple(rest.split()), self._device
         for name in names or ("",):
             if name not in device.outputs and name not in device.inputs.table:
-                raise ValueError(f"no output {name!r}; known: {known(device.outputs)}")
+                raise ValueError(f"no output {name!r}; {near(name, device.outputs)}")
         return Watch(names)
 
 

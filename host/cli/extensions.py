@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tickrig.host.cli.start import load
+from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
@@ -55,8 +56,7 @@ class ExtensionGroup(Generic[T]):
         for point in self._foreign():
             if point.name == name:
                 return self._load_foreign(point)
-        known = ", ".join(self.names())
-        raise ExtensionError(f"no {self.what} {name!r}; known: {known}")
+        raise ExtensionError(f"no {self.what} {name!r}; {near(name, self.names())}")
 
     def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
         """Return all members by name; what cannot be loaded is left out, and told in a line.

@@ -8,9 +8,9 @@ from typing import Protocol
 
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.signals import Signal
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 
 
@@ -129,7 +129,7 @@ class NodeInputs:
         if item is None or signal_type not in (None, item.type):
             wanted = signal_type.value if signal_type else "input"
             names = self.names(signal_type) if signal_type else self.table
-            raise ValueError(f"no {wanted} {name!r}; known: {known(names) or 'none'}")
+            raise ValueError(f"no {wanted} {name!r}; {near(name, names)}")
         return item
 
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
@@ -147,7 +147,7 @@ class NodeInputs:
         part, rest = self._nodes.find(name)
         signal = part.signal(rest) if part else None
         if signal is None:
-            raise ValueError(f"no input {name!r}; known: {known(self.table)}")
+            raise ValueError(f"no input {name!r}; {near(name, self.table)}")
         return signal
 
 

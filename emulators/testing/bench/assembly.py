@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import WireFault, WireFaults
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 
 
@@ -125,12 +125,12 @@ class AssemblyInputs(Copyable):
             return part.inputs.find(rest, signal_type)
         names = self.names(signal_type) if signal_type else self.table
         wanted = signal_type.value if signal_type else "input"
-        raise ValueError(f"no {wanted} {name!r}; known: {known(names) or 'none'}")
+        raise ValueError(f"no {wanted} {name!r}; {near(name, names)}")
 
     def _find(self, name: str) -> tuple[HasSignals, str]:
         part, rest = self._assembly.find(name)
         if part is None or rest not in part.inputs.table:
-            raise ValueError(f"no input {name!r}; known: {known(self.table)}")
+            raise ValueError(f"no input {name!r}; {near(name, self.table)}")
         return part, rest
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
 from tickrig.emulators.testing.bench.bench_rig import Parts
-from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
+from tickrig.emulators.testing.bench.build import BenchedDevice, check_no_device, mounts_of, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
@@ -25,6 +25,7 @@ from tickrig.emulators.testing.bench.triggers import Condition, check_condition
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
@@ -131,7 +132,7 @@ class Bench(BenchDevice):
     def __getitem__(self, name: str) -> BenchDevice:
         """Return a device; KeyError if there is none of this name."""
         if name not in self._devices:
-            raise KeyError(f"no device {name!r}; known: {', '.join(self._devices)}")
+            raise KeyError(f"no device {name!r}; {near(name, self._devices)}")
         return self._devices[name]
 
     @property
@@ -324,10 +325,15 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
     Raises:
         OSError: the file cannot be read, or a port cannot be had.
         RigFileError: all that is wrong with the file.
+        ValueError: it is the name of a device, which `Bench` takes.
         Refused: a device cannot be made.
         PortGone: a bus cannot be opened.
     """
-    plan = read_rig_file(Path(path))
+    try:
+        plan = read_rig_file(Path(path))
+    except FileNotFoundError:
+        check_no_device(str(path))
+        raise
     return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
 
 

@@ -24,6 +24,7 @@ from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.host.text.bench_header import BenchHeader
+from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -158,7 +159,7 @@ class RigState(Copyable):
         for mount in self.mounts.values():
             if device in mount.parts:
                 return mount.name
-        raise ValueError(f"no device {device!r}; known: {', '.join(self.assembly.parts)}")
+        raise ValueError(f"no device {device!r}; {near(device, self.assembly.parts)}")
 
 
 def header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:

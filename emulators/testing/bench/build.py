@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -12,7 +14,12 @@ from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of
+from tickrig.emulators.testing.bench.plan_parts import NoNodeIdError, slave_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
+from tickrig.emulators.testing.rig_file.devices import kind_of
+from tickrig.emulators.testing.rig_file.fields import node_id as read_node_id
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
+from tickrig.host.cli.refused import Refused
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.trace import Config
 
@@ -20,7 +27,11 @@ BUS: Final = "can"
 """The bus that nodes share where nobody says otherwise."""
 
 BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
-"""A device, a device type, or the name of a type or CANopen model."""
+"""A device, a device type, or what a rig file has as `type`: the name of a device type or CANopen
+model, an EDS or DCF file, `FILE.py:Class`; the last three with their node-ID: `5=drive.eds`."""
+
+RIG: Final = ".toml"
+_NODE: Final = re.compile(r"[0-9]+=")
 
 
 def mounts_of(
@@ -38,10 +49,15 @@ def mounts_of(
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
-        if isinstance(device, CanopenSlave):
+        plan = named_device(device, Path(), name) if isinstance(device, str) else None
+        is_node = plan is not None and plan.kind is not DeviceKind.SERIAL
+        if is_node or isinstance(device, CanopenSlave):
             mount = mounts.setdefault(BUS, BusMount(BUS, seed=seed))
             assert isinstance(mount, BusMount)
-            mount.add(name, device, node_entry(BUS, device))
+            if isinstance(device, CanopenSlave):
+                mount.add(name, device, node_entry(BUS, device))
+            elif plan is not None:
+                mount.add(name, *_slave(mount, plan))
             continue
         if not isinstance(device, str | DeviceType):
             _check_device(name, device)
@@ -50,6 +66,54 @@ def mounts_of(
         entry = DeviceEntry(name, made.type, made.config)
         lone.add(name, made.device, entry, seed_of(seed, name, alone=len(devices) == 1))
     return list(mounts.values())
+
+
+def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
+    """Return what a text names, as the `type` of a rig file does.
+
+    Args:
+        text: a name or file; the node-ID of a CANopen device may be before it: `5=drive.eds`.
+        folder: where files are looked for.
+        name: of the device.
+
+    Raises:
+        ValueError: it names no device.
+    """
+    node, _, rest = text.rpartition("=") if _NODE.match(text) else ("", "", text)
+    if rest.lower().endswith(RIG):
+        raise ValueError(f"{rest} is a rig file: open_bench({rest!r}) opens its bench")
+    kind, place = kind_of(rest, folder)
+    if node and kind is DeviceKind.SERIAL:
+        raise ValueError(f"{text}: {rest} is on no CAN bus, and has no node-ID")
+    node_id = read_node_id(int(node)) if node else None
+    return DevicePlan(name=name, kind=kind, type=place, wire=BUS, node_id=node_id)
+
+
+def check_no_device(text: str) -> None:
+    """Raise ValueError if the path of a rig file, which is not there, is the name of a device."""
+    try:
+        kind = named_device(text, Path()).kind
+    except ValueError:
+        return
+    if kind in (DeviceKind.SERIAL, DeviceKind.MODEL):
+        raise ValueError(f"{text} is a device, no rig file: Bench({text!r}) puts it on a bench")
+
+
+def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry]:
+    """Return a slave that is named, and what a trace says of it."""
+    try:
+        slave, entry = slave_of(plan, {})
+    except NoNodeIdError:
+        raise ValueError(
+            f"{plan.name}: {plan.type} gives no node-ID: write '5={plan.type}'"
+        ) from None
+    except Refused as refused:
+        raise ValueError(str(refused)) from None
+    for other, node in mount.nodes.items():
+        if node.slave.configured_id == (taken := slave.configured_id):
+            text = f"node-ID {taken} is that of {other!r} already: write '{taken % 127 + 1}=..."
+            raise ValueError(f"{plan.name}: {text}'")
+    return slave, entry
 
 
 def _check_device(name: str, device: object) -> None:
@@ -90,12 +154,12 @@ def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:
 def name_of(device: BenchedDevice) -> str:
     """Return what a lone device is called where nobody says it.
 
-    >>> name_of("rtc-lite")
-    'rtc_lite'
+    >>> name_of("rtc-lite"), name_of("5=eds/drive.eds")
+    ('rtc_lite', 'drive')
     """
     if isinstance(device, CanopenSlave):
         return f"node{device.configured_id}"
     if isinstance(device, DeviceType):
         device = device.name
     name = device if isinstance(device, str) else type(device).__name__.lower()
-    return name.replace("-", "_")
+    return re.sub(r"\W", "_", Path(name.rpartition("=")[2].rpartition(":")[2]).stem, flags=re.ASCII)

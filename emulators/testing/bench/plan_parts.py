@@ -39,6 +39,10 @@ from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.values import Setting
 
 
+class NoNodeIdError(ValueError):
+    """A CANopen device that nobody gives a node-ID."""
+
+
 def parts_of(plan: RigPlan) -> Parts:
     """Make the devices of a rig file and put them on their wires.
 
@@ -127,17 +131,22 @@ def _bus(
 ) -> BusMount:
     mount = BusMount(wire.name, wire.bit_rate or BIT_RATE, seed)
     for device in devices:
-        mount.add(device.name, *_slave(device, stores))
+        mount.add(device.name, *slave_of(device, stores))
     return mount
 
 
-def _slave(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[CanopenSlave, DeviceEntry]:
-    """Return a slave, and what a trace says of it."""
+def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[CanopenSlave, DeviceEntry]:
+    """Return a slave, and what a trace says of it; the files of `stores` are entered there.
+
+    Raises:
+        Refused: its file cannot be read.
+        NoNodeIdError: nobody gives it a node-ID.
+    """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = describe(eds_cache(), kind, device.profile or AUTO)
     node_id = description.node_id if device.node_id is None else device.node_id
     if node_id is None:
-        raise ValueError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
+        raise NoNodeIdError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
     dictionary, memory = description.make_dictionary(), None
     if device.store:
         if device.store not in stores:

@@ -194,11 +194,12 @@ def _configured(options: Mapping[str, Any], recorded: str) -> ConfiguredDevice:
     """Make the device of --type and --config, or of the trace."""
     from tickrig.emulators.commands.device_config import configure  # noqa: PLC0415 - slow
     from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415
+    from tickrig.host.text.names import near  # noqa: PLC0415
     from tickrig.host.text.values import parse_setting  # noqa: PLC0415
 
     name = options["type_name"] or recorded
     if name not in DEVICES.names():
-        raise Refused(f"no device type {name!r:.60}; known: {', '.join(DEVICES.names())}")
+        raise Refused(f"no device type {name!r:.60}; {near(name, DEVICES.names())}")
     words: Sequence[str] = options["config"]
     with refused_at("--config"):
         config = {}

@@ -90,9 +90,10 @@ def _known(type_name: str) -> tuple[int, Inputs | None]:
         return BAUD, None
     from tickrig.emulators.commands.device_config import configure  # noqa: PLC0415 - slow
     from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+    from tickrig.host.text.names import near  # noqa: PLC0415
 
     if type_name not in DEVICES.names():
-        raise Refused(f"--type: no device {type_name!r}; known: {', '.join(DEVICES.names())}")
+        raise Refused(f"--type: no device {type_name!r}; {near(type_name, DEVICES.names())}")
     with refused_at("--type"):
         made = configure(type_name, {})
     return made.type.line.baud, made.device.inputs

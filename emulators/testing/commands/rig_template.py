@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.physical import InputSignal, SignalType
-from tickrig.emulators.bench.names import SHOWN
 from tickrig.emulators.commands.device_config import option_names
 from tickrig.emulators.testing.rig_file.devices import RESERVED, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.emulators.testing.rig_file.probe import Probe, probe
+from tickrig.host.text.names import SHOWN
 
 HEAD: Final = """\
 # A rig file: what is on the bench. Lines behind a # are proposals.

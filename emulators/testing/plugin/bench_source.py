@@ -16,17 +16,23 @@ import pytest
 from tickrig.emulators.commands.device_type import DeviceType
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import Bench
-from tickrig.emulators.testing.bench.build import BenchedDevice, name_of
+from tickrig.emulators.testing.bench.build import BenchedDevice, name_of, named_device
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
 Source = BenchedDevice | Mapping[str, Any] | Path
 BenchSource = Source | Callable[[], Source] | None
-"""A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`)."""
+"""A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`).
+
+A device may be a text too: what a rig file has as its `type`."""
 
 HARDWARE: Final = "hardware"
 SUFFIX: Final = ".toml"
+
+NO_DEVICES: Final = ("seed", "line", "mode")
+"""Arguments of `Bench` that are something else."""
 
 NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
 
@@ -82,9 +88,7 @@ class Wanted(NamedTuple):
                 "nobody says what is on the bench: write a fixture bench_config, or give "
                 "--bench RIG.TOML"
             )
-        if isinstance(made, Path) or (isinstance(made, str) and made.endswith(SUFFIX)):
-            made = self.folder / made
-        return self._replace(source=made)
+        return self._replace(source=_placed(made, self.folder))
 
     def open(self) -> Bench:
         """Make the bench.
@@ -120,13 +124,40 @@ class Wanted(NamedTuple):
         """What is on the bench, for people."""
         if isinstance(self.source, Path):
             return relpath(self.source)
-        names = [name for name in self._options if name not in ("seed", "line", "mode")]
+        names = [name for name in self._options if name not in NO_DEVICES]
         return ", ".join(name or name_of(self._options[name]) for name in names)
 
     @property
     def _options(self) -> Mapping[str, Any]:
         """The arguments of `Bench`; a lone device has no name."""
         return self.source if isinstance(self.source, Mapping) else {"": self.source}
+
+
+def _placed(source: Source, folder: Path) -> Source:
+    """Return a source whose files are found beside the test.
+
+    Raises:
+        ValueError: a text that names no device.
+    """
+    if isinstance(source, Mapping):
+        return {
+            name: value if name in NO_DEVICES else _placed_device(value, folder)
+            for name, value in source.items()
+        }
+    if isinstance(source, Path) and source.suffix.lower() not in EDS_SUFFIXES:
+        return folder / source
+    if isinstance(source, str) and source.endswith(SUFFIX):
+        return folder / source
+    placed: Source = _placed_device(source, folder)
+    return placed
+
+
+def _placed_device(device: Any, folder: Path) -> Any:
+    """Return a device; what a text or path names is found beside the test."""
+    if not isinstance(device, str | Path):
+        return device
+    plan = named_device(str(device), folder)
+    return plan.type if plan.node_id is None else f"{plan.node_id}={plan.type}"
 
 
 def plan_of(path: Path) -> RigPlan:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from tickrig.emulators.bench.names import known
+from tickrig.device.physical import SignalType
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.checks.dead_threads import THREADS
 from tickrig.emulators.testing.plugin.checks.health import ERRORS, LOST
 from tickrig.emulators.testing.plugin.checks.time_of_test import CLOCK
 from tickrig.emulators.testing.plugin.settings import MODES
+from tickrig.host.text.names import closest, known, near
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
@@ -20,6 +24,9 @@ if TYPE_CHECKING:
 ALLOWED: Final = (ERRORS, LOST, CLOCK, THREADS)
 HAND: Final = "hand"
 OR: Final = " or "
+MEANT: Final = "did you mean"
+_DIGIT: Final = re.compile("[0-9]")
+"""Names that differ in a number alone, as `arm1` and `arm2`, are of different things."""
 
 
 def words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
@@ -49,9 +56,10 @@ def needs_of(item: pytest.Item) -> tuple[str, ...]:
     """
     needs = words_of(item, "needs")
     for choice in (choice for need in needs for choice in need.split(OR)):
-        if choice not in (*MODES, HAND) and choice.partition(":")[0] not in KINDS:
-            kinds = ", ".join((*MODES, HAND, *(f"{kind}:NAME" for kind in KINDS)))
-            raise ValueError(f"needs({choice!r}): nobody has that; known: {kinds}")
+        kind, _, name = choice.partition(":")
+        if choice not in (*MODES, HAND) and not (kind in KINDS and name):
+            kinds = [*MODES, HAND, *(f"{kind}:{name or 'NAME'}" for kind in KINDS)]
+            raise ValueError(f"needs({choice!r}): nobody has that; {near(choice, kinds)}")
     return needs
 
 
@@ -64,10 +72,17 @@ def check_mode(needs: Iterable[str], mode: str) -> None:
 
 
 def check_needs(needs: Iterable[str], bench: Bench) -> None:
-    """Raise NotOnThisBench if a bench has not all of what a test needs."""
+    """Raise NotOnThisBench if a bench has not all of what a test needs.
+
+    Raises:
+        ValueError: a name is misspelt, so that the test would be skipped on every bench.
+    """
     for need in needs:
         lacks = [_lack(choice, bench) for choice in need.split(OR)]
         if all(lacks):
+            for choice, lack in zip(need.split(OR), lacks, strict=True):
+                if MEANT in lack and not _is_elsewhere(choice):
+                    raise ValueError(f"needs({choice!r}): {lack}")
             raise NotOnThisBench(f"needs {need}: {' and '.join(lacks)}")
 
 
@@ -78,9 +93,39 @@ def _lack(choice: str, bench: Bench) -> str:
     if choice == HAND:
         return "" if _described(bench).get("inputs") else "nobody can set anything here"
     kind, _, name = choice.partition(":")
-    there = list(KINDS[kind](bench))
-    found = any(each == name or each.endswith(f"/{name}") for each in there)  # of any device
-    return "" if found else f"no {kind} {name!r}; known: {known(there) or 'none'}"
+    there = [each.rpartition("/")[2] for each in KINDS[kind](bench)]  # of any device
+    if name in there or name in KINDS[kind](bench):
+        return ""
+    others = [each for each in there if _DIGIT.sub("", each) != _DIGIT.sub("", name)]
+    hint = f"{MEANT} {close[0]!r}?" if (close := closest(name, others)) else ""
+    return f"no {kind} {name!r}; {hint or f'known: {known(dict.fromkeys(there))}'}"
+
+
+def _is_elsewhere(choice: str) -> bool:
+    """Return whether a device of another type than those of the bench has what is needed."""
+    kind, _, name = choice.partition(":")
+    return name in _names_anywhere().get(kind, ())
+
+
+@cache
+def _names_anywhere() -> dict[str, set[str]]:
+    """Return the names of what device types and models have, which are made once for it."""
+    from tickrig.emulators.canopen.choices import MODELS  # noqa: PLC0415 - seldom wanted
+    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.devices import kind_of  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.plan import DevicePlan  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.probe import Probe, probe  # noqa: PLC0415
+
+    names: dict[str, set[str]] = {"fault": set(), "input": set(), "output": set()}
+    for each in (*DEVICES.names(), *MODELS):
+        kind, place = kind_of(each, Path())
+        found = probe(DevicePlan(name=each, kind=kind, type=place, wire=""))
+        if isinstance(found, Probe):
+            inputs = found.physical.inputs
+            names["fault"] |= {*inputs.names(SignalType.FAULT), *found.wire_faults}
+            names["input"] |= {*inputs.table, *inputs.groups}
+            names["output"] |= {*found.physical.outputs}
+    return names
 
 
 def _described(bench: Bench) -> Mapping[str, Any]:  # an answer of the control socket

@@ -28,6 +28,9 @@ MARKERS: Final = (
     "time (tickrig)",
 )
 
+EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
+"""What each marker could name."""
+
 OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
 """Markers of async tests that are run by others."""
 
@@ -80,6 +83,37 @@ def _mode_fixture(modes: tuple[str, ...]) -> object:
             return mode
 
     return ModeFixture()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makeitem(collector: pytest.Collector) -> Generator[None, Any, Any]:
+    """Refuse tests whose markers name nothing: they would be run, or count, for nothing."""
+    made = yield
+    for item in made if isinstance(made, list) else ():
+        if isinstance(item, pytest.Function):
+            _check_markers(collector, item)
+    return made
+
+
+def _check_markers(collector: pytest.Collector, item: pytest.Function) -> None:
+    """Raise CollectError for a marker without names; other packages may have markers like ours."""
+    benched = "bench" in item.fixturenames
+    for marker in item.iter_markers():
+        example = EXAMPLES.get(marker.name)
+        if example is None or not (benched or marker.name == "req"):
+            continue
+        place, wrong = f"{item.name}: @{marker.name}", ""
+        if not (marker.args or marker.kwargs):
+            wrong = f"names nothing: write @pytest.mark.{marker.name}({example!r})"
+        elif benched and marker.kwargs:
+            named = ", ".join(f"{key}={value!r}" for key, value in marker.kwargs.items())
+            wrong = f"takes names alone, as {example!r}, not {named}"
+        elif benched and (
+            no := [each for each in marker.args if not (isinstance(each, str) and each)]
+        ):
+            wrong = f"takes names as texts, not {no[0]!r}"
+        if wrong:
+            raise collector.CollectError(f"{place} {wrong}")
 
 
 @pytest.fixture

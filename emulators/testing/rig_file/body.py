@@ -8,11 +8,12 @@ from typing import Final
 from tickrig.device.body.wheeled_body import SIDES
 from tickrig.emulators.canopen.body.body_on_drives import SHAFTS
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.testing.rig_file.fields import near, shown
+from tickrig.emulators.testing.rig_file.fields import shown
 from tickrig.emulators.testing.rig_file.plan import BodyPlan
 from tickrig.emulators.testing.rig_file.schema import BODY
 from tickrig.emulators.testing.rig_file.section import Section, is_broken
 from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
+from tickrig.host.text.names import near
 
 PARAMETERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
 

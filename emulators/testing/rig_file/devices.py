@@ -11,10 +11,11 @@ from typing import Any, Final
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
-from tickrig.emulators.testing.rig_file.fields import check_name, near, shown
+from tickrig.emulators.testing.rig_file.fields import check_name, shown
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, WirePlan, WireType
 from tickrig.emulators.testing.rig_file.schema import CANOPEN_DEVICE, SERIAL_DEVICE
 from tickrig.emulators.testing.rig_file.section import Schema, Section
+from tickrig.host.text.names import near
 from tickrig.host.text.user_file import SUFFIX
 
 BUS: Final = "can"

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from tickrig.emulators.serial.network.serve_url import parse_serve_url
-from tickrig.emulators.testing.rig_file.fields import closest, near
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DevicePlan,
@@ -31,6 +30,7 @@ from tickrig.emulators.testing.rig_file.schema import (
     TOLERANCE,
 )
 from tickrig.emulators.testing.rig_file.section import Schema, Section
+from tickrig.host.text.names import closest, near
 
 CONTROL = "control"
 TOLERANCE_TABLE = "tolerance"

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.testing.rig_file.fields import near, texts
+from tickrig.emulators.testing.rig_file.fields import texts
 from tickrig.emulators.testing.rig_file.plan import FaultPlan
 from tickrig.emulators.testing.rig_file.section import Section, is_broken
+from tickrig.host.text.names import near
 
 CheckFault = Callable[[str, float | None], None]
 """Raises ValueError unless there is a fault of this name, with this rate."""

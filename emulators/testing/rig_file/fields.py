@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from datetime import date, time
-from difflib import get_close_matches
 from math import isfinite
 from typing import Any, Final
 
 from tickrig.device.canopen.core.slave import UNCONFIGURED
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.canopen.node.node_spec import LSS
+from tickrig.host.text.names import closest
 
 Field = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
@@ -44,18 +43,6 @@ def shown(value: object) -> str:
             return value.isoformat()
     text = f"{value!r:.{LONGEST + 1}}" if isinstance(value, str) else str(value)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
-
-
-def near(name: str, names: list[str]) -> str:
-    """Say which name could be meant, or which there are."""
-    if close := closest(name, names):
-        return f"did you mean {close[0]!r}?"
-    return f"known: {known(names) or 'none'}"
-
-
-def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the name that could be meant, if there is one."""
-    return get_close_matches(name, names, n=1)
 
 
 def text(value: object) -> str:

@@ -13,9 +13,10 @@ from typing import Any, Final
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node_spec import LSS, parse_ids
 from tickrig.emulators.canopen.rig_file import DEVICE_KEYS, NODE_KEYS
-from tickrig.emulators.testing.rig_file.fields import closest, shown
+from tickrig.emulators.testing.rig_file.fields import shown
 from tickrig.emulators.testing.rig_file.section import Notes, Section, dotted, is_broken
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.names import closest
 from tickrig.host.text.toml_document import BROKEN, TomlDocument, TomlPath
 
 SYSTEM: Final = (

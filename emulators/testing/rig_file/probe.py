@@ -23,10 +23,10 @@ from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.commands.device_config import configure, option_names
 from tickrig.emulators.commands.device_type import ConfiguredDevice
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.testing.rig_file.fields import near
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from tickrig.emulators.testing.rig_file.fields import Field, closest, near, shown
+from tickrig.emulators.testing.rig_file.fields import Field, shown
+from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_document import BROKEN, Mistake, TomlDocument, TomlPath
 
 MOST: Final = 500

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.testing.rig_file.fields import check_name, closest, near, shown
+from tickrig.emulators.testing.rig_file.fields import check_name, shown
 from tickrig.emulators.testing.rig_file.section import Section, is_broken
 from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
 from tickrig.emulators.testing.signals.scope import SLASH, check_signals
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.emulators.testing.signals.sources import Constant
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
+from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_document import TomlPath
 from tickrig.host.text.values import Setting
 

@@ -28,6 +28,7 @@ from tickrig.emulators.testing.signals.formula import (
     Number,
     Term,
 )
+from tickrig.host.text.names import near
 
 LONGEST: Final = 2_000
 DEEPEST: Final = 100
@@ -154,7 +155,7 @@ def _dotted(node: ast.expr) -> str:
 
 def _function(name: str, count: int) -> str:
     if name not in CALLED:
-        raise ValueError(f"no function {name}; known: {', '.join(CALLED)}")
+        raise ValueError(f"no function {name}; {near(name, CALLED)}")
     _, least, most = FUNCTIONS[name]
     if not least <= count <= most:
         wanted = f"{least} or more" if most == MANY else str(least)

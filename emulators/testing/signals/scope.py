@@ -8,12 +8,12 @@ from math import nan
 from typing import Final
 
 from tickrig.device.physical import SignalType
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.signals.formula import Formula
 from tickrig.emulators.testing.signals.mistake import Mistake
 from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
 from tickrig.emulators.testing.signals.sources import Constant
+from tickrig.host.text.names import near
 
 LONGEST: Final = 100
 """So many signals may need each other in a row."""
@@ -147,17 +147,19 @@ def _check(scope: Scope, key: str) -> Iterator[Mistake]:
     if isinstance(source, Formula):
         for name in source.names:
             if scope.find(name, key) is None:
-                yield Mistake((key,), f"no signal, input or output {name}; {_known(scope, key)}")
+                yield Mistake(
+                    (key,), f"no signal, input or output {name}; {_near(scope, key, name)}"
+                )
 
 
-def _known(scope: Scope, key: str) -> str:
-    """List what a formula could name, its own device first."""
+def _near(scope: Scope, key: str, wanted: str) -> str:
+    """Say what a formula could mean, or list what it could name, its own device first."""
     own = key.partition(SLASH)[0]
     names = [name for name in scope.signals if SLASH not in name]
     for name in sorted(scope.devices, key=lambda name: name != own):
         device, begin = scope.devices[name], "" if name == own else f"{name}."
         names += [f"{begin}{each}" for each in (*device.outputs, *device.inputs.table)]
-    return f"known: {known(names) or 'none'}"
+    return near(wanted, names)
 
 
 def _check_target(scope: Scope, key: str) -> Iterator[Mistake]:
@@ -165,10 +167,10 @@ def _check_target(scope: Scope, key: str) -> Iterator[Mistake]:
     device_name, _, name = key.partition(SLASH)
     device = scope.devices.get(device_name)
     if device is None:
-        yield Mistake((key,), f"no device {device_name}; known: {known(scope.devices) or 'none'}")
+        yield Mistake((key,), f"no device {device_name}; {near(device_name, scope.devices)}")
         return
     if name not in device.inputs.table:
-        yield Mistake((key,), f"no input {name}; known: {known(device.inputs.table) or 'none'}")
+        yield Mistake((key,), f"no input {name}; {near(name, device.inputs.table)}")
         return
     spec, item = scope.signals[key], device.inputs.table[name]
     try:

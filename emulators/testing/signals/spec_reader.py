@@ -34,6 +34,7 @@ from tickrig.emulators.testing.signals.mistake import Keys, Mistake
 from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
 from tickrig.emulators.testing.signals.sources import SHAPES, Constant, Noise, Ramp, Wave
 from tickrig.emulators.testing.signals.table import read_table
+from tickrig.host.text.names import near
 
 EVERY_US: Final = 10_000
 """How often noise is drawn, and lags and integrals move on, unless told otherwise."""
@@ -185,8 +186,8 @@ def _read_fields(name: str, table: Fields, keys: Keys, fields: dict[str, Any]) -
     known = FORMS[name].keys
     for key, value in table.items():
         if key not in known:
-            others = ", ".join(other for other in known if other != name)
-            yield Mistake((*keys, key), f"not a key of {name}; known: {others}")
+            hint = near(str(key), [other for other in known if other != name])
+            yield Mistake((*keys, key), f"not a key of {name}; {hint}")
             continue
         try:
             fields[key] = known[key](value)

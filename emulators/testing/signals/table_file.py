@@ -13,6 +13,7 @@ from typing import Final
 
 from tickrig.emulators.record.bench_replay import read_bench_recording
 from tickrig.emulators.testing.signals.fields import number
+from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 
 Points = Sequence[tuple[int, float]]
@@ -160,7 +161,7 @@ def _place(head: list[str], column: str | None) -> int:
     known = ", ".join(head[1:]) or "none"
     if column is None:
         raise ValueError(f"column is missing: one of {known}")
-    raise ValueError(f"no column {column!r}; it has {known}")
+    raise ValueError(f"no column {column!r}; {near(column, head[1:])}")
 
 
 def _is_number(text: str) -> bool:

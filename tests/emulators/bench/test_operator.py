@@ -36,7 +36,7 @@ def test_a_group_is_not_set_by_halves(emulator: Emulator) -> None:
 @pytest.mark.parametrize(
     ("name", "values", "error"),
     [
-        ("plce", (1,), "no input 'plce'; known: place, lamp, key, x_mm, y_mm, dead"),
+        ("plce", (1,), "no input 'plce'; did you mean 'place'"),
         ("place", (1,), r"place takes 2 values \(x_mm, y_mm\), got 1"),
         ("lamp", (), "lamp takes one value"),
         ("lamp", (2,), r"lamp 2 is not in 0\.\.1"),

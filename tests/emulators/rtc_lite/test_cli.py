@@ -133,7 +133,7 @@ def test_a_callback_that_raises_is_one_line(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (["--node", "eco"], "--node: no node 'eco'; known: echo, lite-a, lite-b, or FILE.py:Cl"),
+        (["--node", "eco"], "--node: no node 'eco'; did you mean 'echo'? (or FILE.py:Class)"),
         (["--node", "none.py:A"], "--node: none.py: No such file or directory"),
         (["--node", ".py:A"], "--node: .py: No such file or directory"),
         (["--node", "broken.py:A"], "--node: broken.py: line 2: invalid syntax"),

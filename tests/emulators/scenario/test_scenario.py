@@ -74,7 +74,7 @@ def test_a_scenario_is_read_into_values() -> None:
         ("1x send a", "'1x' is not a time: write 1.5s, 200ms or 250us"),
         ("-1 send a", "'-1' is not a time"),
         ("0.5 send a", "0.5 is earlier than the action above"),
-        ("1 pres key", "no action 'pres'; known: send, shout, raw, set, press, release, fault"),
+        ("1 pres key", "no action 'pres'; did you mean 'press'?"),
         ("1 send \\q", "is not ASCII"),
         ("1 send é", "is not ASCII"),
         ("1 raw 6", "raw takes bytes in hex, as '6f 6b 0a', got '6'"),

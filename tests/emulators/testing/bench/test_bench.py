@@ -47,7 +47,7 @@ def test_a_group_is_set_at_once() -> None:
 @pytest.mark.parametrize(
     ("act", "text"),
     [
-        (lambda bench: bench.set("stik", 1), "no input 'stik'; known: .*stick"),
+        (lambda bench: bench.set("stik", 1), "no input 'stik'; did you mean 'stick'?"),
         (lambda bench: bench.get("nothing"), "no input or output .*nothing.*; known: .*state"),
         (lambda bench: bench.press("state"), "no button 'state'; known: .*power_button"),
         (lambda bench: bench.fault("smoke"), "no fault 'smoke'; known: .*cut"),

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.emulators.testing.plugin.conftest import Run
@@ -196,4 +198,38 @@ def test_a_safe_output_that_is_not_there_is_told_before_the_test(
     )
     result = run()
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(['*no bench: no input or output "sate"; known: *'])
+    result.stdout.fnmatch_lines(['*no bench: no input or output "sate"; did you mean *'])
+
+
+@pytest.mark.parametrize("device", ["'epos'", "'2=drive.eds'", "dict(epos='epos')", "'lamp.py:L'"])
+def test_a_device_by_what_a_rig_file_calls_it(
+    pytester: pytest.Pytester, run: Run, device: str
+) -> None:
+    examples = Path(__file__).parents[4] / "examples"
+    folder = pytester.mkdir("sub")  # where the test is, and not where pytest runs
+    (folder / "drive.eds").write_bytes((examples / "eds" / "epos.eds").read_bytes())
+    (folder / "lamp.py").write_bytes((examples / "device_rtc_gripper.py").read_bytes())
+    (folder / "test_it.py").write_text(
+        "import pytest\n@pytest.fixture\n"
+        f"def bench_config(): return {device.replace('lamp.py:L', '7=lamp.py:Gripper')}\n"
+        "def test_one(bench):\n    bench.run_for('1s')\n    assert bench.get('state')\n"
+    )
+    run().assert_outcomes(passed=1)
+
+
+def test_a_misspelt_device_is_told_in_a_line(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.fixture
+        def bench_config():
+            return "EPOS"
+
+        def test_one(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["no bench: no device 'EPOS'; did you mean 'epos'? *"])

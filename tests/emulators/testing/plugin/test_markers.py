@@ -57,7 +57,9 @@ def test_what_nobody_can_have_is_an_error(pytester: pytest.Pytester, run: Run) -
     )
     result = run()
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(["no bench: needs('vitual'): nobody has that; known: virtual, *"])
+    result.stdout.fnmatch_lines(
+        ["no bench: needs('vitual'): nobody has that; did you mean 'virtual'[?]"]
+    )
 
 
 def test_markers_of_a_module_count_too(pytester: pytest.Pytester, run: Run) -> None:
@@ -130,3 +132,106 @@ def test_markers_are_told(run: Run) -> None:
     run("--markers").stdout.fnmatch_lines(
         ["@pytest.mark.needs([*]what): *(tickrig)", "@pytest.mark.req([*]names): *(tickrig)"]
     )
+
+
+@pytest.mark.parametrize(
+    ("need", "told"),
+    [
+        ("fault:cutt", "needs('fault:cutt'): no fault 'cutt'; did you mean 'cut'?"),
+        ("input:Stick", "needs('input:Stick'): no input 'Stick'; did you mean 'stick'?"),
+        ("output:stete", "needs('output:stete'): no output 'stete'; did you mean 'state'?"),
+        ("device:rcr", "needs('device:rcr'): no device 'rcr'; did you mean 'rrc'?"),
+        ("real or fault:cutt", "needs('fault:cutt'): no fault 'cutt'; did you mean 'cut'?"),
+        ("vitual", "needs('vitual'): nobody has that; did you mean 'virtual'?"),
+        ("fault", "needs('fault'): nobody has that; did you mean 'fault:NAME'?"),
+        ("falt:cut", "needs('falt:cut'): nobody has that; did you mean 'fault:cut'?"),
+    ],
+)
+def test_what_is_misspelt_is_an_error_and_no_skip(
+    pytester: pytest.Pytester, run: Run, need: str, told: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        @pytest.mark.needs({need!r})
+        def test_one(bench):
+            pass
+        """
+    )
+    result = run()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([f"no bench: {told}"])
+
+
+@pytest.mark.parametrize("need", ["fault:power_cut", "input:stick2", "device:rrc2"])
+def test_what_other_devices_could_have_is_no_misspelling(
+    pytester: pytest.Pytester, run: Run, need: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        @pytest.mark.needs({need!r})
+        def test_one(bench):
+            pass
+        """
+    )
+    run().assert_outcomes(skipped=1)
+
+
+@pytest.mark.parametrize(
+    ("marker", "told"),
+    [
+        ("needs()", "test_one: @needs names nothing: write @pytest.mark.needs('fault:cut')"),
+        ("needs", "test_one: @needs names nothing: write @pytest.mark.needs('fault:cut')"),
+        ("req()", "test_one: @req names nothing: write @pytest.mark.req('SAF-12')"),
+        ("req('')", "test_one: @req takes names as texts, not ''"),
+        ("req(12)", "test_one: @req takes names as texts, not 12"),
+        ("req(id='SAF-12')", "test_one: @req takes names alone, as 'SAF-12', not id='SAF-12'"),
+        ("allows()", "test_one: @allows names nothing: write @pytest.mark.allows('lost')"),
+    ],
+)
+def test_a_marker_without_names_is_an_error_at_collection(
+    pytester: pytest.Pytester, run: Run, marker: str, told: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        class TestIt:
+            @pytest.mark.{marker}
+            def test_one(self, bench):
+                pass
+        """
+    )
+    result = run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*ERROR collecting*", f"*{told}"])
+
+
+def test_markers_of_other_packages_may_have_our_names(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.needs(database=True)
+        @pytest.mark.needs
+        @pytest.mark.allows
+        @pytest.mark.req(12, why="so")
+        def test_one():
+            pass
+
+        @pytest.mark.req
+        class TestIt:
+            def test_two(self):
+                pass
+        """
+    )
+    result = run("--continue-on-collection-errors")
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["*test_two: @req names nothing: write @pytest.mark.req('SAF-12')"])

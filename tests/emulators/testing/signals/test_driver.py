@@ -247,11 +247,11 @@ def test_a_text_is_no_number() -> None:
             ],
         ),
         (
-            'x = {lag = "gone + a.gone", tau = "1s"}',
+            'x = {lag = "gone + a.zzz", tau = "1s"}',
             [
                 f"x: no signal, input or output {name}; known: x, a.mean, a.state, a.volt,"
                 " a.count, a.key, a.label, b.mean, b.state, b.volt, b.count, b.key, b.label"
-                for name in ("gone", "a.gone")
+                for name in ("gone", "a.zzz")
             ],
         ),
     ],

@@ -62,7 +62,7 @@ def test_a_column_of_a_file(
         ("a.csv", "", "", "{path} has no value"),
         ("a.csv", "t,v\n", 'column="v"', "{path} has no value of v"),
         ("a.csv", "t,v,w\n0,1,2\n", "", "{path}: column is missing: one of v, w"),
-        ("a.csv", "t,v\n0,1\n", 'column="u"', "{path}: no column 'u'; it has v"),
+        ("a.csv", "t,v\n0,1\n", 'column="u"', "{path}: no column 'u'; known: v"),
         ("a.csv", "t,v\n0,1\n1\n", "", "{path}: line 3 has 1 columns"),
         ("a.csv", "t,v\n\n0,x\n", "", "{path}: line 3: could not convert string to float: 'x'"),
         ("a.csv", "t,v\n0,inf\n", "", "{path}: line 2: it takes a number, as 12.5, not inf"),

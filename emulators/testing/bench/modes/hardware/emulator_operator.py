@@ -9,13 +9,13 @@ from typing import Final
 
 from tickrig.device.physical import SignalType
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.bench.errors import MachineTooSlow, NotOnThisBench, PortGone
 from tickrig.emulators.testing.bench.modes.emulated_mode import POWER
 from tickrig.emulators.testing.rig_file.plan import DevicePlan
 from tickrig.host.control.client import TIMEOUT_S, ControlClient, ControlRefused
 from tickrig.host.control.requests import Object
+from tickrig.host.text.names import known
 from tickrig.host.text.values import Setting, format_time
 from tickrig.wire.instant import NEVER
 

@@ -6,7 +6,6 @@ from typing import Final
 
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -14,6 +13,7 @@ from tickrig.emulators.testing.bench.assembly import AssemblyFaults
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.hardware.power_switch import PowerSwitch
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, parse_setting
 from tickrig.wire.instant import NEVER
 
@@ -70,8 +70,8 @@ class HumanOperator:
             return self._physical.inputs[name]
         output = self._physical.outputs.get(name)
         if output is None:
-            names = known([*self._physical.inputs.table, *self._physical.outputs])
-            raise ValueError(f"no input or output {name!r}; known: {names}")
+            names = [*self._physical.inputs.table, *self._physical.outputs]
+            raise ValueError(f"no input or output {name!r}; {near(name, names)}")
         unit = f" in {output.unit}" if output.unit else ""
         while True:
             text = self._terminal.prompt(

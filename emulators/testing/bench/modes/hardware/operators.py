@@ -9,7 +9,6 @@ from typing import Any
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.names import known
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.emulated_mode import answer_of
@@ -21,6 +20,7 @@ from tickrig.emulators.testing.bench.modes.hardware.power_switch import PowerSwi
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.rig_file.plan import HardwarePlan, RigPlan
 from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 
 
@@ -183,8 +183,8 @@ class Operators:
         assembly = self._like.state.assembly
         groups = assembly.inputs.groups
         if not (name in assembly.inputs.table or name in assembly.outputs or name in groups):
-            names = known([*assembly.inputs.table, *assembly.outputs])
-            raise ValueError(f"no input or output {name!r}; known: {names}")
+            names = [*assembly.inputs.table, *assembly.outputs]
+            raise ValueError(f"no input or output {name!r}; {near(name, names)}")
         alone = len(assembly.parts) == 1
         device = next(iter(self._plan.devices)) if alone else name.partition("/")[0]
         return device, name.removeprefix(f"{device}/")
