@@ -12,7 +12,9 @@ frame and three bits interframe space.
 
 from __future__ import annotations
 
-from typing import Final
+from functools import lru_cache, reduce
+from operator import getitem
+from typing import Any, Final
 
 import crcmod
 
@@ -39,32 +41,63 @@ EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
 START_STANDARD: Final = 8
 START_EXTENDED: Final = 9
 _FILL_BITS: Final = {START_STANDARD: 5, START_EXTENDED: 1}
+STATES: Final = 10
+
+MAX_STUFFED: Final = 29
+"""Of the 118 bits from start of frame to the end of the CRC: all but the first of each fifth."""
+
+STUFFED_BITS: Final = 256
+"""Place in a row of the number of stuff bits so far; before it stand the rows that follow."""
+
+KEPT_HEADS: Final = 4_096
+
+_Row = list[Any]
 
 
 def frame_bits(frame: CanFrame) -> int:
     """Return the bits of a frame with stuff bits and interframe space."""
-    can_id, data, remote, extended, dlc = frame
-    if not remote:
-        dlc = len(data)
-    control = remote << 6 | dlc
+    can_id, data, remote, extended, length = frame
+    flags = extended << 1 | remote if extended or remote else 0
+    bits, row, crc = _head(can_id << 6 | flags << 4 | (length if remote else len(data)))
+    crc = _crc16(data, crc)
+    row = reduce(getitem, data, row)
+    # Behind the CRC a bit unlike its last one: it fills the byte up, and is never stuffed.
+    end: int = row[crc >> 8][crc & 0xFE | ~crc >> 1 & 1][STUFFED_BITS]
+    return bits + end
+
+
+@lru_cache(KEPT_HEADS)
+def _head(key: int) -> tuple[int, _Row, int]:
+    """Begin a frame: its bits without stuff bits, and row and CRC behind the DLC."""
+    can_id, extended, remote, length = key >> 6, key >> 5 & 1, key >> 4 & 1, key & 0xF
+    control = remote << 6 | length
     if extended:
         arbitration = (can_id >> 18) << 20 | EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
-        stream = (arbitration << 7 | control).to_bytes(5, "big") + data
-        bits, state = EXTENDED_BITS + 8 * len(data), START_EXTENDED << 8
+        stream, bits = (arbitration << 7 | control).to_bytes(5, "big"), EXTENDED_BITS
     else:
-        stream = (can_id << 7 | control).to_bytes(3, "big") + data
-        bits, state = STANDARD_BITS + 8 * len(data), START_STANDARD << 8
-    for byte in stream + _checksum(stream):
-        state += byte
-        bits += STUFFED[state]
-        state = NEXT[state]
-    return bits
+        stream, bits = (can_id << 7 | control).to_bytes(3, "big"), STANDARD_BITS
+    first = _rows()[START_EXTENDED if extended else START_STANDARD]
+    data_bits = 0 if remote else 8 * length
+    return bits + data_bits, reduce(getitem, stream, first), _crc16(stream)
 
 
-def _checksum(stream: bytes) -> bytes:
-    """Return the CRC, and a bit unlike its last one: it fills the byte and is never stuffed."""
-    crc: int = _crc16(stream)
-    return (crc | ~crc >> 1 & 1).to_bytes(2, "big")
+@lru_cache(1)
+def _rows() -> list[_Row]:
+    """Lay the automaton out, so that bytes are followed without a step of Python for each.
+
+    Returns:
+        By the state in which a frame begins: by each byte what follows it, and so on; at
+        `STUFFED_BITS` how many bits were stuffed on the way there.
+    """
+    steps = [stuffed * STATES + (state >> 8) for stuffed, state in zip(STUFFED, NEXT, strict=True)]
+    rows: list[_Row] = [[] for _ in range(STATES * (MAX_STUFFED + 1) + max(steps))]
+    for stuffed in range(MAX_STUFFED + 1):
+        first = stuffed * STATES
+        for state in range(STATES):
+            row = rows[first + state]
+            row += [rows[first + step] for step in steps[state << 8 : state + 1 << 8]]
+            row.append(stuffed)
+    return rows
 
 
 def crc16(stream: bytes) -> int:
@@ -91,7 +124,7 @@ def _feed(state: int, byte: int) -> tuple[int, int]:
     return (last or 0) << 2 | run - 1, stuffed
 
 
-_FED: Final = tuple(_feed(state, byte) for state in range(10) for byte in range(256))
+_FED: Final = tuple(_feed(state, byte) for state in range(STATES) for byte in range(256))
 NEXT: Final = tuple(state << 8 for state, _ in _FED)
 """By state << 8 | byte: the state after it << 8."""
 STUFFED: Final = tuple(stuffed for _, stuffed in _FED)
