@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from heapq import heapify, heappop, heappush
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
+
+NUMBER_BITS: Final = 24
+NUMBER_MASK: Final = (1 << NUMBER_BITS) - 1
+FIRST_NUMBER: Final = -1
+"""Of the node that the fault `babble` adds; the others are counted from 0."""
 
 
 def priority(frame: CanFrame) -> int:
@@ -25,7 +30,7 @@ def priority(frame: CanFrame) -> int:
     can_id, _, remote, extended, _ = frame
     if extended:
         return (can_id >> 18) << 21 | 3 << 19 | (can_id & 0x3_FFFF) << 1 | remote
-    return can_id << 21 | remote << 20
+    return can_id << 21 | (1 << 20 if remote else 0)
 
 
 def first_difference(frames: Sequence[CanFrame]) -> int:
@@ -48,48 +53,67 @@ class CanArbiter:
     All times are in the units of the segment.
 
     Attributes:
-        heads: a heap of priority, number of the node, node.
+        heads: a heap of whole numbers, which sort faster than tuples: the priority of the
+            first frame of a queue, and below it the number of the node.
         free: no frame starts before this.
         slow: some node has to wait longer than the bus is busy.
     """
 
-    __slots__ = ("free", "heads", "slow")
+    __slots__ = ("_ends", "free", "heads", "slow")
 
     def __init__(self) -> None:
         self.free, self.slow = 0, False
-        self.heads: list[tuple[int, int, CanEnd]] = []
+        self.heads: list[int] = []
+        self._ends: dict[int, CanEnd] = {}
+
+    def join(self, end: CanEnd) -> None:
+        """Know a node, which may then take part."""
+        self._ends[end.number - FIRST_NUMBER] = end
+
+    def leave(self, end: CanEnd) -> None:
+        """Know a node no longer."""
+        self._remove(end)
+        del self._ends[end.number - FIRST_NUMBER]
 
     def enter(self, end: CanEnd, now: int) -> None:
         """Let a node whose queue was empty take part from now on."""
         end.held = max(end.held, now)
-        heappush(self.heads, (priority(end.queue[0]), end.number, end))
+        self.push(end)
 
-    def put_back(self, ends: list[CanEnd]) -> None:
+    def put_back(self, ends: Iterable[CanEnd]) -> None:
         """Let nodes take part again, those that still have a frame to send."""
         for end in ends:
             if end.queue:
-                heappush(self.heads, (priority(end.queue[0]), end.number, end))
+                self.push(end)
 
-    def remove(self, end: CanEnd) -> None:
-        """Let a node take part no longer."""
-        self.heads = [head for head in self.heads if head[2] is not end]
-        heapify(self.heads)
+    def push(self, end: CanEnd) -> None:
+        """Let a node take part again, which has a frame to send."""
+        head = priority(end.queue[0]) << NUMBER_BITS | end.number - FIRST_NUMBER
+        heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:
         """Take the winner out; several nodes with the same identifier all win."""
         heads = self.heads
-        rank, _, end = heappop(heads)
-        winners = [end]
-        while heads and heads[0][0] == rank:
-            winners.append(heappop(heads)[2])
+        head = heappop(heads)
+        winners = [self._ends[head & NUMBER_MASK]]
+        while heads and heads[0] >> NUMBER_BITS == head >> NUMBER_BITS:
+            winners.append(self._ends[heappop(heads) & NUMBER_MASK])
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
         """Take the winner of those that wait least, or all of them; the start comes first."""
-        start = max(self.free, min(head[2].held for head in self.heads))
-        able = sorted(head for head in self.heads if head[2].held <= start)
-        winners = [end for rank, _, end in able if everybody or rank == able[0][0]]
-        self.slow = any(head[2].held > self.free for head in self.heads)
+        waiting = {head: self._ends[head & NUMBER_MASK] for head in sorted(self.heads)}
+        start = max(self.free, min(end.held for end in waiting.values()))
+        able = [head for head, end in waiting.items() if end.held <= start]
+        rank = able[0] >> NUMBER_BITS
+        winners = [waiting[head] for head in able if everybody or head >> NUMBER_BITS == rank]
+        self.slow = any(end.held > self.free for end in waiting.values())
         for end in winners:
-            self.remove(end)
+            self._remove(end)
         return start, winners
+
+    def _remove(self, end: CanEnd) -> None:
+        """Let a node take part no longer."""
+        number = end.number - FIRST_NUMBER
+        self.heads = [head for head in self.heads if head & NUMBER_MASK != number]
+        heapify(self.heads)

@@ -92,13 +92,14 @@ class CanSegment(TransmissionOutcomes):
             frames = frames[: len(frames) - excess]
         if not frames:
             return
-        if self._start >= now:
+        if self._start >= now and not self._stale:
             self._withdraw()
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
-        waiting = bool(queue)
-        queue.extend(frames)
-        if not waiting:
+        if queue:
+            queue.extend(frames)
+        else:
+            queue.extend(frames)
             self._enter(end, now)
 
     def join(self, end: CanEnd, now_us: int) -> None:
@@ -108,6 +109,7 @@ class CanSegment(TransmissionOutcomes):
             self.routes.unfiltered.append(end)
         end.segment = self
         self._confinement.join(end)
+        self._arbiter.join(end)
         self.disturb(now_us)
         if end.queue:
             end.held = 0
@@ -119,7 +121,7 @@ class CanSegment(TransmissionOutcomes):
         if end in self._winners:
             self._withdraw()
             self._arbiter.free = now_us * self.unit + (ECHO_BITS + ERROR_BITS) * self.bit
-        self._arbiter.remove(end)
+        self._arbiter.leave(end)
         self.routes.ends.remove(end)
         if end.unfiltered:
             self.routes.unfiltered.remove(end)
@@ -159,12 +161,13 @@ class CanSegment(TransmissionOutcomes):
         arbiter = self._arbiter
         if arbiter.heads and not self._repeating:
             if arbiter.slow or self.shorted:
-                self._start, self._winners = arbiter.take_waiting(everybody=self.shorted)
+                self._start, winners = arbiter.take_waiting(everybody=self.shorted)
             else:
-                self._start, self._winners = arbiter.free, arbiter.take()
-            frame = self._winners[0].queue[0]
+                self._start, winners = arbiter.free, arbiter.take()
+            self._winners = winners
+            frame = winners[0].queue[0]
             bits = self._lengths.get(frame) or self._length(frame)
-            if self._on_bus > 1 and not self._faults.active and len(self._winners) == 1:
+            if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
                 self._settle(self._deliver, bits)
             else:
                 self._judge(frame, bits)

@@ -60,7 +60,27 @@ class TransmissionOutcomes:
         self._due_us: int
 
     def _deliver(self) -> None:
-        """Hand a frame to all that accept it."""
+        """Hand a frame to all that accept it: from one sender, on a sound bus, without detours."""
+        winners, confinement = self._winners, self._confinement
+        if len(winners) > 1 or confinement.marked or self._faults.active or self._recovery.active:
+            self._deliver_and_count()
+            return
+        at_us, (sender,), arbiter = self._due_us, winners, self._arbiter
+        queue = sender.queue
+        frame = queue.popleft()
+        for observe in self._observers:
+            observe(at_us, frame)
+        arbiter.free = self._free
+        self.busy.append((self._start, self._free))
+        if queue:
+            arbiter.push(sender)
+        self._winners = []
+        for end in self.routes.receivers(frame):
+            if end is not sender:
+                end.receive(at_us, frame)
+
+    def _deliver_and_count(self) -> None:
+        """Hand a frame to all that accept it, and count it in error counters and recovery."""
         at_us, winners = self._due_us, self._winners
         frame = winners[0].queue[0]
         self._take_off(frame)
