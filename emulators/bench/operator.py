@@ -97,6 +97,8 @@ class Operator(Copyable):
             wire,
         )
         self.note = note
+        self._spans: dict[str, dict[int, int]] = {}
+        """When each fault that was ordered begins and ends, by its name."""
 
     def set(self, name: str, *values: Setting) -> None:
         """Set an input, or all inputs of a group.
@@ -151,21 +153,24 @@ class Operator(Copyable):
         self.set(name, 0)
 
     def fault(self, now_us: int, spec: FaultSpec) -> None:
-        """Let a fault come, now or when its time comes; ValueError if it cannot."""
+        """Let a fault come, now or when its time comes; ValueError if it cannot.
+
+        It takes the place of those of its name whose time it shares.
+        """
         self.check_fault(spec)
         if spec.to_us <= now_us:
             raise ValueError(f"fault {spec.name} would have ended before now")
-        self._drop_fault(spec.name)
+        self._drop_fault(spec.name, max(now_us, spec.from_us), spec.to_us)
+        key = spec.name, spec.from_us
+        self._spans.setdefault(spec.name, {})[spec.from_us] = spec.to_us
         if spec.from_us > now_us:
-            self._event_queue.put(
-                ("begin", spec.name), spec.from_us, partial(_at, partial(self._begin, spec))
-            )
+            begin = partial(_at, partial(self._begin, spec))
+            self._event_queue.put(("begin", *key), spec.from_us, begin)
         else:
             self._begin(spec)
         if spec.to_us != NEVER:
-            self._event_queue.put(
-                ("end", spec.name), spec.to_us, partial(_at, partial(self._end, spec.name))
-            )
+            end = partial(_at, partial(self._end_span, spec))
+            self._event_queue.put(("end", *key), spec.to_us, end)
 
     def check_fault(self, spec: FaultSpec) -> None:
         """Raise ValueError unless there is such a fault and its rate makes sense."""
@@ -200,9 +205,14 @@ class Operator(Copyable):
     def _inputs_fault(self, name: str) -> bool:
         return name in self._inputs.table and bool(self._inputs[name])
 
-    def _drop_fault(self, name: str) -> None:
-        self._event_queue.drop(("begin", name))
-        self._event_queue.drop(("end", name))
+    def _drop_fault(self, name: str, from_us: int = 0, to_us: int = NEVER) -> None:
+        """Forget what is to become of a fault, or only what shares a time."""
+        spans = self._spans.get(name, {})
+        for begin_us, end_us in tuple(spans.items()):
+            if begin_us < to_us and from_us < end_us:
+                self._event_queue.drop(("begin", name, begin_us))
+                self._event_queue.drop(("end", name, begin_us))
+                del spans[begin_us]
 
     def _begin(self, spec: FaultSpec) -> None:
         if spec.name in self._wire.fault_types:
@@ -210,6 +220,13 @@ class Operator(Copyable):
             self.note(spec.name if spec.rate is None else f"{spec.name}={spec.rate:g}")
         else:
             self._put(spec.name, 1)
+
+    def _end_span(self, spec: FaultSpec) -> None:
+        """Let a fault end, unless it begins again at once."""
+        spans = self._spans[spec.name]
+        del spans[spec.from_us]
+        if spec.to_us not in spans:
+            self._end(spec.name)
 
     def _end(self, name: str) -> None:
         if name in self._wire.fault_types:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tickrig.device.twin import Copyable
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
@@ -45,17 +46,17 @@ class BenchOperator(Operator):
 
     def fault(self, now_us: int, spec: FaultSpec) -> None:
         """Let a fault come; one of a lone device or wire may have its name before it."""
-        super().fault(now_us, replace(spec, name=self._known(spec.name)))
+        super().fault(now_us, replace(spec, name=self.full_name_of(spec.name)))
 
     def clear(self, name: str) -> None:
         """Let a fault go."""
-        super().clear(self._known(name))
+        super().clear(self.full_name_of(name))
 
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless there is a fault of this name."""
-        super().check_clear(self._known(name))
+        super().check_clear(self.full_name_of(name))
 
-    def _known(self, name: str) -> str:
+    def full_name_of(self, name: str) -> str:
         """Return how a fault is called, which need not have its device or wire before it."""
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
@@ -179,6 +180,7 @@ class BenchRig(RunningEmulator):
     Attributes:
         state: what it consists of.
         journal: what happens.
+        orders: faults that were ordered; those of a control socket are not among them.
     """
 
     def __init__(self, name: str, state: RigState, link: str = "") -> None:
@@ -186,6 +188,7 @@ class BenchRig(RunningEmulator):
         self.state, self.rig, self.operator = state, state.rig, state.operator
         self.event_queue = state.rig.event_queue
         self.log = self.journal = Journal()
+        self.orders: list[FaultOrder] = []
         self.operator.note = self._note
         for mount in state.mounts.values():
             if isinstance(mount, LineMount):

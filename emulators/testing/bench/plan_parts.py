@@ -10,7 +10,7 @@ from pathlib import Path
 from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
 from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.choices import AUTO
@@ -22,7 +22,7 @@ from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.bench.bench_rig import Parts, RigState
+from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.plan import (
@@ -84,12 +84,13 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
     }
 
 
-def begin_faults(plan: RigPlan, state: RigState) -> None:
+def begin_faults(plan: RigPlan, rig: BenchRig) -> None:
     """Let the faults come in their time; ValueError if there is none, or it cannot be like this."""
     for fault in plan.faults:
-        name = state.fault_name(fault.owner, fault.spec.name)
-        spec = fault.spec
-        state.operator.fault(0, FaultSpec(name, spec.rate, spec.from_us, spec.to_us))
+        name = rig.state.fault_name(fault.owner, fault.spec.name)
+        order = FaultOrder(replace(fault.spec, name=name), 0)
+        rig.operator.fault(0, order.begin(0))
+        rig.orders.append(order)
 
 
 def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount:

@@ -44,7 +44,8 @@ def rig_of(
         trace=trace,
         keeps=keeps,
     )
-    begin_faults(plan, state)
     for store in parts.stores:
         state.rig.watchers.append(store_keeper(store))
-    return BenchRig(NAME, state)
+    rig = BenchRig(NAME, state)
+    begin_faults(plan, rig)
+    return rig

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.record.wire_log import WireLine
@@ -14,6 +15,8 @@ Condition = Callable[[], bool]
 """Says whether something is so; it only looks."""
 
 ANY: Final = ""
+
+ORDINALS: Final = {1: "st", 2: "nd", 3: "rd"}
 
 
 class LineTrigger:
@@ -34,12 +37,21 @@ class LineTrigger:
     def __init__(self, pattern: str, nth: int = 1, source: str = ANY) -> None:
         if nth < 1:
             raise ValueError(f"nth counts from 1, got {nth}")
+        self._text = pattern
         self._pattern = re.compile(".*".join(map(re.escape, pattern.split("*"))), re.DOTALL)
         self._nth, self._source, self.count = nth, source, 0
 
     def __call__(self) -> bool:
         """Say whether it has passed so often."""
         return self.count >= self._nth
+
+    def __str__(self) -> str:
+        """Say what it waits for.
+
+        >>> str(LineTrigger("OK:*", nth=3))
+        'the 3rd OK:*'
+        """
+        return f"the {_ordinal(self._nth)} {self._text}"
 
     def hear(self, line: WireLine) -> None:
         """Take a line of the journal."""
@@ -52,6 +64,26 @@ def check_condition(condition: object) -> None:
     if not callable(condition):
         wanted = 'a function, as lambda: bench.get("state") == "Off", or bench.on_line("OK:*")'
         raise TypeError(f"{condition!r:.60} cannot be waited for: give {wanted}")
+
+
+def text_of(condition: Condition) -> str:
+    """Say what somebody waits for: a line, or where the question stands."""
+    if isinstance(condition, LineTrigger):
+        return str(condition)
+    code = getattr(condition, "__code__", None)
+    if code is None:
+        return f"a {type(condition).__name__}"
+    return f"the condition of {Path(code.co_filename).name}:{code.co_firstlineno}"
+
+
+def _ordinal(number: int) -> str:
+    """Write a number as people count.
+
+    >>> [_ordinal(number) for number in (1, 2, 3, 4, 11, 22, 112)]
+    ['1st', '2nd', '3rd', '4th', '11th', '22nd', '112th']
+    """
+    teens = number % 100 in (11, 12, 13)
+    return f"{number}{'th' if teens else ORDINALS.get(number % 10, 'th')}"
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:

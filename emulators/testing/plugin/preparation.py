@@ -35,7 +35,8 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
 
         with _usage():
             check_report(settings.report)
-        config.pluginmanager.register(ReportPlugin(config, settings), "tickrig-bench-report")
+            plugin = ReportPlugin(config, settings)
+        config.pluginmanager.register(plugin, "tickrig-bench-report")
 
 
 @contextmanager

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
+from operator import itemgetter
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -16,18 +19,31 @@ from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     Outcome,
-    Requirement,
     RunEnvironment,
     TestRecord,
 )
+from tickrig.emulators.testing.report.overview import (
+    UNWELL,
+    Verdict,
+    natural,
+    reported,
+    requirement_rows,
+)
+from tickrig.emulators.testing.report.page_text import counted
 from tickrig.emulators.testing.report.report_file import write_report
 from tickrig.emulators.testing.report.report_json import from_data, to_data
+from tickrig.emulators.testing.report.requirement_file import read_requirements
 
 RECORD: Final = "tickrig_record"
 """The attribute of the last report of a test that has its record as JSON."""
 
 OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
 REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
+EXPECTED: Final = pytest.StashKey[str]()
+MOST: Final = 400
+"""Characters of what was expected."""
+
+_Place = tuple[str, int, list[tuple[int, str]]]
 
 
 class ReportPlugin:
@@ -36,11 +52,17 @@ class ReportPlugin:
     Args:
         config: of pytest.
         settings: what was asked for; a report is.
+
+    Raises:
+        OSError: the file with the requirements cannot be read.
+        ValueError: what is wrong with it.
     """
 
     def __init__(self, config: pytest.Config, settings: Settings) -> None:
         self._config, self._settings = config, settings
-        self._records: dict[str, TestRecord] = {}
+        path = settings.requirements
+        self._requirements = read_requirements(path) if path else ()
+        self._records: dict[str, tuple[_Place, TestRecord]] = {}
         self._begun = datetime.now().astimezone()
         self._error = ""
 
@@ -54,6 +76,8 @@ class ReportPlugin:
             item.stash[REPORTS] = []
         reports = item.stash.setdefault(REPORTS, [])
         reports.append(report)
+        if report.failed and call.excinfo and not item.stash.get(EXPECTED, ""):
+            item.stash[EXPECTED] = _statement(item, call.excinfo)
         if call.when == "teardown" and is_reported(item):
             setattr(report, RECORD, json.dumps(to_data(record_of(item, reports))))
         return report
@@ -61,7 +85,8 @@ class ReportPlugin:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Take the record of a test, of whatever process."""
         if data := getattr(report, RECORD, None):
-            self._records[str(report.nodeid)] = from_data(TestRecord, json.loads(data))
+            record = from_data(TestRecord, json.loads(data))
+            self._records[record.nodeid] = _place(report), record
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -77,18 +102,31 @@ class ReportPlugin:
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Say where the report is."""
-        count = len(self._records)
-        tests = "1 test" if count == 1 else f"{count} tests"
-        done = f"bench: {self._settings.report} tells of {tests}"
+        done = f"bench: {self._settings.report} tells of {counted(len(self._records), 'test')}"
         terminalreporter.write_line(self._error or done, red=bool(self._error))
+        for line in self._shown():
+            terminalreporter.write_line(f"bench: {line}")
+
+    def _shown(self) -> Iterator[str]:
+        """Yield what the tests show of what they have to, for people."""
+        if not self._requirements:
+            return
+        rows = requirement_rows(self._report(), reported(self._tests()))
+        listed = [row for row in rows if row.listed]
+        shown = sum(row.verdict is Verdict.SHOWN for row in listed)
+        yield f"{shown} of {counted(len(listed), 'requirement')} shown"
+        if untested := [row.name for row in listed if not row.tests]:
+            yield f"no test names {', '.join(untested)}"
+        if unknown := [row.name for row in rows if not row.listed]:
+            yield f"tests name what is no requirement: {', '.join(unknown)}"
+
+    def _tests(self) -> tuple[TestRecord, ...]:
+        """Return the records as they stand in the files, in whatever order the tests were run."""
+        return tuple(record for _, record in sorted(self._records.values(), key=itemgetter(0)))
 
     def _report(self) -> BenchReport:
-        tests = tuple(self._records.values())
-        names = dict.fromkeys(name for test in tests for name in test.requirements)
         return BenchReport(
-            runs=(self._environment(),),
-            tests=tests,
-            requirements=tuple(Requirement(name) for name in names),
+            runs=(self._environment(),), tests=self._tests(), requirements=self._requirements
         )
 
     def _environment(self) -> RunEnvironment:
@@ -101,6 +139,21 @@ class ReportPlugin:
             rig_file=rig_file.name if rig_file else "",
             rig_text=rig_file.read_text("utf-8", "replace") if rig_file else "",
         ).of_this_machine()
+
+
+def _place(report: pytest.TestReport) -> _Place:
+    """Return where a test stands: its file, its line, its name with numbers in their order."""
+    nodeid = str(report.nodeid)
+    return nodeid.partition("::")[0], report.location[1] or 0, natural(nodeid)
+
+
+def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) -> str:
+    """Return the last statement of a test that was run, on one line; empty if none was."""
+    for entry in reversed(error.traceback):
+        if Path(entry.path) == item.path:
+            with suppress(Exception):  # who has compiled the test need not have left its source
+                return " ".join(str(entry.statement).split())[:MOST]
+    return ""
 
 
 def is_reported(item: pytest.Item) -> bool:
@@ -123,6 +176,7 @@ def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord
         requirements=tuple(str(value) for name, value in item.user_properties if name == "req"),
         markers=tuple(dict.fromkeys(m.name for m in item.iter_markers() if m.name not in OWN)),
         reason=reason,
+        expected=item.stash.get(EXPECTED, "") if outcome in UNWELL else "",
         longrepr=longrepr,
         command=repeat_command(item),
     )

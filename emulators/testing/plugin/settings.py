@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -40,6 +41,7 @@ OPTIONS: Final = (
     Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
     Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
     Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
+    Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
 )
 
 
@@ -55,6 +57,7 @@ class Settings(NamedTuple):
         every: whether passed tests are kept too.
         compare: whether each test runs twice.
         report: file for the report, None if there is none.
+        requirements: file with what the tests have to show, None if nobody says it.
     """
 
     rig_file: Path | None = None
@@ -65,6 +68,7 @@ class Settings(NamedTuple):
     every: bool = False
     compare: bool = False
     report: Path | None = None
+    requirements: Path | None = None
 
     @classmethod
     def of(cls, config: pytest.Config) -> Settings:
@@ -79,6 +83,7 @@ class Settings(NamedTuple):
             _every(wanted["bench_artifacts_of"] or FAILED),
             wanted["bench_compare"].lower() in {"true", "1", "yes", "on"},
             _path(config, "bench_report", wanted["bench_report"]),
+            _requirements(config, wanted),
         )
 
     @property
@@ -105,6 +110,16 @@ def _path(config: pytest.Config, name: str, text: str) -> Path | None:
     if config.getoption(name) is not None:
         return config.invocation_params.dir / text
     return (config.inipath.parent if config.inipath else config.rootpath) / text
+
+
+def _requirements(config: pytest.Config, wanted: Mapping[str, str]) -> Path | None:
+    """Return where the requirements are, if there is a report that tells of them."""
+    path = _path(config, "bench_requirements", wanted["bench_requirements"])
+    if path is None or wanted["bench_report"]:
+        return path
+    if config.getoption("bench_requirements") is not None:
+        raise pytest.UsageError("--bench-requirements: a report tells of them: add --bench-report")
+    return None
 
 
 def _modes(text: str) -> tuple[str, ...]:

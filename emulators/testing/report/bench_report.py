@@ -86,19 +86,22 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault that a test ordered.
+    """A fault that a test ordered, or that came without an order.
 
     Attributes:
         name: as it was ordered, with device and rate: `left_drive/flip=0.01`.
         from_us: when it began; None if what it waited for never came.
         to_us: when it ended; None if it stayed.
-        when: what it waited for, such as `the 3rd OK:output`; empty if it came by time.
+        when: what it waited for, such as `the 3rd OK:output`, or a time that never came; empty
+            if it came by time.
+        ordered_us: when it was ordered; None if nobody says, as where a hand made it.
     """
 
     name: str
     from_us: int | None = None
     to_us: int | None = None
     when: str = ""
+    ordered_us: int | None = None
 
 
 class JournalLine(NamedTuple):
@@ -164,7 +167,7 @@ class TestRecord:
         seed: of what was left to chance, None if nothing was.
         requirements: names of what it shows.
         markers: its other markers.
-        expected: what was waited for or checked last, in a line.
+        expected: what was waited for or checked last, in a line: the statement that failed.
         reason: why it failed, is blocked or was skipped, in a line.
         longrepr: what pytest tells about a failure.
         command: what repeats it, for a shell.
@@ -207,7 +210,7 @@ class BenchReport:
         title: of the page.
         runs: where and how, each once.
         tests: in the order in which they are shown.
-        requirements: what has to be shown, also what no test names.
+        requirements: what has to be shown, also what no test names; none if nobody says it.
     """
 
     title: str = "Bench report"

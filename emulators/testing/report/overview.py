@@ -59,11 +59,13 @@ class RequirementRow:
         name: of the requirement.
         text: what it demands.
         tests: those that name it.
+        listed: it is among the requirements, or nobody has said which there are.
     """
 
     name: str
     text: str
     tests: tuple[ReportedTest, ...]
+    listed: bool = True
 
     @property
     def passed(self) -> int:
@@ -119,13 +121,14 @@ def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list
         for name in dict.fromkeys(test.record.requirements):
             shown_by.setdefault(name, []).append(test)
     rows = [
-        RequirementRow(name, texts.get(name, ""), tuple(shown)) for name, shown in shown_by.items()
+        RequirementRow(name, texts.get(name, ""), tuple(shown), name in texts or not texts)
+        for name, shown in shown_by.items()
     ]
     order = list(Verdict)
-    return sorted(rows, key=lambda row: (order.index(row.verdict), _natural(row.name)))
+    return sorted(rows, key=lambda row: (order.index(row.verdict), natural(row.name)))
 
 
-def _natural(name: str) -> list[tuple[int, str]]:
+def natural(name: str) -> list[tuple[int, str]]:
     """Return a key by which SAF-9 comes before SAF-10."""
     return [
         (int(piece), "") if piece.isdecimal() else (-1, piece)

@@ -103,6 +103,27 @@ def test_faults_come_and_go_in_time(emulator: Emulator) -> None:
     assert emulator.operator.active_faults == ()
 
 
+@pytest.mark.parametrize(
+    ("orders", "told"),
+    [
+        (["cut@1ms-2ms", "cut@4ms-5ms"], "1 cut, 2 cut=0, 4 cut, 5 cut=0"),
+        (["cut@4ms-5ms", "cut@1ms-2ms"], "1 cut, 2 cut=0, 4 cut, 5 cut=0"),
+        (["cut@1ms-2ms", "cut@2ms-3ms"], "1 cut, 2 cut, 3 cut=0"),
+        (["cut@2ms-3ms", "cut@1ms-2ms"], "1 cut, 2 cut, 3 cut=0"),
+        (["cut@1ms-4ms", "cut@3ms-5ms"], "3 cut, 5 cut=0"),
+        (["cut@1ms", "cut@3ms-5ms"], "3 cut, 5 cut=0"),
+        (["dead@1ms-2ms", "dead@4ms"], "1 dead=1, 2 dead=0, 4 dead=1"),
+    ],
+)
+def test_a_fault_may_come_again_and_again(emulator: Emulator, orders: list[str], told: str) -> None:
+    notes: list[str] = []
+    emulator.operator.note = lambda text: notes.append(f"{emulator.effective_us // 1_000} {text}")
+    for order in orders:
+        emulator.operator.fault(0, parse_fault_spec(order))
+    run_to(emulator, 8_000)
+    assert ", ".join(notes) == told
+
+
 def test_clearing_a_fault_forgets_its_future(emulator: Emulator) -> None:
     emulator.operator.fault(0, parse_fault_spec("dead@5ms"))
     emulator.operator.clear("dead")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.triggers import Condition, when
+from tickrig.emulators.testing.bench.triggers import Condition, text_of, when
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import VERSION, Object
 
@@ -64,7 +66,19 @@ class EmulatedMode(ABC):
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
         """Let a fault come, or note that it shall."""
-        self.act(lambda rig: _arm(rig, _named(rig, owner, spec), condition, for_us))
+        text = "" if condition is None else text_of(condition)
+        self.act(
+            lambda rig: _arm(
+                rig,
+                FaultOrder(_named(rig, owner, spec), rig.effective_us, for_us, text),
+                condition,
+            )
+        )
+
+    @property
+    def orders(self) -> Sequence[FaultOrder]:
+        """The faults that were ordered, by the rig file too."""
+        return self._rig.orders
 
     def clear(self, owner: str, fault: str) -> None:
         """Let a fault go, and its future too."""
@@ -111,19 +125,19 @@ def answer_of(answer: Object) -> Object:
 def _named(rig: BenchRig, owner: str, spec: FaultSpec) -> FaultSpec:
     """Return a fault under its full name."""
     name = rig.state.fault_name(owner, spec.name) if owner else spec.name
-    return FaultSpec(name, spec.rate, spec.from_us, spec.to_us)
+    return replace(spec, name=rig.state.operator.full_name_of(name))
 
 
-def _arm(rig: BenchRig, spec: FaultSpec, condition: Condition | None, for_us: int | None) -> None:
+def _arm(rig: BenchRig, order: FaultOrder, condition: Condition | None) -> None:
     """Let a fault come, or note that it shall."""
 
     def begin() -> None:
         now_us = rig.effective_us
-        end_us = spec.to_us if for_us is None else max(now_us, spec.from_us) + for_us
-        rig.operator.fault(now_us, FaultSpec(spec.name, spec.rate, spec.from_us, end_us))
+        rig.operator.fault(now_us, order.begin(now_us))
 
-    rig.operator.check_fault(spec)
+    rig.operator.check_fault(order.spec)
     if condition is None:
         begin()
     else:
         when(rig, condition, begin)
+    rig.orders.append(order)

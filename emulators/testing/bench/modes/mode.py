@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
@@ -72,6 +73,11 @@ class BenchMode(Protocol):
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
         """Let a fault of a device, a wire or (empty) any come, or note that it shall."""
+
+    @property
+    def orders(self) -> Sequence[FaultOrder]:
+        """The faults that were ordered, in this order."""
+        ...
 
     def clear(self, owner: str, fault: str) -> None:
         """Let a fault go, and its future too."""

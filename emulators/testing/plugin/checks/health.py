@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
-from tickrig.device.physical import SignalType
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of
+from tickrig.emulators.testing.plugin.evidence.signal_names import fault_names
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
@@ -39,12 +39,9 @@ class Health:
         self._buses = self._spoken = frozenset(buses_of(bench))
         self._faulty, self._errors = frozenset[str](), dict[str, str]()
         self._mode.hear(self._hear)
-        try:
+        self._wire_faults, self._faults = fault_names(bench)
+        with suppress(NotOnThisBench):
             self._mode.act(self._begin)
-        except NotOnThisBench:
-            signals: Mapping[str, Any] = bench.describe()
-            self._wire_faults = {fault["name"] for fault in signals["wire_faults"]}
-            self._faults = {one["name"] for one in signals["inputs"] if one["kind"] == "fault"}
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
         """Return what is wrong, each in a line; nothing if all is well.
@@ -61,8 +58,6 @@ class Health:
         return tuple(found)
 
     def _begin(self, rig: BenchRig) -> None:
-        self._wire_faults = set(rig.wire.fault_types)
-        self._faults = set(rig.state.assembly.inputs.names(SignalType.FAULT))
         if rig.operator.active_faults:
             self._faulty = self._wires
         for mount in rig.state.mounts.values():

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from typing import Final, NamedTuple
 
-from tickrig.device.physical import SignalType
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.plugin.evidence.fault_plan import FaultPlan
 from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of, decoded
 from tickrig.emulators.testing.plugin.evidence.signal_names import names_of
 from tickrig.emulators.testing.report.bench_report import (
@@ -20,7 +17,6 @@ from tickrig.emulators.testing.report.bench_report import (
     SignalSeries,
 )
 from tickrig.emulators.testing.report.signal_sampler import SignalSampler
-from tickrig.host.text.trace import Mark
 
 JOURNAL_LINES: Final = 1_000
 SAMPLES: Final = 1_000
@@ -35,7 +31,7 @@ class BenchEvidence(NamedTuple):
         now_us: when it was closed.
         journal: the last that happened.
         left_out: how many lines came before these.
-        faults: those that came.
+        faults: what was ordered, and what came.
         series: signals that changed.
         trace: what `tickrig replay` reads; empty if nothing was recorded.
     """
@@ -59,6 +55,7 @@ class BenchWitness:
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._samplers: list[SignalSampler] = []
+        self._plan = FaultPlan(bench)
         with suppress(NotOnThisBench):
             bench._mode.act(self._begin)
 
@@ -72,10 +69,10 @@ class BenchWitness:
             mode.now_us,
             tuple(JournalLine(line.at_us, line.source, line.mark, text) for line, text in shown),
             max(0, lines[-1].number - JOURNAL_LINES) if lines else 0,
-            (),
+            self._plan.faults(),
         )
         with suppress(NotOnThisBench):
-            return mode.act(lambda rig: self._of_rig(rig, evidence, lines))
+            return mode.act(lambda rig: self._of_rig(rig, evidence))
         return evidence
 
     def _begin(self, rig: BenchRig) -> None:
@@ -86,33 +83,13 @@ class BenchWitness:
             rig.rig.watchers.append(sampler.take)
             self._samplers.append(sampler)
 
-    def _of_rig(
-        self, rig: BenchRig, evidence: BenchEvidence, lines: Sequence[WireLine]
-    ) -> BenchEvidence:
+    def _of_rig(self, rig: BenchRig, evidence: BenchEvidence) -> BenchEvidence:
+        for sampler in self._samplers:  # what changed since the last step too
+            sampler.take(rig.rig.now_us)
         recorder = rig.state.recorder
         trace = recorder.lines(rig.rig.now_us) if recorder and recorder.keeps else ()
         series = [series for sampler in self._samplers for series in sampler.series()]
         return evidence._replace(
-            faults=faults_of(lines, rig),
             series=tuple(one for one in series if len({value for _, value in one.points}) > 1),
             trace="".join(f"{line}\n" for line in trace),
         )
-
-
-def faults_of(lines: Sequence[WireLine], rig: BenchRig) -> tuple[PlannedFault, ...]:
-    """Return the faults that came, and when they went."""
-    known = {*rig.wire.fault_types, *rig.state.assembly.inputs.names(SignalType.FAULT)}
-    several = len(rig.state.assembly.parts) > 1
-    found: dict[str, PlannedFault] = {}
-    done: list[PlannedFault] = []
-    for line in lines:
-        name, _, value = line.data.decode("ascii", "replace").partition("=")
-        full = f"{line.source}/{name}"
-        if line.mark is not Mark.PHYSICAL or not {name, full} & known:
-            continue
-        if (before := found.pop(full, None)) is not None:
-            done.append(replace(before, to_us=line.at_us))
-        if value != "0":
-            rate = "" if value in ("", "1") else f"={value}"
-            found[full] = PlannedFault((full if several else name) + rate, line.at_us)
-    return (*done, *found.values())

@@ -1,12 +1,16 @@
-"""Signals of devices, without the objects of dictionaries: these are many, and on the wire."""
+"""Names of signals of a bench, without the objects of dictionaries: these are many; of faults."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
+from tickrig.device.physical import SignalType
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
+from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.host.text.values import Setting
 
 OBJECT = "0x"
@@ -25,3 +29,18 @@ def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
         for device, part in assembly.parts.items()
         for name in names_of(part)
     }
+
+
+def fault_names(bench: Bench) -> tuple[set[str], set[str]]:
+    """Return the names of the faults of all wires, and of those of all devices."""
+    try:
+        return bench._mode.act(_names_on)
+    except NotOnThisBench:
+        signals: Mapping[str, Any] = bench.describe()
+        physical = {one["name"] for one in signals["inputs"] if one["kind"] == "fault"}
+        return {fault["name"] for fault in signals["wire_faults"]}, physical
+
+
+def _names_on(rig: BenchRig) -> tuple[set[str], set[str]]:
+    inputs = rig.state.assembly.inputs
+    return set(rig.wire.fault_types), set(inputs.names(SignalType.FAULT))

@@ -90,7 +90,7 @@ def test_a_report_tells_of_each_test_that_has_a_bench(
     report = read_run(pytester.path / "run.json")
     tests = by_name(report)
     assert {name: test.outcome for name, test in tests.items()} == OUTCOMES
-    assert [one.name for one in report.requirements] == ["SAF-1", "SAF-2", "SAF-3"]
+    assert report.requirements == ()  # nobody says which there are
     (environment,) = report.runs
     assert (environment.mode, environment.seed) == ("virtual", 5)
     failed = tests["test_fails"]
@@ -99,12 +99,14 @@ def test_a_report_tells_of_each_test_that_has_a_bench(
     assert failed.reason.startswith("AssertionError: assert ")
     assert failed.command.endswith("::test_fails --bench-seed 5")
     assert failed.faults == (
-        PlannedFault("flip=0.01", 10_000, 20_000),
-        PlannedFault("vr2_fault", 600_000),
+        PlannedFault("flip=0.01", 10_000, 20_000, ordered_us=0),
+        PlannedFault("vr2_fault", 600_000, ordered_us=0),
     )
     assert ("!", "vr2_fault=1") in [(line.mark, line.text) for line in failed.journal]
     assert {"state", "vr2_power"} <= {series.name for series in failed.series}
     assert failed.trace.startswith("# tickrig-trace v2")
+    assert failed.expected == 'assert bench.get("state") == "Lost"'
+    assert (tests["test_passes"].expected, tests["test_skipped"].expected) == ("", "")
     assert tests["test_blocked"].reason == "no port"
     assert tests["test_skipped"].reason == "needs hardware, and this bench is virtual"
     assert tests["test_is_expected_to_fail"].reason == "expected to fail: not yet"
@@ -144,3 +146,135 @@ def test_a_report_that_cannot_be_written_is_a_line(pytester: pytest.Pytester, ru
     result = run("--bench-report", "out.json")
     assert result.ret == pytest.ExitCode.INTERNAL_ERROR
     result.stdout.fnmatch_lines(["bench: */out.json was not written: No space left on device"])
+
+
+def test_the_fault_plan_tells_what_was_ordered_and_what_came(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makefile(
+        ".toml",
+        rig="""
+        [device.rrc]
+        type = "rrc"
+
+        [device.scanner]
+        type = "urg"
+
+        [fault]
+        rrc = ["cut@0ms-5ms", "flip=0.001@0s"]
+        """,
+    )
+    pytester.makepyfile(
+        test_x="""
+        def test_faults(bench):
+            rrc = bench["rrc"]
+            rrc.fault("vr2_fault", when=rrc.on_line("EV:*", nth=1), for_="30ms")
+            rrc.fault("bus_noise", when=lambda: bench.get("rrc/state") == "Lost")
+            rrc.fault("cut@1s")
+            rrc.fault("drop=0.5@5s")
+            for number in range(6_000):
+                bench["rrc"].set("stick_v_pct", number % 2)
+                rrc.set("stick_w_pct", number % 2)
+            bench.run_for("400ms")
+            rrc.fault("cut@2s-3s")
+            bench.set("rrc/bus_unplugged", 1)
+            bench.run_for("2s")
+            rrc.clear("flip")
+        """
+    )
+    run("--bench", "rig.toml", "--bench-report", "run.json").assert_outcomes(passed=1)
+    (test,) = read_run(pytester.path / "run.json").tests
+    assert test.faults == (
+        PlannedFault("rrc/cut", 0, 5_000, ordered_us=0),
+        PlannedFault("rrc/flip=0.001", 0, 2_401_000, ordered_us=0),
+        PlannedFault("rrc/vr2_fault", 11_000, 41_000, "the 1st EV:*", 0),
+        PlannedFault("rrc/bus_noise", None, None, "the condition of test_x.py:4", 0),
+        PlannedFault("rrc/cut", None, None, "1 s", 0),
+        PlannedFault("rrc/drop=0.5", None, None, "5 s", 0),
+        PlannedFault("rrc/cut", 2_000_000, None, ordered_us=401_000),
+        PlannedFault("rrc/bus_unplugged", 401_000),
+    )
+    assert test.journal_left_out > 11_000
+    assert "\n0.000000 rrc ~ cut\n" in test.trace
+
+
+def test_what_changed_after_the_last_step_is_in_the_values(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        def test_one(bench):
+            bench.run_for("1s")
+            bench.set("stick_v_pct", 40)
+        """
+    )
+    run("--bench-report", "run.json").assert_outcomes(passed=1)
+    (test,) = read_run(pytester.path / "run.json").tests
+    (stick,) = [series for series in test.series if series.name == "stick_v_pct"]
+    assert stick.points[-1] == (1_000_000, 40)
+
+
+REQUIREMENTS = """\
+# Wheelchair, release 2
+SAF-1   A pulled bus stops the chair
+SAF-2
+SAF-4   Nobody has thought of this
+"""
+
+
+def test_requirements_that_no_test_names_are_shown(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeini("[pytest]\nbench_requirements = saf.txt\n")
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(TESTS)
+    (pytester.path / "saf.txt").write_text(REQUIREMENTS, "utf-8")
+    result = run("--bench-report", "run.json")
+    result.stdout.fnmatch_lines(
+        [
+            "bench: 0 of 3 requirements shown",
+            "bench: no test names SAF-4",
+            "bench: tests name what is no requirement: SAF-3",
+        ]
+    )
+    report = read_run(pytester.path / "run.json")
+    assert [one.name for one in report.requirements] == ["SAF-1", "SAF-2", "SAF-4"]
+    assert report.requirements[0].text == "A pulled bus stops the chair"
+    run().stdout.no_fnmatch_line("bench: *requirements*")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (None, "--bench-report run.json", "ERROR: */saf.txt: No such file or directory"),
+        ("\n# none\n", "--bench-report run.json", "ERROR: */saf.txt: no requirement: write *"),
+        (
+            "A\nB\nA x\n",
+            "--bench-report run.json",
+            "ERROR: */saf.txt:3: A stands in line 1 *",
+        ),
+        ("A\n\udcff", "--bench-report run.json", "ERROR: */saf.txt: not UTF-8 at byte 2"),
+        ("A\n", "", "ERROR: --bench-requirements: a report tells of them: add --bench-report"),
+    ],
+)
+def test_requirements_that_cannot_be_read_are_a_line(
+    pytester: pytest.Pytester, run: Run, text: str | None, options: str, said: str
+) -> None:
+    if text is not None:
+        (pytester.path / "saf.txt").write_text(text, "utf-8", "surrogateescape")
+    result = run("--bench-requirements", "saf.txt", *options.split())
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([said])
+
+
+def test_tests_stand_as_in_their_files_in_whatever_order_they_were_run(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(
+        f"{RRC}\ndef pytest_collection_modifyitems(items):\n    items.reverse()\n"
+    )
+    many = "import pytest\n@pytest.mark.parametrize('n', [2, 10])\ndef test_z(bench, n): pass\n"
+    pytester.makepyfile(test_b=TESTS, test_a=f"{many}\ndef test_a(bench): pass\n")
+    run("--bench-report", "run.json")
+    names = [test.nodeid for test in read_run(pytester.path / "run.json").tests]
+    assert names[:3] == ["test_a.py::test_z[2]", "test_a.py::test_z[10]", "test_a.py::test_a"]
+    assert names[3:] == [f"test_b.py::{name}" for name in OUTCOMES]

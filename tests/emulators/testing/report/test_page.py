@@ -88,10 +88,10 @@ def test_a_requirement_that_no_test_has_shown_stands_out(page: Element) -> None:
     rows = page.by_class("requirements")[0].all("tr")[1:]
     told = [row.words for row in rows]
     assert told == [
-        "COM-4 failed 0 of 1",
+        "COM-4 not among the requirements failed 0 of 1",
         "SAF-12 A pulled bus stops the chair failed 1 of 2",
         "SAF-30 not shown 0 of 0 no test names it",
-        "SAF-9 shown 1 of 1",
+        "SAF-9 not among the requirements shown 1 of 1",
     ]
     assert [row.attributes["class"] for row in rows] == ["failed", "failed", "not-shown", "shown"]
     cells = rows[1].by_class("cell")
@@ -111,6 +111,20 @@ def test_a_test_tells_what_was_asked_and_how_to_repeat_it(page: Element) -> None
     assert (told["Seed"], told["Kept"]) == ("7", "stops.trace")
     wheel = test_of(page, WHEEL).by_class("facts")[0].words
     assert wheel.startswith("Expected an EMCY within 800 ms")
+
+
+def test_the_fault_plan_tells_what_came_of_each_order() -> None:
+    faults = (
+        PlannedFault("cut", 1_200_000, 1_400_000, "the 3rd OK:output", 100_000),
+        PlannedFault("drop=0.5", None, None, "5 s", 0),
+        PlannedFault("flip=0.1", 2_000_000, None, ordered_us=10_000),
+    )
+    facts = one(TestRecord("t.py::t", Outcome.PASSED, faults=faults)).by_class("facts")[0]
+    assert [line.words for line in facts.all("li")] == [
+        "cut ordered at 0.1 s, at the 3rd OK:output from 1.2 s to 1.4 s",
+        "drop=0.5 ordered at 0 s, at 5 s: did not come",
+        "flip=0.1 ordered at 0.01 s, from 2 s on",
+    ]
 
 
 def test_the_journal_is_what_the_transcript_said(page: Element) -> None:

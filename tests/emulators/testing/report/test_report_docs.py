@@ -78,3 +78,16 @@ def test_each_named_test_is_there() -> None:
     named = re.findall(r"`(test_\w+)`", TEXT)
     assert named
     assert [name for name in named if f"def {name}(" not in source] == []
+
+
+def test_the_requirements_are_shown_as_told(pytester: pytest.Pytester, run_pytest: Run) -> None:
+    listed, told = blocks("text")
+    pytester.makepyfile(test_chair=blocks("python")[0])
+    (pytester.path / "saf.txt").write_text(listed, "utf-8")
+    result = run_pytest("--bench-report", "bench.html", "--bench-requirements", "saf.txt")
+    result.stdout.fnmatch_lines(told.splitlines())
+    rows = page().by_class("requirements")[0].all("tr")[1:]
+    assert [row.words for row in rows] == [
+        "SAF-13 An alarm is heard not shown 0 of 0 no test names it",
+        "SAF-12 A pulled bus stops the chair within 200 ms shown 1 of 1",
+    ]

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
@@ -23,7 +24,7 @@ from tickrig.emulators.testing.bench.modes.real.doors import Doors
 from tickrig.emulators.testing.bench.modes.real.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
 from tickrig.emulators.testing.bench.plan_parts import parts_of
-from tickrig.emulators.testing.bench.triggers import Condition
+from tickrig.emulators.testing.bench.triggers import Condition, text_of
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.host.control.requests import Object
 
@@ -70,6 +71,7 @@ class HardwareMode:
         self._like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
         self._pace, self._pending = HostPace(), list[tuple[Condition, Begin]]()
         self._looking = self._begun = False
+        self.orders = list[FaultOrder]()
         self._journal = DoorJournal(lambda: self.now_us, self._look)
         mounts = self._like.state.mounts
         places = places_of(plan, self._where, mounts)
@@ -113,7 +115,10 @@ class HardwareMode:
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
         """Have a fault made, or note that it shall be."""
-        begin = self._operators.fault(owner, spec, for_us, at_once=condition is not None)
+        text = "" if condition is None else text_of(condition)
+        order = FaultOrder(spec, self.now_us, for_us, text)
+        begin = self._operators.fault(owner, order)
+        self.orders.append(order)
         if condition is None:
             begin(self.now_us)
         else:

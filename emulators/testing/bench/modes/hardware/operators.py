@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.emulated_mode import answer_of
@@ -112,26 +112,24 @@ class Operators:
         device, signal = self._owner(name)
         return self._operator_at(device).get(signal)
 
-    def fault(
-        self, owner: str, spec: FaultSpec, for_us: int | None, *, at_once: bool
-    ) -> Callable[[int], None]:
+    def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
         """Return what has a fault made, at a time of the bench.
 
         Args:
             owner: a device or wire, empty for any.
-            spec: the fault.
-            for_us: how long it stays.
-            at_once: it is no good a moment later.
+            order: the fault, which gets its full name; one that waits is no good a moment later.
         """
-        name = self._fault_name(owner, spec.name)
-        self._like.operator.check_fault(replace(spec, name=name))
+        name = self._like.state.operator.full_name_of(self._fault_name(owner, order.spec.name))
+        spec = order.spec = replace(order.spec, name=name)
+        self._like.operator.check_fault(spec)
         device, fault = self._fault_owner(name)
         operator, wanted = self._operator_at(device), replace(spec, name=fault)
-        if at_once and not operator.quick:
+        if order.when and not operator.quick:
             raise NotOnThisBench(f"no hand makes {fault} the moment that something is so")
 
         def begin(now_us: int) -> None:
-            operator.fault(wanted, now_us, for_us)
+            order.begin(now_us)
+            operator.fault(wanted, now_us, order.for_us)
             self._journal.note(device, fault if spec.rate is None else f"{fault}={spec.rate:g}")
 
         return begin
