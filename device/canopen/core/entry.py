@@ -31,10 +31,12 @@ class Entry:
         guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
         written: called after a value came over the bus.
         source: gives the bytes to read instead of `data`; may raise SdoAbort.
+        measured: `source` gives what is measured, whenever it is asked; it never raises, and
+            asking changes nothing.
         watchers: called whenever the value has changed, from the bus or from the inside.
     """
 
-    __slots__ = ("data", "description", "guard", "source", "watchers", "written")
+    __slots__ = ("data", "description", "guard", "measured", "source", "watchers", "written")
 
     def __init__(self, description: EntryDescription) -> None:
         self.description = description
@@ -42,6 +44,7 @@ class Entry:
         self.guard: Guard | None = None
         self.written: OnEntry | None = None
         self.source: Callable[[Entry], bytes] | None = None
+        self.measured = False
         self.watchers: tuple[OnEntry, ...] = ()
 
     def __repr__(self) -> str:
@@ -83,7 +86,7 @@ class Entry:
     @property
     def value(self) -> Value:
         """The present value."""
-        return self.data_type.decode(self.data)
+        return self.data_type.decode(self.present() if self.measured else self.data)
 
     @value.setter
     def value(self, value: Value) -> None:
@@ -92,10 +95,13 @@ class Entry:
     @property
     def number(self) -> int:
         """The present value of an integer."""
-        return int.from_bytes(self.data, "little", signed=self.description.signed)
+        data = self.present() if self.measured else self.data
+        return int.from_bytes(data, "little", signed=self.description.signed)
 
     def watch(self, changed: OnEntry) -> None:
-        """Have `changed` called whenever the value has changed."""
+        """Have `changed` called whenever the value has changed from what it is now."""
+        if self.measured:
+            self.data = self.present()
         self.watchers = (*self.watchers, changed)
 
     def unwatch(self, changed: OnEntry) -> None:

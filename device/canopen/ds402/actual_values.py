@@ -1,8 +1,8 @@
-"""Actual values: what a drive writes into its objects at the end of a tick (CiA 402-2)."""
+"""Actual values: what the objects of a drive show from the end of a tick on (CiA 402-2)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402.objects import indices
@@ -11,6 +11,7 @@ from tickrig.device.canopen.ds402.state.automaton import DriveState, Statusword
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.dictionary import Dictionary
+    from tickrig.device.canopen.core.entry import Entry
     from tickrig.device.canopen.ds402.drive import Ds402
 
 Measure = Callable[["Ds402"], int]
@@ -70,28 +71,50 @@ MEASURES: Final[Mapping[int, Measure]] = {
 
 
 class ActualValues:
-    """Writes those objects that the device has.
+    """What those of the objects show that the device has, as the latest tick left it.
+
+    They are worked out when somebody asks, those with watchers in each tick: a bus reads two
+    of thirteen each 10 ms (1.5 times as many drives).
 
     Args:
+        drive: what is measured; its `measures` say how.
         dictionary: with the objects.
-        indices: of actual values.
     """
 
-    def __init__(self, dictionary: Dictionary, indices: Iterable[int]) -> None:
-        self._entries = [
-            (index, entry, entry.size, entry.description.signed)
-            for index in indices
-            if (entry := dictionary.find(index)) is not None
-        ]
+    def __init__(self, drive: Ds402, dictionary: Dictionary) -> None:
+        self._drive = drive
+        found = (dictionary.find(index) for index in drive.measures)
+        self._entries = [entry for entry in found if entry is not None]
+        for entry in self._entries:
+            entry.source, entry.measured = self._shown, True
+        self._kept = True
 
-    def update(self, drive: Ds402) -> None:
-        """Write all of them; a value out of the range of its object is cut."""
-        measures = drive.measures
-        for index, entry, size, signed in self._entries:
-            value = measures[index](drive)
-            try:
-                data = value.to_bytes(size, "little", signed=signed)
-            except OverflowError:
-                value = clamped(value, 8 * size, signed=signed)
-                data = value.to_bytes(size, "little", signed=signed)
-            entry.assign(data)
+    def keep(self) -> None:
+        """Write all of them before something changes: they are shown up to the end of the tick."""
+        if not self._kept:
+            for entry in self._entries:
+                entry.assign(self._encoded(entry))
+            self._kept = True
+
+    def begin(self) -> None:
+        """Show what is written, while the drive works."""
+        self._kept = True
+
+    def renew(self) -> None:
+        """Show what the drive has come to; watchers are told."""
+        self._kept = False
+        for entry in self._entries:
+            if entry.watchers:
+                entry.assign(self._encoded(entry))
+
+    def _shown(self, entry: Entry) -> bytes:
+        return entry.data if self._kept else self._encoded(entry)
+
+    def _encoded(self, entry: Entry) -> bytes:
+        """Return a value as bytes; one out of the range of its object is cut."""
+        size, signed = entry.size, entry.description.signed
+        value = self._drive.measures[entry.index](self._drive)
+        try:
+            return value.to_bytes(size, "little", signed=signed)
+        except OverflowError:
+            return clamped(value, 8 * size, signed=signed).to_bytes(size, "little", signed=signed)

@@ -134,7 +134,7 @@ class Ds402(Application):
         self.mode, self.mode_number = Mode(self._view), 0
         self.automaton = Automaton(self.stopping, self._begin_mode)
         self.supervision = Supervision(self.axis, self.bounds)
-        self.actual_values = ActualValues(node.dictionary, self.measures)
+        self.actual_values = ActualValues(self, node.dictionary)
         self.limited, self._stale, self._winding_dc = False, True, 0
         self._faults: list[int] = []
         self._lost: set[int] = set()
@@ -179,12 +179,14 @@ class Ds402(Application):
 
     def power_on(self) -> None:
         """Count from 0 on."""
+        self.actual_values.keep()
         axis = self.axis
         axis.motor.release()
         axis.zero, axis.homed = float(axis.motor.counts), False
 
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast; see `Application.without_power`."""
+        self.actual_values.keep()
         motor = self.axis.motor
         motor.release()
         motor.step_to(now_us)
@@ -193,6 +195,7 @@ class Ds402(Application):
 
     def start(self) -> None:
         """Switch off."""
+        self.actual_values.begin()
         self._faults.clear()
         self._lost.clear()
         self.automaton.restart()
@@ -219,6 +222,7 @@ class Ds402(Application):
         """Act as 6007h says, while the motor has power."""
         if self.state not in MOVING:
             return
+        self.actual_values.keep()
         match self.parameters.number(indices.ABORT_CONNECTION):
             case AbortConnection.FAULT:
                 self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
@@ -232,6 +236,7 @@ class Ds402(Application):
 
     def on_execute(self, now_us: int) -> None:
         """Measure, watch, make a step, command the motor, show actual values."""
+        self.actual_values.begin()
         self.axis.motor.step_to(now_us)
         self._follow_outside()
         for code in self.supervision.step(now_us, powered=self.automaton.powered):
@@ -243,11 +248,12 @@ class Ds402(Application):
         else:
             self.axis.release()
         self._view.fresh = False
-        self.actual_values.update(self)
+        self.actual_values.renew()
         self._sleep(now_us, settled and not self.supervision.waiting)
 
     def _note(self, code: int) -> None:
         """Have a fault that the master knows already."""
+        self.actual_values.keep()
         self._faults.append(code)
         self.parameters.write(indices.ERROR_CODE, code)
         self.automaton.react(code)
@@ -319,12 +325,15 @@ class Ds402(Application):
         motor = self.axis.motor
         if not (settled and motor.resting):
             self.schedule(now_us + TICK_US)
-        elif self._winding_dc != motor.winding_dc:
+            return
+        self.actual_values.keep()
+        if self._winding_dc != motor.winding_dc:
             self._winding_dc = motor.winding_dc
             self.schedule(now_us + COOLING_US)
 
     def _controlled(self, entry: Entry) -> None:
         """Obey a new controlword, with what was configured before it."""
+        self.actual_values.keep()
         self._configure()
         before = self._view.controlword
         self._view.controlword = controlword = self.parameters.number(indices.CONTROLWORD)
@@ -345,6 +354,7 @@ class Ds402(Application):
         self._change_mode()
 
     def _change_mode(self) -> None:
+        self.actual_values.keep()
         number = self.parameters.number(indices.MODES_OF_OPERATION)
         if number in self.offered:
             self.mode_number = number

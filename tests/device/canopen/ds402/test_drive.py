@@ -303,7 +303,7 @@ def test_a_value_that_an_object_cannot_hold_is_cut() -> None:
     bench.write(0x6060, 10)
     bench.drive.axis.reference.current_a = 1e6
     bench.drive.axis.motor.drive_current(1e6)
-    bench.drive.actual_values.update(bench.drive)
+    bench.drive.actual_values.renew()
     assert bench.read(0x6077) == 2**15 - 1
 
 
