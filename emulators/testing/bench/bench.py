@@ -284,7 +284,10 @@ class Bench(BenchDevice):
         return nullcontext(time)
 
     def transcript(self) -> str:
-        """Return the latest lines and frames, and what was done: time, where, direction, text."""
+        """Return the latest lines and frames, and what was done: time, where, direction, text.
+
+        10,000 are kept; a line above them says how many came before.
+        """
         return text_of(self._mode.journal())
 
     def save_trace(self, path: Path | str) -> None:

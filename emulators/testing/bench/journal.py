@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
@@ -13,7 +13,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
 KEPT: Final = 10_000
-"""So many lines are kept; of those before it is known that there were some."""
+"""So many lines are kept; of those before it is known how many there were."""
 
 
 class Journal(WireLog):
@@ -42,8 +42,21 @@ class Journal(WireLog):
         return self.since(0)
 
 
-def text_of(lines: Iterable[WireLine]) -> str:
-    """Write lines for people: time in seconds, which wire or device, direction, text."""
-    return "\n".join(
+def text_of(lines: Sequence[WireLine]) -> str:
+    """Write lines for people: time in seconds, which wire or device, direction, text.
+
+    How many lines came before these, and are kept no more, stands above them.
+    """
+    written = [
         f"{format_time(line.at_us)} {line.source} {line.mark} {escape(line.data)}" for line in lines
-    )
+    ]
+    if missing := missing_of(lines):
+        written.insert(0, f"({missing})")
+    return "\n".join(written)
+
+
+def missing_of(lines: Sequence[WireLine]) -> str:
+    """Say how many lines came before these, and are kept no more; empty if none did."""
+    before = lines[0].number - 1 if lines else 0
+    came = f"{before} {'line' if before == 1 else 'lines'} came before"
+    return f"{came}; the last {len(lines)} are kept" if before else ""

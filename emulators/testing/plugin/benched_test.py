@@ -50,7 +50,7 @@ class BenchedTest:
         blocked: why the test came to no verdict, empty if it did.
         unheard: what went wrong beside its body and was not told yet, each in a line.
         kept: files that were kept of it.
-        not_kept: why other files were not, each in a line.
+        not_kept: why other files were not, or not whole, each in a line.
     """
 
     def __init__(self, item: pytest.Function, wanted: Wanted, safe: SafeState) -> None:

@@ -138,7 +138,11 @@ class Chair:
                 self.client.run_for(SAMPLE_US)
 
     def _listen(self, duration_us: int) -> list[int]:
-        """Return how long the buzzer was on, off, on, ... from its first sound to the end."""
+        """Return how long the buzzer was on, off, on, ... from its first sound to the end.
+
+        The buzzer is looked at, and its times are taken, by the host: in virtual time to the
+        sample, in real time as late as the host is. A human is asked instead.
+        """
         edges: list[tuple[int, bool]] = []
         until_us = self.client.now_us + duration_us
         while self.client.now_us < until_us:

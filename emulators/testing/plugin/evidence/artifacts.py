@@ -10,10 +10,12 @@ from typing import Final
 
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.journal import missing_of
 from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of, frame_of
 from tickrig.host.text.trace import Mark
 from tickrig.wire.candump import LogLine
 
+TRACE: Final = ".trace"
 MOST: Final = 80
 """Characters of a name that are of the test."""
 
@@ -37,7 +39,7 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
         nodeid: of the test.
 
     Returns:
-        The files, and why others are not there, each in a line.
+        The files, and why others are not there, or not whole, each in a line.
     """
     kept: list[Path] = []
     failed: list[str] = []
@@ -47,11 +49,18 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
             folder.mkdir(parents=True, exist_ok=True)
             if write(bench, path):
                 kept.append(path)
+                failed += _cut(bench, path)
         except NotOnThisBench:
             continue
         except OSError as error:
             failed.append(f"{path} was not written: {error.strerror or error}")
     return kept, failed
+
+
+def _cut(bench: Bench, path: Path) -> list[str]:
+    """Say that a file has the latest alone; a trace has all."""
+    missing = "" if path.suffix == TRACE else missing_of(bench._mode.journal())
+    return [f"{path} is not whole: {missing}"] if missing else []
 
 
 def _trace(bench: Bench, path: Path) -> bool:
@@ -61,14 +70,14 @@ def _trace(bench: Bench, path: Path) -> bool:
 
 def _candump(bench: Bench, path: Path) -> bool:
     buses = buses_of(bench)
-    lines = [
+    frames = [
         f"{LogLine(line.at_us, line.source, frame_of(line))}\n"
         for line in bench._mode.journal()
         if line.source in buses and line.mark is not Mark.PHYSICAL
     ]
-    if lines:
-        path.write_text("".join(lines), "utf-8")
-    return bool(lines)
+    if frames:
+        path.write_text("".join(frames), "utf-8")
+    return bool(frames)
 
 
 def _transcript(bench: Bench, path: Path) -> bool:
@@ -77,7 +86,7 @@ def _transcript(bench: Bench, path: Path) -> bool:
 
 
 WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
-    ".trace": _trace,
+    TRACE: _trace,
     ".log": _candump,
     ".txt": _transcript,
 }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
+from tickrig.emulators.testing.plugin.evidence.artifacts import TRACE
 from tickrig.emulators.testing.plugin.evidence.journal_text import last_lines
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.host.text.values import format_time
@@ -15,7 +16,6 @@ from tickrig.host.text.values import format_time
 if TYPE_CHECKING:
     from tickrig.emulators.testing.plugin.benched_test import BenchedTest
 
-TRACE: Final = ".trace"
 LINES: Final = 20
 """So many lines and frames are told."""
 

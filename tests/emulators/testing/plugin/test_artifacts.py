@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.test_bench_fixture import RRC
 from tests.emulators.testing.plugin.test_verdicts import BUS
 from tickrig.emulators.testing.plugin.evidence.artifacts import stem_of
 from tickrig.wire.candump import parse_log
@@ -74,3 +75,21 @@ def test_no_name_of_a_test_leaves_the_folder(tmp_path: Path, nodeid: str) -> Non
     assert not name.startswith(("-", "."))
     assert len(name) < 100
     assert stem_of(nodeid) != stem_of(f"{nodeid} ")
+
+
+def test_what_is_kept_no_more_is_counted(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        test_x="""
+        def test_one(bench):
+            for number in range(10_001):
+                bench.set("stick_v_pct", number % 2)
+            assert 0
+        """
+    )
+    result = run("--bench-artifacts", "kept")
+    stem = stem_of("test_x.py::test_one")
+    text = (pytester.path / "kept" / f"{stem}.txt").read_text().splitlines()
+    missing = "1 line came before; the last 10000 are kept"
+    assert (text[0], len(text)) == (f"({missing})", 10_001)
+    result.stdout.fnmatch_lines([f"*/kept/{stem}.txt is not whole: {missing}"])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
+from weakref import WeakSet
 
 from tickrig.emulators.testing.bench.journal import Journal
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, HostPace
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.host.text.trace import Mark
+from tickrig.wire.can import Frames
 
 
 class DoorJournal(Journal):
@@ -24,6 +28,7 @@ class DoorJournal(Journal):
     def __init__(self, now_us: Callable[[], int], after: Callable[[], None]) -> None:
         super().__init__()
         self._now_us, self._after, self._lock = now_us, after, threading.Lock()
+        self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
     def watch(self, mount: Mount, pace: HostPace) -> DoorWatch:
         """Return a watch at a door of a wire.
@@ -34,7 +39,9 @@ class DoorJournal(Journal):
         """
         if isinstance(mount, LineMount):
             return _Watch(pace, partial(self._hear_bytes, self._splitting(mount)))
-        return _Watch(pace, partial(self._hear_frames, mount.name))
+        watch = _BusWatch(pace, mount.name, self)
+        self._watches[mount.name].add(watch)
+        return watch
 
     def note(self, device: str, text: str) -> None:
         """Note what was done to a device."""
@@ -51,18 +58,63 @@ class DoorJournal(Journal):
             hear(self._now_us(), mark, data)
         self._after()
 
-    def _hear_frames(self, wire: str, mark: Mark, frames: tuple[Any, ...]) -> None:
+    def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Frames) -> None:
+        """Note frames that passed a door, unless another one of its bus has told of them."""
         with self._lock:
             for frame in frames:
+                if mark is Mark.FROM_DEVICE:
+                    if watch.known[str(frame)] > 0:
+                        watch.known[str(frame)] -= 1
+                        continue
+                    self._announce(wire, watch, (frame,))
                 self.add(self._now_us(), mark, str(frame).encode(), wire)
         self._after()
+
+    def announce(self, wire: str, watch: _BusWatch, frames: Frames, by: int = 1) -> None:
+        """Let all doors of a bus but one know frames, or forget them again."""
+        with self._lock:
+            self._announce(wire, watch, frames, by)
+
+    def _announce(self, wire: str, watch: _BusWatch, frames: Frames, by: int = 1) -> None:
+        for other in self._watches[wire]:
+            if other is not watch:
+                for frame in frames:
+                    other.known[str(frame)] += by
 
 
 class _Watch:
     """Lets hosts pass, and hands on what they carry."""
 
     def __init__(self, pace: HostPace, hear: Callable[[Mark, Any], None]) -> None:
-        self.waited, self.passed = pace.waited, hear
+        self.waited, self.passed, self.sending = pace.waited, hear, pace.sending
 
     def used(self) -> None:
         """Anybody may, at any time."""
+
+
+class _BusWatch:
+    """A watch at one of several doors of a bus, each of which sees each frame.
+
+    Attributes:
+        known: frames that are in the journal already, and have yet to be seen here.
+    """
+
+    def __init__(self, pace: HostPace, wire: str, journal: DoorJournal) -> None:
+        self.waited, self._wire, self._journal = pace.waited, wire, journal
+        self.known: Counter[str] = Counter()
+
+    def used(self) -> None:
+        """Anybody may, at any time."""
+
+    def passed(self, mark: Mark, frames: Frames) -> None:
+        self._journal.hear_frames(self._wire, self, mark, frames)
+
+    @contextmanager
+    def sending(self, frames: Frames) -> Iterator[None]:
+        """Let the other doors know of frames before they can see them."""
+        self._journal.announce(self._wire, self, frames)
+        try:
+            yield
+        except BaseException:
+            self._journal.announce(self._wire, self, frames, by=-1)
+            raise

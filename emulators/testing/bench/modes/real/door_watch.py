@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from time import monotonic_ns
 from typing import Any, Protocol
 
@@ -18,6 +18,10 @@ class DoorWatch(Protocol):
 
     def waited(self, wanted_us: int, took_us: int) -> None:
         """Take note of a wait in vain: how long it was to take, and how long it took."""
+
+    def sending(self, traffic: Any) -> AbstractContextManager[object]:
+        """Return what is entered while bytes or frames are sent, which other doors may see."""
+        ...
 
     def passed(self, mark: Mark, traffic: Any) -> None:
         """Take note of bytes or frames."""
@@ -40,6 +44,10 @@ class HostPace:
     def waited(self, wanted_us: int, took_us: int) -> None:
         """Take note of a wait in vain."""
         self.late_us = max(self.late_us, took_us - wanted_us)
+
+    def sending(self, traffic: object) -> AbstractContextManager[object]:
+        """Nothing: it is of no matter here who sees what is sent."""
+        return nullcontext()
 
     @contextmanager
     def waiting(self, wanted_us: int) -> Iterator[None]:

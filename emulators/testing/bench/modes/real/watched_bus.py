@@ -16,6 +16,7 @@ from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links.can_link import keep_to_group
 from tickrig.host.links.can_message import to_frame
 from tickrig.host.text.trace import Mark
+from tickrig.wire.can import Frames
 
 GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
 """What the kernel says of an adapter that was pulled out, or switched off."""
@@ -43,7 +44,7 @@ class _Watched(can.BusABC):
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self._watch.used()
-        with self._told_if_gone():
+        with self._watch.sending(_frames_of(msg)), self._told_if_gone():
             super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
         self._pass_on(Mark.TO_DEVICE, msg)
 
@@ -58,8 +59,13 @@ class _Watched(can.BusABC):
             raise BusGone(f"{self.channel_info}: {error}", code) from error
 
     def _pass_on(self, mark: Mark, message: can.Message) -> None:
-        if frame := to_frame(message):
-            self._watch.passed(mark, (frame,))
+        if frames := _frames_of(message):
+            self._watch.passed(mark, frames)
+
+
+def _frames_of(message: can.Message) -> Frames:
+    frame = to_frame(message)
+    return (frame,) if frame else ()
 
 
 def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:

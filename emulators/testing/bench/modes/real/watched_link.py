@@ -41,7 +41,8 @@ class WatchedLink(Generic[W]):
         """
         self._watch.used()
         try:
-            self._link.send(traffic)
+            with self._watch.sending(traffic):
+                self._link.send(traffic)
         except LinkClosed as error:
             raise self._gone(error) from error
         self._watch.passed(Mark.TO_DEVICE, traffic)

@@ -1,0 +1,92 @@
+"""Several doors of a bus of real nodes: each sees each frame, the journal has it once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import can
+import pytest
+from can.interfaces.virtual import VirtualBus
+
+from tickrig import Bench
+from tickrig.emulators.testing.rig_file.plan import (
+    BusPlan,
+    DeviceKind,
+    DevicePlan,
+    HardwarePlan,
+    RigPlan,
+    WirePlan,
+    WireType,
+)
+from tickrig.wire.can import CanFrame
+
+BUS = BusPlan(interface="virtual", channel="doors")
+DRIVE = DevicePlan(name="drive", kind=DeviceKind.MODEL, type="epos", wire="can", node_id=5)
+PLAN = RigPlan(
+    wires={"can": WirePlan(name="can", type=WireType.CAN, given=False)},
+    devices={"drive": DRIVE},
+    hardware=HardwarePlan(buses={"can": BUS}),
+)
+BOOT_UP = can.Message(arbitration_id=0x705, data=b"\x00", is_extended_id=False)
+START = can.Message(arbitration_id=0, data=b"\x01\x05", is_extended_id=False)
+
+
+@pytest.fixture
+def drive() -> Iterator[can.BusABC]:
+    with can.Bus("doors", "virtual") as bus:
+        yield bus
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    with Bench.of_plan(PLAN, "hardware") as bench:
+        yield bench
+
+
+def told(bench: Bench) -> list[str]:
+    return [line.partition(" can ")[2] for line in bench.transcript().splitlines()]
+
+
+def test_a_frame_that_two_doors_see_is_told_once(bench: Bench, drive: can.BusABC) -> None:
+    first, second, third = bench.can_bus(), bench.link, bench.can_bus()
+    boots = bench.on_line("705#*", nth=3)
+    for _ in range(2):
+        drive.send(BOOT_UP)
+        assert first.recv(1) is not None
+    assert second.receive(0) == (CanFrame(0x705, b"\0"),) * 2
+    assert third.recv(0) is not None
+    assert (told(bench), boots()) == (["< 705#00"] * 2, False)
+    drive.send(BOOT_UP)
+    assert third.recv(0) is not None  # the second of those before
+    assert not boots()
+    assert second.receive(0) == (CanFrame(0x705, b"\0"),)
+    assert boots()
+    assert (first.recv(1) is not None, third.recv(0) is not None) == (True, True)
+    assert told(bench) == ["< 705#00"] * 3
+
+
+def test_what_a_host_sends_is_no_answer_at_another_door(bench: Bench, drive: can.BusABC) -> None:
+    first, second = bench.can_bus(), bench.can_bus()
+    first.send(START)
+    assert second.recv(0) is not None
+    assert told(bench) == ["> 000#0105"]
+    drive.send(START)  # another host, not on the bench
+    assert (first.recv(0) is not None, second.recv(0) is not None) == (True, True)
+    assert told(bench) == ["> 000#0105", "< 000#0105"]
+
+
+def test_what_was_not_sent_is_not_known_elsewhere(
+    bench: Bench, drive: can.BusABC, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = bench.can_bus(), bench.can_bus()
+
+    def fail(*arguments: object, **options: object) -> None:
+        raise can.CanOperationError("buffer full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(VirtualBus, "send", fail)
+        with pytest.raises(can.CanOperationError):
+            first.send(START)
+    drive.send(START)
+    assert second.recv(0) is not None
+    assert told(bench) == ["< 000#0105"]
