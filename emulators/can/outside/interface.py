@@ -15,6 +15,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkError
+from tickrig.host.text.names import near
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError
 
@@ -94,10 +95,8 @@ class TickrigBus(can.BusABC):
         try:
             self._host: CanHost = CHANNELS.open(str(channel))
         except KeyError:
-            known = ", ".join(CHANNELS.names) or "none"
-            raise can.CanInitializationError(
-                f"no rig offers channel {channel!r}; known: {known}"
-            ) from None
+            hint = near(str(channel), CHANNELS.names)
+            raise can.CanInitializationError(f"no rig offers channel {channel!r}; {hint}") from None
         self.channel_info = f"tickrig {channel}"
         super().__init__(channel, can_filters)
 

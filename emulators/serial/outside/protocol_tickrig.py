@@ -9,6 +9,7 @@ from serial.serialutil import SerialException
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import Mismatch
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
+from tickrig.host.text.names import near
 
 FORM: Final = "tickrig://NAME or tickrig://NAME?mismatch=refuse"
 
@@ -42,10 +43,8 @@ class Serial(SimSerial):
             try:
                 self.side = SERIAL_PORTS.find(name)
             except KeyError:
-                known = ", ".join(f"tickrig://{each}" for each in SERIAL_PORTS.names)
-                told = (
-                    f"could not open port {self.port}: no rig offers it; known: {known or 'none'}"
-                )
+                hint = near(str(self.port), [f"tickrig://{each}" for each in SERIAL_PORTS.names])
+                told = f"could not open port {self.port}: no rig offers it; {hint}"
                 raise SerialException(told) from None
         super().open()
 

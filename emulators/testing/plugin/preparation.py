@@ -27,6 +27,14 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
         if MODES[0] not in settings.modes:
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
+    if settings.artifacts:
+        from tickrig.emulators.testing.report.report_file import check_writable  # noqa: PLC0415
+
+        try:
+            check_writable(settings.artifacts)
+        except OSError as error:
+            where = f"--bench-artifacts {settings.artifacts}"
+            raise pytest.UsageError(f"{where}: {error.strerror}") from None
     if settings.report:
         from tickrig.emulators.testing.plugin.report_plugin import (  # noqa: PLC0415 - asked for
             ReportPlugin,

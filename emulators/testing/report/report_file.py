@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -10,6 +11,7 @@ from typing import Final
 from tickrig.emulators.testing.report.bench_report import BenchReport
 from tickrig.emulators.testing.report.report_json import from_json, to_json
 
+PAGES: Final = (".html", ".htm", "")
 JSON: Final = ".json"
 """Ends the name of a report that is kept as JSON."""
 
@@ -18,12 +20,43 @@ def check_report(path: Path) -> None:
     """See before a run whether its report could be written after it.
 
     Raises:
-        ValueError: Jinja2 is not there, or the folder is not.
+        ValueError: Jinja2 is not there, the folder is not, or nothing can be written to it; or
+            the name is that of a folder, or of a kind of file that no report is.
     """
+    if path.suffix.lower() not in (*PAGES, JSON) and not is_special(path):
+        raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
     if path.suffix.lower() != JSON and find_spec("jinja2") is None:
         raise ValueError("a report needs Jinja2: pip install 'tickrig[report]'")
     if not path.parent.is_dir():
         raise ValueError(f"report {path}: no directory {path.parent}")
+    if path.is_dir():
+        raise ValueError(f"report {path}: it is a directory")
+    if not is_special(path):
+        try:
+            check_writable(path.resolve().parent)
+        except OSError as error:
+            raise ValueError(f"report {path}: {error.strerror}") from None
+
+
+def is_special(path: Path) -> bool:
+    """Return whether it is something else than a file or folder, such as a pipe."""
+    return path.exists() and not (path.is_file() or path.is_dir())
+
+
+def check_writable(folder: Path) -> None:
+    """See whether files can be made in a folder, by making one; it may be a folder to be made.
+
+    Raises:
+        OSError: none can.
+    """
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    beside = folder / f".tickrig.{os.getpid()}"
+    try:
+        beside.touch()
+    finally:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
 
 
 def write_report(report: BenchReport, path: Path) -> None:

@@ -44,7 +44,7 @@ class VirtualDoors:
         """Open a line by pyserial."""
         from tickrig.emulators.serial.outside.sim_serial import SimSerial  # noqa: PLC0415 - slow
 
-        return SimSerial(self._side(wire), **options)
+        return SimSerial(self._side(wire), **{"port": wire, **options})
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can."""

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from serial import SerialException, serial_for_url
 
 from tickrig import Bench, open_bench
 from tickrig.device import make_epos
@@ -115,3 +116,14 @@ def test_a_misspelt_name_is_guessed_among_several_devices() -> None:
         ):
             with pytest.raises(ValueError, match=re.escape(text)):
                 act()
+
+
+def test_a_port_has_the_name_that_the_bench_gave_it() -> None:
+    with Bench(chair="rrc") as bench:
+        port = bench.serial()
+        assert port.port == "chair"
+        with pytest.raises(SerialException, match="could not open port chair: another host has"):
+            bench.serial()
+        port.close()
+        with pytest.raises(SerialException, match=r"tickrig://chiar: .*did you mean .*chair'\?"):
+            serial_for_url(bench.url.replace("chair", "chiar"))

@@ -139,6 +139,35 @@ def test_a_report_tells_what_differs(pytester: pytest.Pytester, run: Run) -> Non
     assert test.reason == "the second run differs from the first at line 25"
 
 
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (
+            ("--bench-report", "x.pdf"),
+            "report */x.pdf: it is a page, as report.html, or JSON, as report.json",
+        ),
+        (("--bench-report", "no/x.html"), "report */no/x.html: no directory */no"),
+        (("--bench-report", "folder.html"), "report */folder.html: it is a directory"),
+        (("--bench-report", "/proc/x.html"), "report /proc/x.html: *"),
+        (("--bench-artifacts", "/proc/kept"), "--bench-artifacts /proc/kept: *"),
+        (("--bench-artifacts", "a_file"), "--bench-artifacts */a_file: Not a directory"),
+        (("--bench-artifacts", "a_file/x"), "--bench-artifacts */a_file/x: Not a directory"),
+    ],
+)
+def test_where_nothing_can_be_written_is_told_before_the_tests(
+    pytester: pytest.Pytester, run: Run, options: tuple[str, ...], told: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile("def test_one(bench):\n    open('ran', 'x')\n")
+    pytester.mkdir("folder.html")
+    (pytester.path / "a_file").touch()
+    result = run(*options)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"ERROR: {told}"])
+    assert not (pytester.path / "ran").exists()
+    assert not [*pytester.path.glob("**/.tickrig.*")]
+
+
 def test_a_report_that_cannot_be_written_is_a_line(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile("def test_one(bench):\n    pass\n")
