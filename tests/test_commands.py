@@ -191,3 +191,20 @@ def test_a_full_disk_is_one_line(words: str) -> None:
 def test_the_package_is_the_command() -> None:
     words = [sys.executable, "-m", "tickrig", "--version"]
     assert subprocess.check_output(words, text=True) == f"tickrig (tickrig) {__version__}\n"
+
+
+@pytest.mark.parametrize("words", ["demo rtc-lite --virtual", "demo fig120"])
+def test_who_reads_no_further_ends_a_command_without_a_word(words: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-m", "tickrig", *words.split()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode in (0, 1)

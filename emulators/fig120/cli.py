@@ -12,7 +12,7 @@ from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import refuse_path
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import loading, raise_of_output
 
 if TYPE_CHECKING:
     from tickrig.emulators.fig120.samples import Sample
@@ -54,6 +54,7 @@ def _play_fig120(bus: BusOptions) -> list[Sample]:
         with warnings_shown(), bus_stage(bus) as stage:
             return run_demo(stage, click.echo)
     except (RuntimeError, OSError, SdoCommunicationError) as error:
+        raise_of_output(error)
         raise click.ClickException(str(error)) from error
 
 

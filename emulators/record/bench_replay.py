@@ -21,7 +21,7 @@ from tickrig.host.text.bench_header import (
     parse_bench_header,
 )
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
-from tickrig.host.text.trace import RESET, Mark, TraceError
+from tickrig.host.text.trace import RESET, Mark, TraceError, trace_text
 from tickrig.wire.can import Frames
 
 Traffic = bytes | Frames
@@ -70,11 +70,7 @@ def read_bench_recording(data: bytes) -> BenchRecording:
     """
     if not data.startswith(PREFIX.encode()):
         return as_bench(read_recording(data))
-    try:
-        text = data.decode("ascii")
-    except UnicodeDecodeError as error:
-        raise TraceError(f"not a trace: byte {error.start} is not ASCII") from None
-    first, *lines = text.split("\n")
+    first, *lines = trace_text(data).split("\n")
     header = parse_bench_header(first)
     records = tuple(BenchParser(header).parse(lines[:-1]))
     ended = bool(records) and records[-1].mark is Mark.END

@@ -15,6 +15,7 @@ from tickrig.host.text.trace import (
     TraceError,
     parse_header,
     parse_records,
+    trace_text,
 )
 
 
@@ -51,11 +52,7 @@ def read_recording(data: bytes) -> Recording:
     Raises:
         TraceError: not a trace of this version, or a line of it is damaged.
     """
-    try:
-        text = data.decode("ascii")
-    except UnicodeDecodeError as error:
-        raise TraceError(f"not a trace: byte {error.start} is not ASCII") from None
-    first, *lines = text.split("\n")
+    first, *lines = trace_text(data).split("\n")
     header = parse_header(first)
     records = tuple(parse_records(lines[:-1]))
     ended = bool(records) and records[-1].mark is Mark.END

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import loading, raise_of_output
 from tickrig.host.links.errors import DeviceRefused, LinkError
 
 
@@ -17,4 +17,5 @@ def rrc() -> None:
     try:
         run_demo(click.echo)
     except (RuntimeError, OSError, LinkError, DeviceRefused) as error:
+        raise_of_output(error)
         raise click.ClickException(str(error)) from error

@@ -52,6 +52,16 @@ def start(name: str, path: str) -> None:
             signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to be tidied up
 
 
+def raise_of_output(error: Exception) -> None:
+    """Raise an error of printing once more, which is no matter of what was printed.
+
+    Where somebody reads no further, as before `| head`, the command ends without a word.
+    """
+    printing = isinstance(error, OSError) and error.filename is None
+    if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]
+        raise error
+
+
 def load(path: str) -> Any:
     """Return what stands at `MODULE:NAME`."""
     module, _, name = path.partition(":")

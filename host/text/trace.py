@@ -30,6 +30,7 @@ RESET: Final = "reset"
 Config = Mapping[str, str | int | float | None]
 """Configuration of a device, as the header of its trace carries it."""
 
+BEGIN: Final = "# tickrig-trace v"
 _VERSION: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
 _HEADER: Final = re.compile(r"# tickrig-trace v1 ([\w-]+) (\{.*\})")
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
@@ -90,6 +91,19 @@ class Record:
         """Which input changed to what, for `!`."""
         name, _, value = self.text.partition("=")
         return name, parse_setting(value)
+
+
+def trace_text(data: bytes) -> str:
+    """Return the text of a trace; TraceError if there is none, or no whole first line."""
+    try:
+        text = data.decode("ascii")
+    except UnicodeDecodeError as error:
+        raise TraceError(f"not a trace: byte {error.start} is not ASCII") from None
+    if not text:
+        raise TraceError("not a trace: it is empty")
+    if "\n" not in text and (text.startswith(BEGIN) or BEGIN.startswith(text)):
+        raise TraceError("line 1 is cut off: the header of the trace has no end")
+    return text
 
 
 def parse_header(line: str) -> Header:

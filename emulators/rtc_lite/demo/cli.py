@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tickrig.host.cli.messages import warnings_shown
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import loading, raise_of_output
 from tickrig.host.links.errors import LinkError
 
 
@@ -29,4 +29,5 @@ def rtc_lite(virtual: bool) -> None:
         with warnings_shown(), pty_setup() as setup:
             run_demo(setup, click.echo)
     except (RuntimeError, OSError, LinkError, RtcRefused) as error:
+        raise_of_output(error)
         raise click.ClickException(str(error)) from error

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
 from tickrig.emulators.testing.bench.bench_rig import Parts
-from tickrig.emulators.testing.bench.build import BenchedDevice, check_no_device, mounts_of, name_of
+from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
@@ -328,15 +328,10 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
     Raises:
         OSError: the file cannot be read, or a port cannot be had.
         RigFileError: all that is wrong with the file.
-        ValueError: it is the name of a device, which `Bench` takes.
         Refused: a device cannot be made.
         PortGone: a bus cannot be opened.
     """
-    try:
-        plan = read_rig_file(Path(path))
-    except FileNotFoundError:
-        check_no_device(str(path))
-        raise
+    plan = read_rig_file(Path(path))
     return Bench.of_plan(plan if seed is None else replace(plan, seed=seed), mode)
 
 

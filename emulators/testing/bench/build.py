@@ -89,16 +89,6 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
     return DevicePlan(name=name, kind=kind, type=place, wire=BUS, node_id=node_id)
 
 
-def check_no_device(text: str) -> None:
-    """Raise ValueError if the path of a rig file, which is not there, is the name of a device."""
-    try:
-        kind = named_device(text, Path()).kind
-    except ValueError:
-        return
-    if kind in (DeviceKind.SERIAL, DeviceKind.MODEL):
-        raise ValueError(f"{text} is a device, no rig file: Bench({text!r}) puts it on a bench")
-
-
 def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry]:
     """Return a slave that is named, and what a trace says of it."""
     try:

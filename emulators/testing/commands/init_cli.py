@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Final
 
@@ -62,6 +63,14 @@ def init(types: tuple[str, ...], file: Path) -> None:
     try:
         with file.open("x", encoding="utf-8", newline="\n") as out:
             out.write(text)
+    except FileExistsError:
+        text = f"file {file} is there already, and is left alone: -o FILE writes another one"
+        raise Refused(text) from None
+    except FileNotFoundError:
+        why = "cannot be made there" if file.parent.is_dir() else f"no directory {file.parent}"
+        raise Refused(f"file {file}: {why}") from None
     except OSError as error:
         refuse_path("file", error)
     click.echo(file)
+    words = shlex.quote(str(file))
+    click.echo(f"next: edit it; tickrig check {words}; tickrig run {words}", err=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 @click.command("replay")
 @click.argument("file", type=PATH)
+@click.option("-v", "--verbose", is_flag=True, help="Each device: its ticks, and what differs.")
 @click.pass_context
-def replay_command(context: click.Context, /, file: Path) -> None:
+def replay_command(context: click.Context, /, file: Path, *, verbose: bool) -> None:
     """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
 
     \b
@@ -34,19 +35,35 @@ def replay_command(context: click.Context, /, file: Path) -> None:
     try:
         data = file.read_bytes()
         play = _replay_bench if data.startswith(PREFIX.encode()) else _replay
-        ticks, name, difference = play(file, data)
+        played = play(file, data)
     except OSError as error:
         refuse_path("trace", error)
     except ValueError as error:
         raise Refused(f"trace {file}: {error}") from None
-    if difference is None:
-        click.echo(f"identical: {ticks} ticks")
-    else:
-        click.echo(_describe(name, difference, file))
-        context.exit(1)
+    if verbose:
+        for each in played:
+            said = _describe("", each.difference, file) if each.difference else "identical"
+            click.echo(f"{each.name or each.type}: {each.ticks} ticks, {said}")
+    differing = [each for each in played if each.difference is not None]
+    if not differing:
+        click.echo(f"identical: {sum(each.ticks for each in played)} ticks")
+        return
+    first = min(differing, key=lambda each: each.difference.at_us if each.difference else 0)
+    if first.difference is not None and not verbose:
+        click.echo(_describe(first.name, first.difference, file))
+    context.exit(1)
 
 
-def _replay(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
+class _Played(NamedTuple):
+    """A device that was replayed; it has no name where it is the only one."""
+
+    name: str
+    type: str
+    ticks: int
+    difference: Difference[Any] | None
+
+
+def _replay(file: Path, data: bytes) -> list[_Played]:
     """Replay a trace of one device on a serial line."""
     with loading():
         from tickrig.emulators.commands.device_type import build_recorded  # noqa: PLC0415 - slow
@@ -57,11 +74,11 @@ def _replay(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
     with mistakes_in(recording.header.config.values()):
         difference = replay(recording, build_recorded(recording.header))
     _warn(file, ended=recording.ended)
-    return recording.ticks, "", difference
+    return [_Played("", recording.header.device, recording.ticks, difference)]
 
 
-def _replay_bench(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | None]:
-    """Replay each device of a bench; return how many ticks, and the first difference of all."""
+def _replay_bench(file: Path, data: bytes) -> list[_Played]:
+    """Replay each device of a bench."""
     with loading():
         from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
 
@@ -70,10 +87,12 @@ def _replay_bench(file: Path, data: bytes) -> tuple[int, str, Difference[Any] | 
         raise ValueError("it was recorded at a host's port, without ticks: use tickrig compare")
     found = _differences(file, recording)
     _warn(file, ended=recording.ended)
-    ticks = sum(len(recording.ticks_of(name)) for name, _ in found)
-    differing = [(name, difference) for name, difference in found if difference is not None]
-    first = min(differing, key=lambda row: row[1].at_us, default=("", None))
-    return ticks, *first
+    return [
+        _Played(
+            name, recording.header.devices[name].type, len(recording.ticks_of(name)), difference
+        )
+        for name, difference in found
+    ]
 
 
 def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Difference[Any] | None]]:

@@ -92,7 +92,13 @@ def read_run(path: Path) -> BenchReport:
         OSError: the file cannot be read.
         ValueError: it is no report; the text says where and what.
     """
-    return from_json(path.read_text("utf-8"))
+    try:
+        text = path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"not JSON: the byte at {error.start} is no UTF-8") from None
+    if not text:
+        raise ValueError("not JSON: it is empty")
+    return from_json(text)
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -18,11 +18,15 @@ from tickrig.emulators.testing.rig_file.section import Notes, Section, dotted, i
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.names import closest
 from tickrig.host.text.toml_document import BROKEN, TomlDocument, TomlPath
+from tickrig.host.text.trace import BEGIN
 
 SYSTEM: Final = (
     "it is a system of RT components, of which nothing is emulated: tickrig rtc run FILE"
 )
 SCENARIO: Final = "it is a scenario: --scenario FILE plays it"
+TRACE: Final = "it is a trace: tickrig replay FILE, tickrig compare FILE"
+EDS: Final = "it is an EDS or DCF: a rig file names it as the type of a device, type = FILE"
+_EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
 _SCENARIO: Final = re.compile(r"(\s*(#.*)?\n)*\s*\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)")
 HIL: Final = {
     ("dut", "rrc", "port"): ("hardware", "rrc", "port"),
@@ -39,6 +43,10 @@ def no_rig_file(text: str) -> str:
     >>> no_rig_file("# drive\n0.1s press power_button\n")
     'it is a scenario: --scenario FILE plays it'
     """
+    if text.startswith(BEGIN):
+        return TRACE
+    if _EDS.match(text):
+        return EDS
     return SCENARIO if _SCENARIO.match(text) else ""
 
 

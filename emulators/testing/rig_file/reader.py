@@ -12,11 +12,17 @@ from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.body import read_body
-from tickrig.emulators.testing.rig_file.devices import DeviceReader
+from tickrig.emulators.testing.rig_file.devices import DeviceReader, kind_of
 from tickrig.emulators.testing.rig_file.doors import DoorReader
 from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
 from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
-from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan, WirePlan, WireType
+from tickrig.emulators.testing.rig_file.plan import (
+    DeviceKind,
+    DevicePlan,
+    RigPlan,
+    WirePlan,
+    WireType,
+)
 from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, check_wire_fault, probe
 from tickrig.emulators.testing.rig_file.schema import TOP
 from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
@@ -42,7 +48,22 @@ def read_rig_file(path: Path) -> RigPlan:
         OSError: it cannot be read.
         RigFileError: all that is wrong with it.
     """
-    return decode_rig_file(path.read_bytes(), path)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError as error:
+        if not _is_device(str(path)):
+            raise
+        hint = f"tickrig init --device {path} writes a rig file, Bench({str(path)!r}) needs none"
+        text = f"no such file; it is the name of a device: {hint}"
+        raise FileNotFoundError(error.errno, text, error.filename) from None
+    return decode_rig_file(data, path)
+
+
+def _is_device(text: str) -> bool:
+    try:
+        return kind_of(text, Path())[0] in (DeviceKind.SERIAL, DeviceKind.MODEL)
+    except ValueError:
+        return False
 
 
 def decode_rig_file(data: bytes, path: Path) -> RigPlan:

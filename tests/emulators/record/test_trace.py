@@ -151,7 +151,9 @@ def test_a_full_disk_is_said_once_and_the_emulator_goes_on(
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("", "line 1 is not '# tickrig-trace v1"),
+        ("", "not a trace: it is empty"),
+        ("# tickrig-", "line 1 is cut off: the header of the trace has no end"),
+        ('# tickrig-trace v1 lamp {"a', "line 1 is cut off: the header of the trace has no end"),
         ("hello\n", "line 1 is not"),
         ("# tickrig-trace v2 lamp {}\n", "version 2; versions 1 and 2 are known"),
         ("# tickrig-trace v1 lamp {,}\n", "the configuration is not JSON"),

@@ -73,7 +73,7 @@ def test_two_of_a_model_share_its_node_id() -> None:
 
 
 def test_the_name_of_a_device_is_no_rig_file() -> None:
-    with pytest.raises(ValueError, match=r"epos is a device, no rig file: Bench\('epos'\) puts"):
+    with pytest.raises(FileNotFoundError, match=r"it is the name of a device: .*Bench\('epos'\)"):
         open_bench("epos")
     with pytest.raises(FileNotFoundError):
         open_bench("eposs")

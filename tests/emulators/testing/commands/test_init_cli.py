@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.commands.cli import main
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.testing.commands.init_cli import init
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
@@ -26,7 +28,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(*words: str) -> tuple[int, str]:
     result = CliRunner().invoke(init, words)
-    return result.exit_code, result.output
+    return result.exit_code, result.stdout or result.stderr
 
 
 def test_without_words_it_is_an_rrc(folder: Path) -> None:
@@ -56,8 +58,30 @@ def test_what_it_writes_checks_with_and_without_its_proposals(
 
 def test_a_file_that_is_there_is_left_alone(folder: Path) -> None:
     (folder / "rig.toml").write_text("mine")
-    assert run() == (2, "Error: file rig.toml: File exists\n")
+    told = "file rig.toml is there already, and is left alone: -o FILE writes another one"
+    assert run() == (2, f"Error: {told}\n")
     assert (folder / "rig.toml").read_text() == "mine"
+
+
+def test_it_says_what_to_do_next(folder: Path) -> None:
+    result = CliRunner().invoke(init, ["-o", "my rig.toml"])
+    assert (result.exit_code, result.stdout) == (0, "my rig.toml\n")
+    edit, *commands = result.stderr.strip().split("; ")
+    assert (edit, commands[1]) == ("next: edit it", "tickrig run 'my rig.toml'")
+    assert CliRunner().invoke(main, shlex.split(commands[0])[1:]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ("no/rig.toml", "file no/rig.toml: no directory no"),
+        ("io_module.eds/rig.toml", "file io_module.eds/rig.toml: Not a directory"),
+        ("/proc/self/cmdline/x", "file /proc/self/cmdline/x: Not a directory"),
+        ("/proc/rig.toml", "file /proc/rig.toml: cannot be made there"),
+    ],
+)
+def test_where_nothing_can_be_written_is_told(file: str, told: str) -> None:
+    assert run("-o", file) == (2, f"Error: {told}\n")
 
 
 def test_standard_output_is_a_file_too(folder: Path) -> None:

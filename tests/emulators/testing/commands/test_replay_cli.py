@@ -53,6 +53,22 @@ def test_the_first_difference_of_all_devices_is_said(tmp_path: Path, bench_trace
     )
 
 
+def test_verbose_tells_of_each_device(tmp_path: Path, bench_trace: bytes) -> None:
+    path = tmp_path / "run.trace"
+    path.write_bytes(bench_trace)
+    result = CliRunner().invoke(main, ["replay", "-v", str(path)])
+    assert result.exit_code == 0
+    *each, last = result.stdout.splitlines()
+    assert {line.partition(":")[0] for line in each} >= {"rrc", "io", "file"}
+    assert all(re.fullmatch(r"\w+: \d+ ticks, identical", line) for line in each)
+    assert last == "identical: 17 ticks"
+    path.write_bytes(bench_trace.replace(b"703#00", b"703#01"))
+    result = CliRunner().invoke(main, ["replay", str(path), "--verbose"])
+    assert result.exit_code == 1
+    assert re.search(r"^io: \d+ ticks, different at 0.001000 \(.*:6\)$", result.stdout, re.M)
+    assert result.stdout.count("identical") == len(each) - 1
+
+
 def test_a_killed_recording_is_replayed_up_to_its_last_tick(
     tmp_path: Path, bench_trace: bytes
 ) -> None:

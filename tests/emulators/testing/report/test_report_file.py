@@ -78,7 +78,8 @@ def test_a_page_does_not_depend_on_the_process(kept: Path, tmp_path: Path) -> No
     ("text", "said"),
     [
         (b"{", "not JSON: Expecting property name"),
-        (b"\xff\xfe", "codec can't decode byte 0xff"),
+        (b"\xff\xfe", "not JSON: the byte at 0 is no UTF-8"),
+        (b"", "not JSON: it is empty"),
         (b'{"tickrig-report": 9}', "report version 9; this program reads 1"),
         (b'{"tickrig-report": 1, "tests": [1]}', ".tests[0]: 1 is no object"),
     ],
