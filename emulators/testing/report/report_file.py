@@ -53,7 +53,7 @@ def check_writable(folder: Path) -> None:
         folder = folder.parent
     beside = folder / f".tickrig.{os.getpid()}"
     try:
-        beside.touch()
+        beside.write_bytes(b"")
     finally:
         with suppress(OSError):
             beside.unlink(missing_ok=True)

@@ -65,7 +65,9 @@ def test_verbose_tells_of_each_device(tmp_path: Path, bench_trace: bytes) -> Non
     path.write_bytes(bench_trace.replace(b"703#00", b"703#01"))
     result = CliRunner().invoke(main, ["replay", str(path), "--verbose"])
     assert result.exit_code == 1
-    assert re.search(r"^io: \d+ ticks, different at 0.001000 \(.*:6\)$", result.stdout, re.M)
+    assert re.search(
+        r"^io: \d+ ticks, different at 0.001000 \(.*:6\)$", result.stdout, re.MULTILINE
+    )
     assert result.stdout.count("identical") == len(each) - 1
 
 
