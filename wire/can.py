@@ -97,5 +97,12 @@ class CanFrame(NamedTuple):
         return f"{can_id}#{self.data.hex().upper()}"
 
 
+def data_frame(can_id: int, data: bytes) -> CanFrame:
+    """Return `CanFrame(can_id, data)`, in a third of the time: 11-bit, not checked."""
+    return _new(CanFrame, (can_id, data, False, False, 0))
+
+
+_new: Final = tuple.__new__
+
 Frames = tuple[CanFrame, ...]
 """The traffic of one tick on a CAN bus."""

@@ -56,9 +56,11 @@ _Row = list[Any]
 
 def frame_bits(frame: CanFrame) -> int:
     """Return the bits of a frame with stuff bits and interframe space."""
-    can_id, data, remote, extended, length = frame
-    flags = extended << 1 | remote if extended or remote else 0
-    bits, row, crc = _head(can_id << 6 | flags << 4 | (length if remote else len(data)))
+    data = frame[1]  # places, not names: all five at once would take longer than these
+    key = frame[0] << 6 | len(data)
+    if frame[2] or frame[3]:
+        key |= frame[3] << 5 | frame[2] << 4 | frame[4]
+    bits, row, crc = _head(key)
     crc = _crc16(data, crc)
     row = reduce(getitem, data, row)
     # Behind the CRC a bit unlike its last one: it fills the byte up, and is never stuffed.

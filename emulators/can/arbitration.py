@@ -27,10 +27,10 @@ def priority(frame: CanFrame) -> int:
     >>> [str(frame) for frame in sorted(frames, key=priority)]
     ['100#', '100#R', '04000000#', '04000000#R', '101#']
     """
-    can_id, _, remote, extended, _ = frame
-    if extended:
-        return (can_id >> 18) << 21 | 3 << 19 | (can_id & 0x3_FFFF) << 1 | remote
-    return can_id << 21 | (1 << 20 if remote else 0)
+    can_id = frame[0]
+    if frame[3]:
+        return (can_id >> 18) << 21 | 3 << 19 | (can_id & 0x3_FFFF) << 1 | frame[2]
+    return can_id << 21 | (1 << 20 if frame[2] else 0)
 
 
 def first_difference(frames: Sequence[CanFrame]) -> int:

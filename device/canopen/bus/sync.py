@@ -101,7 +101,7 @@ class Sync(Service):
         self._announce(self._counter)
 
     def _receive(self, frame: CanFrame) -> None:
-        data = frame.data
+        data = frame[1]
         if len(data) != self._length:
             self._length_error = True
             length = bytes([len(data)])

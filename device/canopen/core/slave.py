@@ -10,7 +10,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.twin import Copyable, Listeners
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
@@ -57,6 +57,7 @@ class CanopenSlave(Copyable):
         pending_id: the node-ID that counts from the next reset on (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
+        due_us: when the next service is due.
         accepts: CAN-IDs that it listens to, for the acceptance filter of a wire; None,
             for all, from power-on or a reset to the first tick.
         reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
@@ -103,7 +104,8 @@ class CanopenSlave(Copyable):
         self.reconfigured_by: frozenset[int] = frozenset()
         self.on_accepts: list[Callable[[], None]] = []
         self._dues = [NEVER] * len(services)
-        self._due_us = 0
+        self._asking: tuple[int, ...] = ()  # slots that have ever had a due time, in order
+        self.due_us: int = 0
         self.services: list[Service] = [make(self, slot) for slot, make in enumerate(services)]
 
     @property
@@ -111,15 +113,10 @@ class CanopenSlave(Copyable):
         """The control period."""
         return TICK_US
 
-    @property
-    def due_us(self) -> int:
-        """When the next service is due."""
-        return self._due_us
-
     def reset(self) -> None:
         """Lose power; the next tick is the first one after power-on."""
         self._powered = False
-        self._due_us = 0
+        self.due_us = 0
         self._listen_to(None)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
@@ -136,12 +133,11 @@ class CanopenSlave(Copyable):
         if not self._powered:
             self._power_on()
         for frame in rx:
-            handler = self._handlers.get(frame[0])
             if frame[2] or frame[3]:
                 self._receive_special(frame)
-            elif handler is not None:
+            elif (handler := self._handlers.get(frame[0])) is not None:
                 handler(frame)
-        if self._due_us <= now_us:
+        if self.due_us <= now_us:
             self._run_due(now_us)
         out = self._out
         if not out:
@@ -160,7 +156,11 @@ class CanopenSlave(Copyable):
             can_id: 11-bit CAN-ID, 0x000..0x7FF.
             data: 0 to 8 bytes.
         """
-        self._out.append(CanFrame(can_id, data))
+        self._out.append(data_frame(can_id, data))
+
+    def put(self, frame: CanFrame) -> None:
+        """Put a frame into this tick's traffic that was made before."""
+        self._out.append(frame)
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
         """Raise an error: it is active until it is cleared, and raising it again is none.
@@ -212,10 +212,12 @@ class CanopenSlave(Copyable):
             due_us: when; `NEVER` for not at all.
         """
         before, self._dues[slot] = self._dues[slot], due_us
-        if due_us < self._due_us:
-            self._due_us = due_us
-        elif before == self._due_us and self._powered:
-            self._due_us = min(self._dues)
+        if due_us < NEVER and slot not in self._asking:
+            self._asking = tuple(sorted((*self._asking, slot)))
+        if due_us < self.due_us:
+            self.due_us = due_us
+        elif before == self.due_us and self._powered:
+            self.due_us = min(self._dues)
 
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
@@ -300,15 +302,18 @@ class CanopenSlave(Copyable):
         if frame.remote and not frame.extended and handler is not None:
             handler(frame)
 
-    def _run_due(self, now_us: int) -> None:
-        """Let the services act that are due, in their order."""
-        dues = self._dues
-        for slot, service in enumerate(self.services):
-            if dues[slot] <= now_us:
+    def _run_due(self, now_us: int, after: int = -1) -> None:
+        """Let the services act that are due, in their order; most have never asked for a tick."""
+        dues, asking = self._dues, self._asking
+        for slot in asking:
+            if dues[slot] <= now_us and slot > after:
                 dues[slot] = NEVER
-                service.tick(now_us)
+                self.services[slot].tick(now_us)
+                if self._asking is not asking:  # one that had never asked may be due behind it
+                    self._run_due(now_us, slot)
+                    return
         if self._powered:
-            self._due_us = min(dues)
+            self.due_us = min([dues[slot] for slot in asking]) if asking else NEVER
 
 
 def _boots() -> bool:

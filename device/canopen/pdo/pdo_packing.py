@@ -48,8 +48,9 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
     entries = [slot.entry for slot in slots if slot.entry is not None]
     if not all(slot.whole for slot in slots):
         return _Bits(slots).pack
-    kept = all(entry.source is None for entry in entries)
-    return partial(_join, entries) if kept else partial(_join_present, entries)
+    if any(entry.source is not None for entry in entries):
+        return partial(_join_present, entries)
+    return partial(_data, entries[0]) if len(entries) == 1 else partial(_join, entries)
 
 
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
