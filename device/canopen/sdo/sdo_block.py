@@ -56,10 +56,18 @@ class BlockDownload:
 
     def _segment(self, request: bytes) -> None:
         """Take a segment of the running block."""
-        head = request[0]
-        if head == ClientCommand.ABORT:
+        head, due = request[0], self._in_sequence + 1
+        if head == due and due < self._block_size:  # most are: in sequence, and not the last
+            self._in_sequence = due
+            self._data += request[1:]
+            self._server.go_on()
+        elif head == ClientCommand.ABORT:
             self._server.end()
-            return
+        else:
+            self._end_block(head, request)
+
+    def _end_block(self, head: int, request: bytes) -> None:
+        """Take the last segment of a block, or drop one that is out of sequence."""
         seqno = head & BLOCK_SEQNO
         if seqno == self._in_sequence + 1:
             self._in_sequence = seqno
@@ -68,7 +76,7 @@ class BlockDownload:
         if head >= BLOCK_LAST or seqno >= self._block_size:
             self._acknowledge()
         else:
-            self._server.wait(self._segment)
+            self._server.go_on()
 
     def _acknowledge(self) -> None:
         """Say how far the block was received, and begin the next."""

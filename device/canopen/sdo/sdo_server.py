@@ -100,7 +100,8 @@ class SdoServer:
     """
 
     def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
-        self.node, self._wake, self._limits = node, wake, limits
+        self.node, self._wake, self._memory_bytes = node, wake, limits.memory_bytes
+        self._timeout_us = limits.timeout_us
         self.request_id: int
         self.response_id: int
         self.block_size = MAX_BLOCK_SIZE
@@ -130,13 +131,23 @@ class SdoServer:
     def wait(self, state: State) -> None:
         """Let the transfer wait for a request, but not for ever."""
         self._state = state
-        self.due_us = self.node.now_us + self._limits.timeout_us
+        self.go_on()
         self._wake(self.due_us)
+
+    def go_on(self) -> None:
+        """Let the transfer wait for the next request of the same meaning, as long again."""
+        self.due_us = self.node.now_us + self._timeout_us
+
+    def go_on_otherwise(self, request: bytes, specifier: int) -> None:
+        """Take what is not the segment that was due: SdoAbort if only its toggle bit is wrong."""
+        if request[0] & SPECIFIER == specifier:
+            raise SdoAbort(AbortCode.TOGGLE_BIT)
+        self.initiate(request)
 
     def free_bytes(self, entry: Entry) -> int:
         """Return what a string or domain may hold beside all others."""
         others = (one for one in self.node.dictionary if not one.size and one is not entry)
-        return self._limits.memory_bytes - sum(len(one.data) for one in others)
+        return self._memory_bytes - sum(len(one.data) for one in others)
 
     def end(self) -> None:
         """End the transfer."""
@@ -180,14 +191,14 @@ class SdoServer:
     def _without_transfer(self, request: bytes) -> None:
         """Take a request while no transfer runs; reading a small value is the short way."""
         if request[0] == _UPLOAD:
-            entry = self._entries.get(request[1:4])
+            multiplexer = request[1:4]
+            entry = self._entries.get(multiplexer)
             if entry is not None and entry.source is None:
                 data = entry.data
                 size = len(data)
                 if 0 < size <= EXPEDITED_BYTES:
-                    self.node.send(
-                        self.response_id, _EXPEDITED[size] + request[1:4] + data + _FILL[size]
-                    )
+                    response = _EXPEDITED[size] + multiplexer + data + _FILL[size]
+                    self.node.send(self.response_id, response)
                     return
         self.initiate(request)
 

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -86,3 +88,62 @@ def test_a_slave_without_a_service_does_not_find_it(bus: Bus) -> None:
 
     with pytest.raises(StopIteration):
         Third.of(bus.slave)
+
+
+SLOTS = 5
+Request = tuple[int, int]
+"""A slot, and in how many ms it asks for a tick; 0 and less are due, 9 is never."""
+
+requests = st.tuples(st.integers(0, SLOTS - 1), st.integers(-1, 9))
+
+
+class Asker(Service):
+    """Asks for ticks as it is told, for itself and for others."""
+
+    log: list[tuple[int, int]]
+    told: list[list[Request]]
+
+    def tick(self, now_us: int) -> None:
+        self.log.append((now_us, self.slot))
+        for slot, after_ms in self.told.pop() if self.told else ():
+            self.node.schedule(slot, NEVER if after_ms == 9 else now_us + 1_000 * after_ms)
+
+
+class PlainSlave:
+    """Asks all services in each tick: what a slave does that takes no short way."""
+
+    def __init__(self, told: list[list[Request]]) -> None:
+        self.dues, self.told, self.log = [NEVER] * SLOTS, told, list[tuple[int, int]]()
+
+    def tick(self, now_us: int) -> None:
+        for slot in range(SLOTS):
+            if self.dues[slot] <= now_us:
+                self.dues[slot] = NEVER
+                self.log.append((now_us, slot))
+                for other, after_ms in self.told.pop() if self.told else ():
+                    self.schedule(other, NEVER if after_ms == 9 else now_us + 1_000 * after_ms)
+
+    def schedule(self, slot: int, due_us: int) -> None:
+        self.dues[slot] = due_us
+
+
+@given(
+    st.lists(st.lists(requests, max_size=3), max_size=20),
+    st.lists(st.lists(requests, max_size=2), max_size=8),
+)
+def test_a_slave_runs_what_one_runs_that_asks_all_services(
+    told: list[list[Request]], between: list[list[Request]]
+) -> None:
+    slave = CanopenSlave(Dictionary([]), 5, (Asker,) * SLOTS)
+    Asker.log, Asker.told = [], [list(each) for each in told]
+    plain = PlainSlave([list(each) for each in told])
+    slave.tick(1_000, ())
+    for now_us in range(2_000, 2_000 + 1_000 * len(between), 1_000):
+        for slot, after_ms in between[now_us // 1_000 - 2]:
+            due_us = NEVER if after_ms == 9 else now_us + 1_000 * after_ms
+            slave.schedule(slot, due_us)
+            plain.schedule(slot, due_us)
+        assert slave.due_us == min(plain.dues)
+        slave.tick(now_us, ())
+        plain.tick(now_us)
+        assert (slave.due_us, Asker.log) == (min(plain.dues), plain.log)
