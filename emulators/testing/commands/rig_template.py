@@ -56,6 +56,7 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
         parts.append(BUS.format(bit_rate=rates[0] if rates else BIT_RATE))
     parts += ["\n".join(_device_lines(*each)) for each in made]
     parts.append("\n".join(_fault_lines(made)))
+    parts.append("\n".join(_safe_lines(made)))
     parts.append("\n".join(_door_lines(made)))
     return "\n".join(parts)
 
@@ -132,6 +133,16 @@ def _fault_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
         plain = next(each for each in names if _is_plain(found, each))
         shown = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
         yield f'# {plan.name} = "{plain}@2s-3s"'.ljust(32) + f"# {shown}"
+    yield ""
+
+
+def _safe_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
+    yield "# [safe]                        # outputs when a test is over, looked at by pytest"
+    for plan, found in made:
+        for item in list(found.physical.outputs.values())[:1]:
+            value = json.dumps(found.physical.read(item.name))
+            others = ", ".join(list(found.physical.outputs)[1:SHOWN])
+            yield f"# {plan.name}.{item.name} = {value}".ljust(32) + f"# {others}"
     yield ""
 
 

@@ -21,6 +21,7 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.host.text.values import Setting
 
 Source = BenchedDevice | Mapping[str, Any] | Path
 BenchSource = Source | Callable[[], Source] | None
@@ -118,6 +119,11 @@ class Wanted(NamedTuple):
         if not isinstance(seed, int):
             raise ValueError(f"seed is a number, not {seed!r}")
         return seed
+
+    @property
+    def safe(self) -> Mapping[str, Mapping[str, Setting]]:
+        """What the rig file says of outputs when a test is over, by device and name."""
+        return plan_of(self.source).safe if isinstance(self.source, Path) else {}
 
     @property
     def text(self) -> str:

@@ -17,7 +17,12 @@ from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
 from tickrig.emulators.testing.plugin.checks.dead_threads import THREADS, dead_threads
 from tickrig.emulators.testing.plugin.checks.health import Health
 from tickrig.emulators.testing.plugin.checks.never_awaited import never_awaited
-from tickrig.emulators.testing.plugin.checks.safe_state import SafeState, check_safe, unsafe
+from tickrig.emulators.testing.plugin.checks.safe_state import (
+    SafeState,
+    check_safe,
+    unsafe,
+    with_plan,
+)
 from tickrig.emulators.testing.plugin.checks.time_of_test import guard
 from tickrig.emulators.testing.plugin.evidence.artifacts import keep
 from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
@@ -81,6 +86,7 @@ class BenchedTest:
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = self.wanted.open()
         check_needs(needs, bench)
+        self._safe = with_plan(self._safe, self.wanted.safe, bench)
         check_safe(bench, self._safe)
         _offer(bench)
         self._health = Health(bench)

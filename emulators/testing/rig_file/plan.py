@@ -249,6 +249,7 @@ class RigPlan:
         devices: by name, in the order of the file.
         signals: by name, for formulas.
         faults: in the order of the file.
+        safe: for each device outputs, and what they are when a test is over.
         body: what drives move, None if nothing.
         real: the bench in real time.
         hardware: the bench of real devices, None if the file tells none.
@@ -260,6 +261,7 @@ class RigPlan:
     devices: Mapping[str, DevicePlan] = field(default_factory=dict)
     signals: Mapping[str, SignalSpec] = field(default_factory=dict)
     faults: tuple[FaultPlan, ...] = ()
+    safe: Mapping[str, Mapping[str, Setting]] = field(default_factory=dict)
     body: BodyPlan | None = None
     real: RealPlan = field(default_factory=RealPlan)
     hardware: HardwarePlan | None = None

@@ -26,7 +26,7 @@ from tickrig.emulators.testing.rig_file.plan import (
 from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, check_wire_fault, probe
 from tickrig.emulators.testing.rig_file.schema import TOP
 from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
-from tickrig.emulators.testing.rig_file.starts import Start, StartReader
+from tickrig.emulators.testing.rig_file.starts import Start, StartReader, read_safe
 from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
 from tickrig.emulators.testing.rig_file.wires import check_wires, read_wires
 from tickrig.host.text.toml_document import Mistake
@@ -122,13 +122,15 @@ class _Reader:
         if top.notes.document.whole:
             starts.check(self._physical)
         doors = DoorReader(self._wires, self._devices.plans, self._folder)
-        fault, body, real, hardware = map(top.sub, ("fault", "body", "real", "hardware"))
+        sections = map(top.sub, ("fault", "safe", "body", "real", "hardware"))
+        fault, safe, body, real, hardware = sections
         return RigPlan(
             seed=seed,
             wires={name: self._with_rate(wire) for name, wire in self._wires.items() if wire},
             devices=devices,
             signals=signals,
             faults=tuple(read_faults(fault, self._fault_owners())) if fault else (),
+            safe=read_safe(safe, self._physical) if safe else {},
             body=read_body(body, self._physical, node_ids) if body else None,
             real=doors.read_real(real) if real else RigPlan().real,
             hardware=doors.read_hardware(hardware) if hardware else None,

@@ -137,6 +137,7 @@ TOP: Final[Schema] = {
             ("device", "what is on the bench"),
             ("signal", "values for formulas, see below"),
             ("fault", "faults by device or wire, see below"),
+            ("safe", "outputs when a test is over, see below"),
             ("body", "what drives move"),
             ("real", "the bench in real time"),
             ("hardware", "where the real devices are"),

@@ -1,4 +1,7 @@
-"""`[device.NAME.start]` and `[signal.NAME]`: inputs at the start, and what drives them."""
+"""`[device.NAME.start]` and `[signal.NAME]`: inputs at the start, and what drives them.
+
+`[safe.NAME]`: outputs at the end.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.rig_file.fields import check_name, shown
 from tickrig.emulators.testing.rig_file.section import Section, is_broken
 from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
@@ -127,6 +130,46 @@ class StartReader:
             if not (missing and missing[0] not in value and closest(str(missing[0]), misspelt)):
                 section.wrong(mistake.reason, *mistake.keys)
         return None
+
+
+def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, dict[str, Setting]]:
+    """Read `[safe]`: for each device outputs, and what they are when a test is over.
+
+    Args:
+        section: the table.
+        devices: by name.
+    """
+    safe: dict[str, dict[str, Setting]] = {}
+    for device, table in section.subs():
+        if device not in devices:
+            section.unknown(f"no device {device!r}; {near(device, devices)}", device)
+        elif table is not None:
+            physical = devices[device]
+            safe[device] = {
+                name: int(value) if isinstance(value, bool) else value
+                for name, value in table.values.items()
+                if _can_be_safe(table, physical, name)
+            }
+    return safe
+
+
+def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
+    """Return whether an output or input can be this; else it is noted."""
+    value = section.values[name]
+    if is_broken(value):
+        return False
+    if name not in physical.outputs and name not in physical.inputs.table:
+        names = [*physical.outputs, *physical.inputs.table]
+        section.wrong(f"no output {shown(name)}; {near(name, _alike(name, names))}", name)
+        return False
+    if not isinstance(value, bool | int | float | str):
+        section.wrong(f"it takes a number or a text, not {shown(value)}", name)
+        return False
+    is_text = isinstance(read_signal(physical, name), str)
+    if physical is not UNKNOWN and is_text != isinstance(value, str):
+        section.wrong(f"it is a {'text' if is_text else 'number'}, not {shown(value)}", name)
+        return False
+    return True
 
 
 def _alike(name: str, names: Iterable[str]) -> list[str]:

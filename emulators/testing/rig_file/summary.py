@@ -24,6 +24,7 @@ def summary(plan: RigPlan) -> Iterator[str]:
         _count(len(plan.wires), "wire"),
         _count(len(plan.signals) + sum(_driven(each) for each in plan.devices.values()), "signal"),
         _count(len(plan.faults), "fault"),
+        _count(sum(map(len, plan.safe.values())), "safe output"),
         "1 body" if plan.body else "",
         "hardware" if plan.hardware else "",
     ]

@@ -17,6 +17,9 @@ PLACE = RIGS / "mutated.toml"
 
 SEEDS = [WHOLE, *(file.read_text("utf-8") for file in sorted(RIGS.glob("*.toml")))]
 SEEDS.append(
+    f'{WHOLE}[safe.vr2]\nout_v_pct = 0\nstate = "WaitPowerOn"\n[safe]\nleft.shaft_deg = 0\n'
+)
+SEEDS.append(
     '[dut.rrc]\nport = "/dev/ttyACM0"\n[tolerance]\nstick_pct = 5\ntime_ms = 20\n'
     '[operator]\ncontrol = "rrc.ctl"\n'
 )
@@ -43,8 +46,27 @@ VALUES += [
 ]
 VALUES += ["{table = 'morning.csv'}", "{lag = 'load', tau = '1s'}", "127", "[true, 'x', {}]"]
 
-TABLES = ["wire", "wire.can0", "device", "device.left", "device.vr2.start", "signal", "fault"]
-TABLES += ["body", "real", "real.vr2", "hardware", "hardware.tolerance", "x", "device.x", "[node]"]
+TABLES = [
+    "wire",
+    "wire.can0",
+    "device",
+    "device.left",
+    "device.vr2.start",
+    "signal",
+    "fault",
+    "safe",
+]
+TABLES += [
+    "safe.vr2",
+    "body",
+    "real",
+    "real.vr2",
+    "hardware",
+    "hardware.tolerance",
+    "x",
+    "device.x",
+    "[node]",
+]
 
 _KEY_VALUE = re.compile(r"^([^=\[#\n]+)=(.*)$", re.MULTILINE)
 

@@ -253,6 +253,18 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         ('[device.can]\ntype = "rrc"', ["1: device.can: control, .* are no names of devices"]),
         (RRC + "node_id = 5", ["3: device.rrc: no key 'node_id'; known: type, wire,"]),
         (RRC + 'profile = "402"', ["3: device.rrc: no key 'profile'; "]),
+        (RRC + "[safe]\nrcr = {}", ["4: safe.rcr: no device 'rcr'; did you mean 'rrc'?"]),
+        (RRC + "[safe]\nrrc = 5", ["4: safe.rrc: it is a table [safe.rrc], not 5"]),
+        (RRC + "safe = 5", ["3: .*no key 'safe'"]),
+        (
+            RRC + "[safe.rrc]\nout_v = 0\nout_w_pct = []\nstate = 0\nout_v_pct = 'x'",
+            [
+                "4: safe.rrc.out_v: no output 'out_v'; did you mean 'out_v_pct'?",
+                "5: safe.rrc.out_w_pct: it takes a number or a text, not a list",
+                "6: safe.rrc.state: it is a text, not 0",
+                "7: safe.rrc.out_v_pct: it is a number, not 'x'",
+            ],
+        ),
         (NODE + 'profile = "402"', ["4: device.node.profile: it belongs to an EDS or DCF"]),
         (NODE + "config = {}", ["4: device.node: no key 'config'; "]),
         (NODE.replace("5", "0"), ["3: device.node.node_id: it takes 1..127, or lss"]),
