@@ -24,7 +24,7 @@ pyserial, python-can and canopen are on a rig by objects of ours (`SimSerial`, t
 
 KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
 
-INSTALLED: Final = ("site-packages", "dist-packages")
+INSTALLED: Final = tuple(f"{os.sep}{name}{os.sep}" for name in ("site-packages", "dist-packages"))
 PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
 
 
@@ -48,7 +48,7 @@ def is_host(module: str, file: str) -> bool:
 @cache
 def is_installed(file: str) -> bool:
     """Return whether a file is of an installed package."""
-    return any(folder in Path(file).parts for folder in INSTALLED)
+    return any(folder in file for folder in INSTALLED)
 
 
 def package_of(frame: FrameType) -> str:

@@ -32,6 +32,7 @@ class Switch:
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Look who calls."""
+        __tracebackhide__ = True
         frame = sys._getframe(1)
         name = frame.f_globals.get("__name__") or ""
         if self.on and is_host(name, frame.f_code.co_filename):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
 
-from tickrig.emulators.testing.host_clock.kept_names import all_places
+from tickrig.emulators.testing.host_clock.kept_names import HOST_MODULES, Place
 from tickrig.emulators.testing.host_clock.switch import Act, MethodSwitch, Switch, root_of
 
 Acts = Mapping[tuple[Any, str], Act]
@@ -29,21 +29,26 @@ class Switches:
 
     def __enter__(self) -> None:
         """Put them in place."""
-        new: dict[int, tuple[Switch, Any]] = {}
+        new: dict[int, Switch] = {}
         for (owner, name), act in self._acts.items():
             before = vars(owner)[name]
             switch = (MethodSwitch if isinstance(owner, type) else Switch)(before, act)
-            new[id(root_of(before))] = switch, before
+            new[id(root_of(before))] = switch
             self._undo.callback(setattr, owner, name, before)
             setattr(owner, name, switch)
             self._undo.callback(setattr, switch, "on", False)
-        for place in all_places():
-            switch_and_before = new.get(id(place.function))
-            if switch_and_before is not None:
-                switch, before = switch_and_before
-                place.put(switch)
-                self._undo.callback(place.put, before)
+        for place in HOST_MODULES.places():
+            switch_of_it, kept = new.get(id(place.function)), place.kept()
+            if switch_of_it is not None and root_of(kept) is place.function:
+                place.put(switch_of_it)
+                self._undo.callback(_put_back, place, switch_of_it, kept)
 
     def __exit__(self, *exception: object) -> None:
         """Put back what was there."""
         self._undo.close()
+
+
+def _put_back(place: Place, switch: Switch, before: Any) -> None:
+    """Put back what was there, unless somebody has put something else there meanwhile."""
+    if place.kept() is switch:
+        place.put(before)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Collection, Container
 from contextlib import AbstractContextManager, nullcontext
+from threading import Thread
 from typing import Final
 
 from tickrig.emulators.testing.bench.bench import VIRTUAL
@@ -12,13 +13,16 @@ from tickrig.emulators.testing.host_clock.unpatched_time import unpatched_time_f
 CLOCK: Final = "clock"
 
 
-def guard(mode: str, allowed: Container[str]) -> AbstractContextManager[None]:
+def guard(
+    mode: str, allowed: Container[str], others: Collection[Thread]
+) -> AbstractContextManager[None]:
     """Return what fails a test in virtual time that looks at the clock of the machine.
 
     Args:
         mode: of its bench.
         allowed: what its markers allow.
+        others: threads that ran before there was a bench.
     """
     if mode != VIRTUAL or CLOCK in allowed:
         return nullcontext()
-    return unpatched_time_fails()
+    return unpatched_time_fails(others=others)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -22,8 +23,8 @@ from tickrig.emulators.testing.host_clock.unpatched_time import unpatched_time_f
 from tickrig.host.control.clock import RealClock
 
 WHAT_TO_DO = (
-    "in virtual time the clock of this machine means nothing: use the fixture bench_time"
-    " (time.perf_counter measures this machine)"
+    "in virtual time the clock of this machine means nothing: take the fixture bench_time, or wait"
+    """ by bench.run_for or bench.sleep, or mark the test needs("real or hardware")"""
 )
 
 
@@ -31,6 +32,29 @@ def module_of(name: str, file: str, code: str) -> Any:
     module = ModuleType(name)
     exec(compile(code, file, "exec"), vars(module))
     return module
+
+
+def test_what_a_module_keeps_later_is_found_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    late = module_of("late_host", "/home/me/late_host.py", "def rest(): nap(1)")
+    monkeypatch.setitem(sys.modules, "late_host", late)
+    late.__file__ = "/home/me/late_host.py"
+    with unpatched_time_fails():
+        pass
+    late.nap = time.sleep
+    with pytest.raises(UnpatchedTimeError, match=r"late_host\.py:1: time\.sleep is called"):
+        with unpatched_time_fails():
+            late.rest()
+    assert late.nap is time.sleep
+
+
+def test_a_module_in_the_place_of_another_is_found_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    for _ in range(2):
+        code = "from time import sleep\ndef rest(): sleep(1)"
+        host = module_of("new_host", "/home/me/new_host.py", code)
+        host.__file__ = "/home/me/new_host.py"
+        monkeypatch.setitem(sys.modules, "new_host", host)
+        with pytest.raises(UnpatchedTimeError), unpatched_time_fails():
+            host.rest()
 
 
 def test_the_line_is_told_and_what_to_do() -> None:

@@ -68,10 +68,107 @@ def test_a_test_that_sleeps_fails_with_the_line(pytester: pytest.Pytester, run: 
     result.assert_outcomes(passed=2, failed=2)
     result.stdout.fnmatch_lines(
         [
-            "*my_host.py:5: time.monotonic is called, but in virtual time *",
-            "*test_a_*.py:10: time.sleep is called, but in virtual time *",
+            ">*deadline = monotonic() + 10",
+            "E *UnpatchedTimeError: my_host.py:5: time.monotonic is called, but in virtual time *",
+            "",
+            "my_host.py:5: UnpatchedTimeError",
+            "test_a_*.py:10: time.sleep is called, but in virtual time *",
         ]
     )
+
+
+def test_a_thread_of_a_fixture_that_sleeps_fails_its_test(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import threading
+        import time
+        import pytest
+
+        @pytest.fixture
+        def host(bench):
+            go = threading.Event()
+            def work():
+                go.wait()
+                try:
+                    time.sleep(0.001)
+                except RuntimeError:
+                    pass
+            thread = threading.Thread(target=work)
+            thread.start()
+            yield go, thread
+            go.set()
+
+        def test_one(host):
+            go, thread = host
+            go.set()
+            thread.join()
+        """
+    )
+    result = run()
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*test_a_*.py:11: time.sleep is called, but in virtual time *"])
+
+
+@pytest.mark.parametrize(("mode", "outcome"), [("virtual", "skipped"), ("real", "passed")])
+@pytest.mark.realtime
+def test_a_test_can_be_marked_as_the_error_says(
+    pytester: pytest.Pytester, run: Run, mode: str, outcome: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import time
+        import pytest
+
+        @pytest.mark.needs("real or hardware")
+        def test_one(bench):
+            time.sleep(0.001)
+        """
+    )
+    run("--bench-mode", mode).assert_outcomes(**{outcome: 1})
+
+
+def test_what_a_test_has_put_in_place_of_the_clock_stays(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(my_host=HOST)
+    pytester.makepyfile(
+        """
+        import time
+        import pytest
+        import my_host
+
+        def test_first(bench):
+            pass
+
+        @pytest.fixture
+        def naps(monkeypatch):
+            naps = []
+            monkeypatch.setattr("my_host.sleep", naps.append)
+            monkeypatch.setattr("time.sleep", naps.append)
+            return naps
+
+        def test_one(bench, naps):
+            my_host.sleep(1)
+            time.sleep(2)
+            assert naps == [1, 2]
+
+        def test_two(bench, monkeypatch):
+            monkeypatch.setattr("my_host.sleep", print)
+
+        def test_three(bench):
+            with pytest.raises(RuntimeError, match="test_what_a_test_.*py:.*: time.sleep is"):
+                time.sleep(3)
+            raise ValueError("here")
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=3, failed=1)
+    result.stdout.fnmatch_lines(["*ValueError: here"])
 
 
 @pytest.mark.realtime
