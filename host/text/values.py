@@ -54,6 +54,15 @@ def parse_size(text: str) -> int:
     return int(match[1]) << _SHIFT.get(match[2], 0)
 
 
+def counted(number: int, noun: str) -> str:
+    """Write a number with its noun.
+
+    >>> counted(1, "test"), counted(2, "test")
+    ('1 test', '2 tests')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 Setting = int | float | str
 """Most inputs take whole numbers alone."""
 

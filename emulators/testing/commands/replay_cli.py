@@ -11,7 +11,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.text.byte_text import escape
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import counted, format_time
 
 if TYPE_CHECKING:
     from tickrig.emulators.record.bench_replay import BenchRecording
@@ -43,10 +43,10 @@ def replay_command(context: click.Context, /, file: Path, *, verbose: bool) -> N
     if verbose:
         for each in played:
             said = _describe("", each.difference, file) if each.difference else "identical"
-            click.echo(f"{each.name or each.type}: {each.ticks} ticks, {said}")
+            click.echo(f"{each.name or each.type}: {counted(each.ticks, 'tick')}, {said}")
     differing = [each for each in played if each.difference is not None]
     if not differing:
-        click.echo(f"identical: {sum(each.ticks for each in played)} ticks")
+        click.echo(f"identical: {counted(sum(each.ticks for each in played), 'tick')}")
         return
     first = min(differing, key=lambda each: each.difference.at_us if each.difference else 0)
     if first.difference is not None and not verbose:

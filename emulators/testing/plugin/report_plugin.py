@@ -29,10 +29,10 @@ from tickrig.emulators.testing.report.overview import (
     reported,
     requirement_rows,
 )
-from tickrig.emulators.testing.report.page_text import counted
 from tickrig.emulators.testing.report.report_file import write_report
 from tickrig.emulators.testing.report.report_json import from_data, to_data
 from tickrig.emulators.testing.report.requirement_file import read_requirements
+from tickrig.host.text.values import counted
 
 RECORD: Final = "tickrig_record"
 """The attribute of the last report of a test that has its record as JSON."""

@@ -43,7 +43,7 @@ from tickrig.emulators.testing.report.page_room import (
     cut,
 )
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import counted, format_time
 
 PACKAGE: Final = __package__
 FOLDER: Final = "template"
@@ -116,7 +116,7 @@ def _environment() -> Environment:
     environment.filters |= {
         "duration": page_text.duration,
         "size": page_text.size,
-        "counted": page_text.counted,
+        "counted": counted,
         "time": format_time,
         "seconds": page_text.seconds,
     }
@@ -180,4 +180,4 @@ def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[Part]) -> 
     if timeline and Part.TIMELINE not in parts:
         yield "the plots"
     if test.journal and Part.JOURNAL not in parts:
-        yield page_text.counted(len(test.journal), "journal line")
+        yield counted(len(test.journal), "journal line")

@@ -68,12 +68,3 @@ def size(characters: int) -> str:
     if characters < 1_000:
         return f"{characters} bytes"
     return f"{characters / 1e3:.3g} kB" if characters < 999_500 else f"{characters / 1e6:.3g} MB"
-
-
-def counted(number: int, noun: str) -> str:
-    """Write a number with its noun.
-
-    >>> counted(1, "test"), counted(2, "test")
-    ('1 test', '2 tests')
-    """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

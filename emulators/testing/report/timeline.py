@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.emulators.testing.report.axis import Axis, Span
 from tickrig.emulators.testing.report.bench_report import JournalLine, PlannedFault, TestRecord
 from tickrig.emulators.testing.report.lane import WORD_CHARACTERS, Lane, lane_of
-from tickrig.emulators.testing.report.page_text import counted
+from tickrig.host.text.values import counted
 
 MOST_FAULTS: Final = 40
 MOST_EVENTS: Final = 200

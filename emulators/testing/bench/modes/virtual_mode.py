@@ -12,7 +12,7 @@ from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
-from tickrig.emulators.testing.host_clock.rig_passing import RigPassing
+from tickrig.emulators.testing.host_clock.rig_passing import LONGEST_US, RigPassing
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
 
@@ -28,6 +28,9 @@ T = TypeVar("T")
 LOOK_US: Final = 1_000
 LOOKS: Final = 10_000
 """A condition is looked at each millisecond, in long waits so often."""
+
+ALMOST_NEVER: Final = NEVER // 2
+"""A device that has nothing to do has its next tick at the last one before `NEVER`."""
 
 EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
@@ -67,11 +70,14 @@ class VirtualMode(EmulatedMode):
         may have something to do.
         """
         self._check_open()
-        rig, look_us = self._rig.rig, max(LOOK_US, within_us // LOOKS)
+        rig = self._rig.rig
         until_us = rig.now_us + within_us
-        while not rig.run_until(done, min(look_us, until_us - rig.now_us)):
-            if rig.now_us >= until_us or (until_us >= NEVER and rig.next_us == NEVER):
-                return False
+        for_ever = until_us >= NEVER
+        look_us = max(LOOK_US, (LONGEST_US if for_ever else within_us) // LOOKS)
+        while not done():
+            if rig.now_us >= until_us or (for_ever and rig.next_us >= ALMOST_NEVER):
+                return False  # time that nothing ends does not pass: the bench keeps its age
+            rig.run_until(done, min(look_us, until_us - rig.now_us))
         return True
 
     def _check_open(self) -> None:

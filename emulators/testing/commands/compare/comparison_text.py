@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from tickrig.emulators.record.comparison import Pair, Said
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import counted, format_time
 
 SHOWN: Final = 20
 """So many differences are listed."""
@@ -38,7 +38,7 @@ def report(
         list(_first(file, *different[0])) if different else [],
         [_row(name, pair) for name, pair in listed] + [f"... and {left} more"] * bool(left),
         list(_table(pairs)),
-        [f"{result} {count} lines, within {tolerance_us / 1_000:g} ms"],
+        [f"{result} {counted(count, 'line')}, within {tolerance_us / 1_000:g} ms"],
     )
     lines = [line for section in sections if section for line in ("", *section)]
     return lines[1:], not different

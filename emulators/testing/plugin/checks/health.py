@@ -15,7 +15,7 @@ from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of
 from tickrig.emulators.testing.plugin.evidence.signal_names import fault_names
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import counted, format_time
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
 from tickrig.wire.errors import FramingError
 
@@ -66,10 +66,13 @@ class Health:
 
     def _lost(self, rig: BenchRig) -> list[str]:
         return [
-            f"{name}: {on.lost} {'frames' if name in self._buses else 'bytes'} found a buffer full"
+            f"{name}: {counted(on.lost, self._unit(name))} found a buffer full"
             for name, on in rig.state.mounts.items()
             if on.lost and name in self._spoken - self._faulty
         ]
+
+    def _unit(self, wire: str) -> str:
+        return "frame" if wire in self._buses else "byte"
 
     def _pass(self, wire: str, at_us: int, mark: Mark, data: bytes) -> None:
         """Note that a host spoke."""

@@ -15,6 +15,7 @@ from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.emulators.rrc.device_type import RRC
 from tickrig.emulators.rtc_lite.device_type import RTC_LITE
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.testing.bench.bench import Bench as OpenBench
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, WireEntry, WireType
 from tickrig.host.text.trace import Header
 from tickrig.wire.rtc_lite.codes import LiteCommand
@@ -36,6 +37,14 @@ def bench_trace() -> bytes:
 def replayed(path: Path, data: bytes) -> Result:
     path.write_bytes(data)
     return CliRunner().invoke(main, ["replay", str(path)])
+
+
+def test_one_tick_is_one(tmp_path: Path) -> None:
+    with OpenBench("rrc") as bench:
+        bench.run_for("10ms")
+        bench.save_trace(tmp_path / "run.trace")
+    result = CliRunner().invoke(main, ["replay", str(tmp_path / "run.trace")])
+    assert (result.exit_code, result.stdout) == (0, "identical: 1 tick\n")
 
 
 def test_a_bench_is_replayed(tmp_path: Path, bench_trace: bytes) -> None:

@@ -41,9 +41,11 @@ def test_what_a_module_keeps_later_is_found_too(monkeypatch: pytest.MonkeyPatch)
     with unpatched_time_fails():
         pass
     late.nap = time.sleep
-    with pytest.raises(UnpatchedTimeError, match=r"late_host\.py:1: time\.sleep is called"):
-        with unpatched_time_fails():
-            late.rest()
+    with (
+        pytest.raises(UnpatchedTimeError, match=r"late_host\.py:1: time\.sleep is called"),
+        unpatched_time_fails(),
+    ):
+        late.rest()
     assert late.nap is time.sleep
 
 
