@@ -45,6 +45,7 @@ class Urg(Copyable):
         self.inputs = QuantityBank(INPUTS, GROUPS)
         self._server, self._lines = ScipServer(self.parameters), LineSplitter()
         self._on, self._restarted = True, False
+        self._obeyed: tuple[float, ...] = ()
 
     @property
     def tick_us(self) -> int:
@@ -54,7 +55,7 @@ class Urg(Copyable):
     @property
     def due_us(self) -> int:
         """When anything would happen without input."""
-        if self.inputs.changed or self._restarted:
+        if self._restarted or (self.inputs.changed and self._switches != self._obeyed):
             return 0
         return self._server.due_us
 
@@ -73,6 +74,12 @@ class Urg(Copyable):
         """The world, with whoever stands there."""
         x_m, y_m, radius_m = (self.inputs[name] for name in GROUPS["post"])
         return self.world.with_posts(Post(x_m, y_m, radius_m)) if radius_m else self.world
+
+    @property
+    def _switches(self) -> tuple[float, ...]:
+        """The inputs that act at once; places count when a scan ends."""
+        inputs = self.inputs
+        return inputs["power_cut"], inputs["laser_broken"], inputs["motor_jammed"]
 
     def reset(self) -> None:
         """Begin as after power-up."""
@@ -122,7 +129,7 @@ class Urg(Copyable):
 
     def _inputs_changed(self, now_us: int) -> bytes:
         inputs, server = self.inputs, self._server
-        inputs.changed = False
+        inputs.changed, self._obeyed = False, self._switches
         on = not inputs["power_cut"]
         if on != self._on:
             self._on = on

@@ -39,7 +39,9 @@ class Stream:
         """Return a scan as it was asked for."""
         first, last, cluster = (int(text) for text in self.command.fields[:3])
         width = WIDTHS[self.command.symbol[1]]
-        numbers = [min(n, WIDEST[width]) for n in view.distances(first, last, cluster)]
+        numbers, widest = view.distances(first, last, cluster), WIDEST[width]
+        if max(numbers, default=0) > widest:
+            numbers = tuple(min(number, widest) for number in numbers)
         return Reply(echo, code, encode_scan(view.time_ms, numbers, width)).encode()
 
     def answer(self, view: View) -> bytes:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import isinf, tau
+from functools import lru_cache
+from math import inf, isinf, tau
 from typing import Final
 
 from tickrig.device.body.pose import Pose
 from tickrig.device.chance import Chance
 from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.ray_cast import Beams
 from tickrig.device.urg.world import World
 from tickrig.wire.scip.description import Specification
 
@@ -54,7 +56,18 @@ class View:
         Where none has a distance, it is the code of the first. Steps behind the last whole
         cluster have no number (DECISION U11).
         """
-        numbers = self._numbers(range(first, last + 1))
+        kind, ways_m = self.kind, self._ways_m(range(first, last + 1))
+        measurable = kind.first <= first and last <= kind.last
+        if measurable and cluster > 1:  # round once a cluster: a third of the time of a scan
+            least_m = _least_of_each(ways_m, cluster)
+            if kind.nearest_mm / 1_000 <= min(least_m, default=inf):
+                return tuple(self._numbers(least_m))
+        numbers = self._numbers(ways_m)
+        if not measurable:
+            numbers = [
+                number if kind.first <= step <= kind.last else NoDistance.NOT_MEASURABLE
+                for step, number in enumerate(numbers, first)
+            ]
         if cluster <= 1:
             return tuple(numbers)
         places = range(0, len(numbers) - cluster + 1, cluster)
@@ -64,26 +77,28 @@ class View:
         good = [number for number in numbers if number >= self.kind.nearest_mm]
         return min(good, default=numbers[0])
 
-    def _numbers(self, steps: Sequence[int]) -> list[int]:
+    def _ways_m(self, steps: range) -> list[float]:
+        """Return how far it is in the direction of each step, with the noise of the sensor."""
         kind, pose = self.kind, self.pose
-        angles = [pose.heading_rad + (s - kind.front) * tau / kind.resolution for s in steps]
-        ways_m = self.world.distances_m(pose.x_m, pose.y_m, angles)
-        if self.parameters.noise:
-            pairs = zip(steps, ways_m, strict=True)
-            ways_m = [
-                way_m if isinf(way_m) else way_m + self._error_mm(step, way_m) / 1_000
-                for step, way_m in pairs
-            ]
-        near_m, far_m = kind.nearest_mm / 1_000, kind.farthest_mm / 1_000
+        angles_rad = [pose.heading_rad + off_rad for off_rad in _off_rad(kind, steps)]
+        ways_m = Beams(pose.x_m, pose.y_m, angles_rad, kind.resolution).cast_m(self.world)
+        if not self.parameters.noise:
+            return ways_m
         return [
-            NoDistance.NOT_MEASURABLE
-            if not kind.first <= step <= kind.last
-            else NoDistance.WEAK
+            way_m if isinf(way_m) else way_m + self._error_mm(step, way_m) / 1_000
+            for step, way_m in zip(steps, ways_m, strict=True)
+        ]
+
+    def _numbers(self, ways_m: Sequence[float]) -> list[int]:
+        """Return distances in mm, and codes."""
+        near_m, far_m = self.kind.nearest_mm / 1_000, self.kind.farthest_mm / 1_000
+        return [
+            NoDistance.WEAK
             if way_m > far_m
             else NoDistance.OTHER
             if way_m < near_m
             else round(way_m * 1_000)
-            for step, way_m in zip(steps, ways_m, strict=True)
+            for way_m in ways_m
         ]
 
     def _error_mm(self, step: int, distance_m: float) -> float:
@@ -91,3 +106,15 @@ class View:
         most_mm = self.parameters.noise * max(10.0, distance_m * 10)
         chance = Chance(self.parameters.seed, f"{self.number} {step}")
         return most_mm * (chance.draw() / HALF - 1)
+
+
+@lru_cache(maxsize=8)
+def _off_rad(kind: Specification, steps: range) -> tuple[float, ...]:
+    """Return the directions of steps from straight ahead; each scan asks for the same."""
+    return tuple((step - kind.front) * tau / kind.resolution for step in steps)
+
+
+def _least_of_each(ways_m: Sequence[float], cluster: int) -> list[float]:
+    """Return the least of each whole cluster."""
+    end = len(ways_m) - len(ways_m) % cluster
+    return list(map(min, *(ways_m[at:end:cluster] for at in range(cluster))))

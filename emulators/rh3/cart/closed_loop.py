@@ -73,7 +73,8 @@ class MountedUrg:
             if inputs[name] != value:
                 inputs.set(name, value)
         places = [(base.read("x_m"), base.read("y_m")) for base in self._others]
-        self.urg.world = self.world.with_posts(*(Post(x, y, OUTLINE_M) for x, y in places))
+        posts = [Post(x, y, OUTLINE_M) for x, y in places]
+        self.urg.world = self.world.with_posts(*posts) if posts else self.world
 
 
 @dataclass(frozen=True, slots=True)

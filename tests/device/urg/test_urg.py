@@ -389,3 +389,17 @@ def test_it_is_a_device_of_a_millisecond_with_named_ends() -> None:
 def test_parameters_that_cannot_be_are_refused(settings: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         UrgParameters(**settings)  # type: ignore[arg-type]
+
+
+def test_it_is_due_for_what_is_switched_and_not_for_where_it_is_put() -> None:
+    urg = Measured(AHEAD).urg
+    assert urg.due_us == 0
+    urg.tick(1_000, b"")
+    assert urg.due_us == NEVER
+    urg.inputs.set("x_m", 1.0)
+    assert urg.due_us == NEVER
+    for name in ("power_cut", "laser_broken", "motor_jammed"):
+        urg.inputs.set(name, 1)
+        assert urg.due_us == 0
+        urg.tick(2_000, b"")
+        assert urg.due_us == NEVER

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
 from tickrig.wire.scip.command import SIZES, Command
 from tickrig.wire.scip.description import Specification, encode_lines, parse_lines
-from tickrig.wire.scip.encoding import encode_number, parse_number, with_sum, without_sum
+from tickrig.wire.scip.encoding import (
+    encode_number,
+    encode_numbers,
+    parse_number,
+    parse_numbers,
+    with_sum,
+    without_sum,
+)
 from tickrig.wire.scip.reply import MOST_BYTES, Reply, ReplySplitter
 from tickrig.wire.scip.scan import encode_scan, parse_scan
 
@@ -94,6 +101,16 @@ def test_scans_survive_coding(time_ms: int, numbers: list[int], width: int) -> N
     lines = encode_scan(time_ms, numbers, width)
     assert all(len(line) <= 65 for line in lines)
     assert parse_scan(lines, width) == (time_ms, tuple(numbers))
+
+
+@given(st.integers(1, 4), st.data())
+def test_a_character_carries_six_bits_and_0_is_the_lowest(width: int, data: st.DataObject) -> None:
+    most = (1 << 6 * width) - 1
+    numbers = data.draw(st.lists(st.integers(0, most) | st.just(most), max_size=9))
+    shifts = range(6 * (width - 1), -1, -6)
+    codes = bytes(0x30 + (number >> shift & 0x3F) for number in numbers for shift in shifts)
+    assert encode_numbers(numbers, width) == codes
+    assert parse_numbers(codes, width) == tuple(numbers)
 
 
 @pytest.mark.parametrize("lines", [(), (with_sum(b"000"),), (with_sum(b"0000"), with_sum(b"0000"))])
