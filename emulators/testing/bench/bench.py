@@ -293,14 +293,16 @@ class Bench(BenchDevice):
     def save_trace(self, path: Path | str) -> None:
         """Save what all devices received, sent and suffered, for `tickrig replay`.
 
+        Of real devices it has what passed their ports and what the operator did, for
+        `tickrig compare`.
+
         Args:
             path: the file; one that exists is replaced.
 
         Raises:
-            NotOnThisBench: real devices; what passes their ports can be recorded.
             OSError: the file cannot be written.
         """
-        self._mode.act(lambda rig: rig.save_trace(Path(path)))
+        self._mode.save_trace(Path(path))
 
     def fork(self) -> Bench:
         """Return a twin of the bench that goes on from here by itself, in virtual time.

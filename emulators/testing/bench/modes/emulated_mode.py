@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Final, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
@@ -109,6 +110,10 @@ class EmulatedMode(ABC):
 
     def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
         """Nothing: nobody is asked who takes his time."""
+
+    def save_trace(self, path: Path) -> None:
+        """Write a trace of all that happened; OSError if it cannot be."""
+        self.act(lambda rig: rig.save_trace(path))
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return the latest lines and frames, and what was done."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from tickrig.emulators.bench.fault_order import FaultOrder
@@ -124,6 +125,9 @@ class BenchMode(Protocol):
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""
         ...
+
+    def save_trace(self, path: Path) -> None:
+        """Write a trace of all that happened; OSError if it cannot be."""
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return the latest lines and frames, and what was done."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from tickrig.emulators.bench.fault_spec import FaultSpec
@@ -35,6 +36,9 @@ class DeviceOperator(Protocol):
 
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Set an input, or all inputs of a group."""
+
+    def set_all(self, values: Mapping[str, Setting]) -> None:
+        """Set several inputs, before the device has its power."""
 
     def get(self, name: str) -> Setting:
         """Return the present value of an input or output."""

@@ -11,9 +11,11 @@ from typing import Any
 from weakref import WeakSet
 
 from tickrig.emulators.testing.bench.journal import Journal
+from tickrig.emulators.testing.bench.modes.hardware.port_record import PortRecord
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, HostPace
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting
 from tickrig.wire.can import Frames
 
 
@@ -23,10 +25,14 @@ class DoorJournal(Journal):
     Args:
         now_us: the time.
         after: called when something has been heard.
+        record: gets the same, for a trace.
     """
 
-    def __init__(self, now_us: Callable[[], int], after: Callable[[], None]) -> None:
+    def __init__(
+        self, now_us: Callable[[], int], after: Callable[[], None], record: PortRecord
+    ) -> None:
         super().__init__()
+        self.record = record
         self._now_us, self._after, self._lock = now_us, after, threading.Lock()
         self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
@@ -38,29 +44,33 @@ class DoorJournal(Journal):
             pace: learns how late the host is.
         """
         if isinstance(mount, LineMount):
-            return _Watch(pace, partial(self._hear_bytes, self._splitting(mount)))
+            return _Watch(pace, partial(self._hear_bytes, mount.name, self._splitting(mount)))
         watch = _BusWatch(pace, mount.name, self)
         self._watches[mount.name].add(watch)
         return watch
 
-    def note(self, device: str, text: str) -> None:
-        """Note what was done to a device."""
+    def note(self, device: str, text: str, **changes: Setting) -> None:
+        """Note what was done to a device, and what its inputs are now."""
         with self._lock:
+            for name, value in changes.items():
+                self.record.changed(device, name, value)
             self.add(self._now_us(), Mark.PHYSICAL, text.encode(), device)
 
     def _splitting(self, mount: LineMount) -> Callable[[int, Mark, bytes], None]:
         return self.of_line(mount.name, mount.settings.splitter)
 
     def _hear_bytes(
-        self, hear: Callable[[int, Mark, bytes], None], mark: Mark, data: bytes
+        self, wire: str, hear: Callable[[int, Mark, bytes], None], mark: Mark, data: bytes
     ) -> None:
         with self._lock:
+            self.record.passed(wire, mark, data)
             hear(self._now_us(), mark, data)
         self._after()
 
     def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Frames) -> None:
         """Note frames that passed a door, unless another one of its bus has told of them."""
         with self._lock:
+            self.record.passed(wire, mark, frames)
             for frame in frames:
                 if mark is Mark.FROM_DEVICE:
                     if watch.known[str(frame)] > 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -97,6 +98,9 @@ class EmulatorOperator:
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Set an input, or all inputs of a group."""
         self._request("set", name=self._prefix + name, value=list(values))
+
+    def set_all(self, values: Mapping[str, Setting]) -> None:
+        """Nothing: `prepare` has done so."""
 
     def get(self, name: str) -> Setting:
         """Return the present value of an input or output."""

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from tickrig.emulators.bench.fault_order import FaultOrder
@@ -16,6 +17,7 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.hardware.door_journal import DoorJournal
 from tickrig.emulators.testing.bench.modes.hardware.operators import Operators
 from tickrig.emulators.testing.bench.modes.hardware.places import places_of
+from tickrig.emulators.testing.bench.modes.hardware.port_record import PortRecord
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
@@ -72,8 +74,9 @@ class HardwareMode:
         self._pace, self._pending = HostPace(), list[tuple[Condition, Begin]]()
         self._looking = self._begun = False
         self.orders = list[FaultOrder]()
-        self._journal = DoorJournal(lambda: self.now_us, self._look)
         mounts = self._like.state.mounts
+        self._record = PortRecord(plan, mounts, lambda: self.now_us)
+        self._journal = DoorJournal(lambda: self.now_us, self._look, self._record)
         places = places_of(plan, self._where, mounts)
         self._doors = Doors(places, lambda wire: self._journal.watch(mounts[wire], self._pace))
         self._waits = CpuWaits()
@@ -206,6 +209,10 @@ class HardwareMode:
     def act(self, action: Callable[[BenchRig], T]) -> NoReturn:
         """Refuse: there is no rig."""
         raise NotOnThisBench("this works on emulated devices alone: here are real ones")
+
+    def save_trace(self, path: Path) -> None:
+        """Write what passed the ports and was done by hand; OSError if it cannot be."""
+        self._record.save(path)
 
     def fork(self) -> NoReturn:
         """Refuse: real devices cannot be copied."""

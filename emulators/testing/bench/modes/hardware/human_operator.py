@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.device.physical import InputSignal, SignalType
@@ -63,6 +64,14 @@ class HumanOperator:
         wanted = [self._wish(self._physical.inputs.table[member], value) for member, value in pairs]
         self.have_done(f"{' and '.join(wanted)}, and leave it so")
         self._record.set(name, *values)
+
+    def set_all(self, values: Mapping[str, Setting]) -> None:
+        """Have several inputs set, and held, in one go."""
+        table = self._physical.inputs.table
+        wanted = [self._wish(table[name], value) for name, value in values.items()]
+        self.have_done(f"{' and '.join(wanted)}, and leave it so")
+        for name, value in values.items():
+            self._record.set(name, value)
 
     def get(self, name: str) -> Setting:
         """Return what an input was set to, or ask for what is seen of an output."""

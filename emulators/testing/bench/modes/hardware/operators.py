@@ -19,9 +19,11 @@ from tickrig.emulators.testing.bench.modes.hardware.human_operator import HumanO
 from tickrig.emulators.testing.bench.modes.hardware.power_switch import PowerSwitch
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.rig_file.plan import HardwarePlan, RigPlan
+from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.host.control.requests import VERSION, Object
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
+from tickrig.wire.instant import NEVER
 
 
 class Operators:
@@ -57,6 +59,7 @@ class Operators:
             for name, operator in self._operators.items():
                 operator.prepare(like.state.assembly.parts[name])
                 self._waiting.append(name)
+                self._start(name, operator)
             undo.pop_all()
 
     def begin(self) -> None:
@@ -97,16 +100,18 @@ class Operators:
         return {}
 
     def _set(self, name: str, values: list[Setting]) -> None:
-        self._like.operator.check_set(name, *values)
+        pairs = self._like.operator.check_set(name, *values)
         device, signal = self._owner(name)
         self._operator_at(device).set(signal, tuple(values))
-        self._journal.note(device, f"{signal}={' '.join(map(str, values))}")
+        changes = {member.removeprefix(f"{device}/"): value for member, value in pairs}
+        self._journal.note(device, f"{signal}={' '.join(map(str, values))}", **changes)
 
     def _press(self, name: str, duration_us: int) -> None:
         self._like.operator.check_press(name, duration_us)
         device, button = self._owner(name)
         self._operator_at(device).press(button, duration_us)
-        self._journal.note(device, f"{button} pressed for {duration_us / 1e6:g} s")
+        self._journal.note(device, f"{button} pressed for {duration_us / 1e6:g} s", **{button: 1})
+        self._journal.record.changed(device, button, 0, duration_us)
 
     def _get(self, name: str) -> Setting:
         device, signal = self._owner(name)
@@ -124,13 +129,16 @@ class Operators:
         self._like.operator.check_fault(spec)
         device, fault = self._fault_owner(name)
         operator, wanted = self._operator_at(device), replace(spec, name=fault)
+        is_input = name in self._like.state.assembly.inputs.table
         if order.when and not operator.quick:
             raise NotOnThisBench(f"no hand makes {fault} the moment that something is so")
 
         def begin(now_us: int) -> None:
             order.begin(now_us)
             operator.fault(wanted, now_us, order.for_us)
-            self._journal.note(device, fault if spec.rate is None else f"{fault}={spec.rate:g}")
+            said = fault if spec.rate is None else f"{fault}={spec.rate:g}"
+            lasts = (spec.from_us, spec.to_us, order.for_us) == (0, NEVER, None)
+            self._journal.note(device, said, **({fault: 1} if is_input and lasts else {}))
 
         return begin
 
@@ -140,7 +148,8 @@ class Operators:
         self._like.operator.check_clear(name)
         device, bare = self._fault_owner(name)
         self._operator_at(device).clear(bare)
-        self._journal.note(device, f"{bare}=0")
+        is_input = name in self._like.state.assembly.inputs.table
+        self._journal.note(device, f"{bare}=0", **({bare: 0} if is_input else {}))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
         """Have the supply of a device switched, of all if it is empty."""
@@ -149,6 +158,8 @@ class Operators:
             if device in self._waiting:  # the test says itself what it is to have
                 self._waiting.remove(device)
             self._journal.note(device, f"switched {'on' if on else 'off'}")
+            if on:
+                self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
         """Ask the human at a device, or at the first that has one; None if there is none."""
@@ -166,6 +177,15 @@ class Operators:
                 self._journal.note(device, f"done: {text}")
                 return True
         return False
+
+    def _start(self, device: str, operator: DeviceOperator) -> None:
+        """Have the inputs as the rig file has them at the start; nobody's hand plays a signal."""
+        start = self._plan.devices[device].start
+        values = {key: each for key, each in start.items() if not isinstance(each, SignalSpec)}
+        if values:
+            operator.set_all(values)
+            said = ", ".join(f"{name}={value}" for name, value in values.items())
+            self._journal.note(device, said, **values)
 
     def _operator_of(self, device: str) -> DeviceOperator:
         if path := self._where.control.get(device):

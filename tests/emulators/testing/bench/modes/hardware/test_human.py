@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from tests.emulators.testing.bench.modes.hardware.plans import Answers, serial_plan
 from tickrig import Bench
+from tickrig.emulators.record.bench_replay import read_bench_recording
 from tickrig.emulators.testing.bench.errors import (
     BenchBlocked,
     NotOnThisBench,
@@ -26,6 +28,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     RigPlan,
     Tolerances,
 )
+from tickrig.host.text.trace import Mark
 
 HOW = "then press Enter (n: not done, c: cannot be done):"
 
@@ -66,6 +69,44 @@ def test_a_group_is_set_at_once_and_remembered(bench_of: BenchOf) -> None:
     assert "and set stick_w_pct (stick, right is positive) to -20 %, and leave it so" in asked
     assert (bench.get("stick_v_pct"), bench.get("stick_w_pct")) == (100, -20)
     assert "rrc ! stick=100 -20" in bench.transcript()
+
+
+def test_what_a_rig_file_has_at_the_start_is_asked_for() -> None:
+    plan = serial_plan(HardwarePlan())
+    device = replace(plan.devices["rrc"], start={"stick_v_pct": 20, "bus_unplugged": 1})
+    human = Answers("")
+    with Bench.of_plan(replace(plan, devices={"rrc": device}), "hardware", human) as bench:
+        (asked,) = human.asked
+        assert asked == (
+            "rrc: set stick_v_pct (stick, forward is positive) to 20 % and make this fault: "
+            f"a connector of the VR2 bus is out, and leave it so, {HOW}"
+        )
+        assert (bench.get("stick_v_pct"), bench.get("bus_unplugged")) == (20, 1)
+        assert "rrc ! stick_v_pct=20, bus_unplugged=1" in bench.transcript()
+    with pytest.raises(OperatorRefused, match="did not do this: rrc: set stick_v_pct"):
+        Bench.of_plan(replace(plan, devices={"rrc": device}), "hardware", Answers("n"))
+
+
+def test_what_was_done_by_hand_is_in_the_trace(bench_of: BenchOf, tmp_path: Path) -> None:
+    bench = bench_of(Answers("", "", "", "", ""))
+    bench.set("stick", 100, -20)
+    bench.fault("bus_unplugged")
+    bench.clear("bus_unplugged")
+    bench.switch_on()
+    bench.press("power_button", for_="1us")
+    bench.save_trace(tmp_path / "run.trace")
+    recording = read_bench_recording((tmp_path / "run.trace").read_bytes())
+    assert (recording.at_port, recording.ended) == (True, True)
+    assert recording.header.devices["rrc"].type == "rrc"
+    assert [(x.name, x.text) for x in recording.records if x.mark is Mark.PHYSICAL] == [
+        ("rrc", "stick_v_pct=100"),
+        ("rrc", "stick_w_pct=-20"),
+        ("rrc", "bus_unplugged=1"),
+        ("rrc", "bus_unplugged=0"),
+        ("rrc", "reset"),
+        ("rrc", "power_button=1"),
+        ("rrc", "power_button=0"),
+    ]
 
 
 def test_an_output_is_asked_for_until_it_is_a_number(bench_of: BenchOf) -> None:
@@ -185,8 +226,6 @@ def test_what_real_devices_cannot_do_is_told(bench_of: BenchOf) -> None:
     bench = bench_of(Answers())
     with pytest.raises(NotOnThisBench, match="real devices have no twins"):
         bench.fork()
-    with pytest.raises(NotOnThisBench, match="on emulated devices alone"):
-        bench.save_trace("run.trace")
     with pytest.raises(NotOnThisBench, match="on emulated devices alone"):
         bench.start(bench.sleep("1ms"))
     bench.run(bench.sleep("1ms"))

@@ -5,14 +5,17 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from tests.emulators.testing.bench.modes.hardware.plans import played
 from tests.interop.buses import MULTICAST
 from tickrig import Bench
 from tickrig.emulators.bench.child import Child, running
 from tickrig.emulators.testing.bench.errors import MachineTooSlow, PortGone
+from tickrig.emulators.testing.commands.compare_cli import compare_command
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DeviceKind,
@@ -52,6 +55,21 @@ def test_a_host_and_hands_at_an_rrc_in_another_process(bench: Bench) -> None:
     assert "rrc > output1e00" in bench.transcript()
     assert "rrc < OK:output" in bench.transcript()
     assert "rrc ! power_button pressed for 0.1 s" in bench.transcript()
+
+
+def test_what_passed_the_port_is_compared_with_an_emulator(bench: Bench, tmp_path: Path) -> None:
+    with RrcClient(bench.link) as client:
+        client.start()
+        bench.press("power_button")
+        assert bench.wait_until(lambda: bench.get("state") == "Standby", within="8s")
+        client.output(30, 0, confirm=True)
+        client.poweroff()
+    trace = tmp_path / "run.trace"
+    bench.save_trace(trace)
+    result = CliRunner().invoke(compare_command, [str(trace), "--tolerance", "500ms"])
+    assert "OK:output" in trace.read_text("ascii")
+    assert " ! power_button=1" in trace.read_text("ascii")
+    assert (result.exit_code, result.stderr) == (0, ""), result.output
 
 
 def test_a_fault_comes_with_a_line_and_goes_in_its_time(bench: Bench) -> None:
