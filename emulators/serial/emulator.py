@@ -120,8 +120,3 @@ class Emulator(RunningEmulator):
             **super().status(),
             "host_setting": self._outside.host_setting if self._outside else "",
         }
-
-    @property
-    def lost_bytes(self) -> int:
-        """Their number."""
-        return self.lost["lost_bytes"]

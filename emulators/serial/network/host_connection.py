@@ -50,11 +50,6 @@ class HostConnection:
         """What it has set the port to, as `9600 8N1`; empty where it cannot."""
         return ""
 
-    @property
-    def unsent_bytes(self) -> int:
-        """How much is kept for it."""
-        return len(self._unsent)
-
     def has_ended(self, now_us: int) -> bool:
         """Whether another host may have the line: this one sends no more, or is stuck."""
         stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US

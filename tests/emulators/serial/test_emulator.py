@@ -47,7 +47,7 @@ def test_what_is_done_between_ticks_takes_effect_at_the_next_one() -> None:
 def test_bytes_that_find_a_buffer_full_are_counted() -> None:
     emulator = Emulator("lamp", Lamp())
     emulator.send(0, bytes(5_000))
-    assert emulator.lost_bytes == 904
+    assert emulator.lost == {"lost_bytes": 904}
     assert emulator.status()["lost_bytes"] == 904
 
 

@@ -22,6 +22,9 @@ from tickrig.wire.instant import NEVER
 SEARCHED_US: Final = 10_000_000
 """So long after it was switched on an emulator may say the first that was recorded."""
 
+PHASES: Final = 8
+"""So many places of the emulator's ticks are tried; a port does not show where they begin."""
+
 
 @dataclass(frozen=True, slots=True)
 class ComparedRun:
@@ -70,9 +73,10 @@ def compare_port(
         tolerance: how long after the end the emulator may still answer.
         settle_us: how long the emulator has been on when the recording begins. If what the
             device said first is what it says by itself when it is switched on, that is tried
-            too, and the closer one counts.
+            too; so are other places of its ticks where something was set for less than one.
+            The closest counts.
     """
-    records = recording.of(name)
+    records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
     split = make().type.line.splitter or line_splitter
     recorded = list(cut(split(Mark.FROM_DEVICE), traffic_of(records, Mark.FROM_DEVICE)))
@@ -81,10 +85,22 @@ def compare_port(
         emulated = _play(make(), records, begin_us, begin_us + until_us)
         return ComparedRun(recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
 
-    begins = [settle_us]
+    phases = PHASES if has_short_change(records, device.tick_us) else 1
+    begins = [settle_us + device.tick_us * phase // phases for phase in range(phases)]
     if recorded:
         begins += begin_with(recorded[0], _play(make(), (), 0, SEARCHED_US), tolerance)
     return closest(map(run, begins), recording.until_us, tolerance)
+
+
+def has_short_change(records: Iterable[BenchRecord], tick_us: int) -> bool:
+    """Say whether an input was set twice within a tick: only some ticks see what was between."""
+    latest: dict[str, int] = {}
+    for record in records:
+        if record.mark is Mark.PHYSICAL and (change := record.change) is not None:
+            if record.at_us - latest.get(change[0], -NEVER) < tick_us:
+                return True
+            latest[change[0]] = record.at_us
+    return False
 
 
 def begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> list[int]:

@@ -101,6 +101,30 @@ def test_a_recording_of_any_session_is_the_same(tmp_path: Path, seed: int) -> No
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.parametrize("phase_us", range(0, 10_000, 1_250))
+@pytest.mark.parametrize("held_us", [2_000, 6_000, 9_900])
+def test_a_press_shorter_than_a_tick_is_the_same_in_any_phase(
+    tmp_path: Path, phase_us: int, held_us: int
+) -> None:
+    """A port does not show where ticks begin; whether a short press is seen depends on that."""
+    line, rrc = SerialLine(), Rrc()
+    rig = Rig(Station(rrc, line.a))
+    rig.run_for(503_000 + phase_us)
+    line.b.poll(rig.now_us)
+    link = RecordingLink(SimLink(rig, line.b), tmp_path / "t", name="rrc", type="rrc")
+    for value, wait_us in ((1, held_us), (0, 1_000_000)):
+        rrc.inputs.set("power_button", value)
+        link.note("power_button", value)
+        until_us = link.now_us + wait_us
+        while link.now_us < until_us:
+            link.receive(until_us - link.now_us)
+    link.send(b"device\n")
+    link.receive(100_000)
+    link.close()
+    result = compared(tmp_path / "t")
+    assert result.exit_code == 0, result.output
+
+
 def test_another_duration_is_found_with_its_line(tmp_path: Path) -> None:
     record_rrc(tmp_path / "t", RrcConfig(power_on_ticks=80))
     result = compared(tmp_path / "t")
