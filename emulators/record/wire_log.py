@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 from tickrig.host.text.trace import Mark
 from tickrig.wire.serial.lines import LineSplitter
@@ -28,6 +29,11 @@ class WireLine:
     data: bytes
     source: str = ""
 
+
+MOST_BEGUN: Final = 4_096
+"""Bytes that are kept of a line that does not end."""
+
+LINE_ENDS: Final = b"\r\n"
 
 Splitter = Callable[[int, bytes], list[bytes]]
 """Told when bytes were heard; gives what has become whole."""
@@ -56,12 +62,21 @@ class WireLog:
         self.listeners: list[Callable[[WireLine], None]] = []
         self._lines: deque[WireLine] = deque(maxlen=keep)
         self._splitters = {mark: splitter(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
+        self._begun = dict.fromkeys(self._splitters, (0, b""))
         self._count = 0
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
+        begun = (self._begun[mark][1] + data)[-MOST_BEGUN:]
         for line in self._splitters[mark](at_us, data):
             self.add(at_us, mark, line)
+            begun = begun[begun.find(line) + len(line) :].lstrip(LINE_ENDS)
+        self._begun[mark] = at_us, begun
+
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun and did not end, of each direction; not numbered."""
+        begun = self._begun.items()
+        return tuple(WireLine(0, at_us, mark, data) for mark, (at_us, data) in begun if data)
 
     def add(self, at_us: int, mark: Mark, line: bytes, source: str = "") -> None:
         """Take a whole line."""

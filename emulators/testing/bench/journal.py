@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
@@ -24,6 +25,7 @@ class Journal(WireLog):
 
     def __init__(self) -> None:
         super().__init__(KEPT)
+        self._logs: list[tuple[str, WireLog]] = []
 
     def of_line(
         self, source: str, splitter: Callable[[Mark], Splitter] | None
@@ -31,11 +33,19 @@ class Journal(WireLog):
         """Return what takes the bytes of a serial line, cut anywhere."""
         log = WireLog(0) if splitter is None else WireLog(0, splitter)
         log.listeners.append(lambda line: self.add(line.at_us, line.mark, line.data, source))
+        self._logs.append((source, log))
         return log.hear
 
     def of_bus(self, source: str) -> Callable[[int, CanFrame | ErrorFrame], None]:
         """Return an observer of a CAN bus."""
         return lambda at_us, frame: self.add(at_us, Mark.FROM_DEVICE, str(frame).encode(), source)
+
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun on serial lines and did not end, by the time of its last byte."""
+        found = [
+            replace(line, source=name) for name, log in self._logs for line in log.unfinished()
+        ]
+        return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
         """Return what is kept."""

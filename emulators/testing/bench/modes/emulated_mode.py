@@ -119,6 +119,10 @@ class EmulatedMode(ABC):
         """Return the latest lines and frames, and what was done."""
         return self.act(lambda rig: rig.journal.lines())
 
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun on serial lines and did not end."""
+        return self.act(lambda rig: rig.journal.unfinished())
+
 
 def answer_of(answer: Object) -> Object:
     """Return an answer; ValueError with its text if it is a refusal."""

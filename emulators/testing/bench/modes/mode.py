@@ -133,6 +133,10 @@ class BenchMode(Protocol):
         """Return the latest lines and frames, and what was done."""
         ...
 
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun on serial lines and did not end."""
+        ...
+
     def too_slow(self) -> str:
         """Say why no failure is to be believed: real time was not kept; empty if it was."""
         ...

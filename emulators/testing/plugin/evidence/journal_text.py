@@ -49,10 +49,15 @@ def decoded(lines: Iterable[WireLine], buses: Collection[str]) -> Iterator[tuple
 
 
 def last_lines(bench: Bench, count: int) -> str:
-    """Return the last that happened on a bench: time, where, direction, text."""
+    """Return the last that happened on a bench: time, where, direction, text.
+
+    Lines that have begun and did not end stand below.
+    """
     described = list(decoded(bench._mode.journal(), buses_of(bench)))[-count:]
+    begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]
     return "\n".join(
-        f"{format_time(line.at_us)} {line.source} {line.mark} {text}" for line, text in described
+        f"{format_time(line.at_us)} {line.source} {line.mark} {text}"
+        for line, text in [*described, *begun]
     )
 
 

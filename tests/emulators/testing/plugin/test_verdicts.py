@@ -41,6 +41,23 @@ def test_a_failure_tells_what_was_asked_what_happened_and_how_to_repeat_it(
     )
 
 
+def test_a_failure_shows_a_line_that_did_not_end(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        def test_one(bench):
+            port = bench.serial(timeout=0.1)
+            port.write(b"device\\nvers")
+            bench.run_for("100ms")
+            assert b"Version" in port.read(100)
+        """
+    )
+    result = run()
+    result.stdout.fnmatch_lines(
+        ["0.* rrc > device", "0.* rrc < RRC", "0.* rrc > vers  (not ended)"]
+    )
+
+
 def test_frames_are_told_with_what_they_mean(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makepyfile(
         """

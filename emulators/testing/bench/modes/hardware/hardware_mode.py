@@ -199,6 +199,10 @@ class HardwareMode:
         """Return what passed the doors last, and what the operator did."""
         return self._journal.lines()
 
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun at the doors of serial lines and did not end."""
+        return self._journal.unfinished()
+
     def too_slow(self) -> str:
         """Say why no failure is to be believed; empty if one is, or a human has said no."""
         if self._operators.said_no:
