@@ -45,6 +45,11 @@ class PtyPort(NonCopyable):
     nobody reads is kept up to `buffer_bytes` here and some 4 KiB in the kernel;
     after that whole sends are dropped and counted.
 
+    A second host that opens the terminal is not refused: the kernel does not tell this side who
+    has it open, and TIOCEXCL would keep out the first host as well, and not one of root. What the
+    device sends then goes to whichever of them reads first. Hosts that lock it, as
+    pyserial's `exclusive=True` does, refuse each other.
+
     Args:
         link: path of a symbolic link to the terminal, see `PtyLink`; none if not given.
             One that is left over from a killed emulator is replaced.

@@ -228,3 +228,14 @@ def test_a_bridge_hands_on_what_its_tap_hears() -> None:
         bridge.give_out(3_000)
         assert os.read(host, 10) == b"out"
     assert heard == [(1_000, Mark.TO_DEVICE, b"in"), (3_000, Mark.FROM_DEVICE, b"out")]
+
+
+def test_hosts_that_lock_refuse_each_other_and_others_take_each_others_bytes() -> None:
+    port = PtyPort()
+    with closing(port), serial.Serial(port.path, timeout=5, exclusive=True) as host:
+        with pytest.raises(serial.SerialException, match="exclusively lock"):
+            serial.Serial(port.path, exclusive=True)
+        with serial.Serial(port.path, timeout=5) as second:
+            port.send(0, b"once")
+            assert second.read(4) == b"once"
+            assert host.in_waiting == 0

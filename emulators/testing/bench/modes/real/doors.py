@@ -80,7 +80,8 @@ class Doors:
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
         data, parity, stop = int(place.framing[0]), place.framing[1], float(place.framing[2:])
         own = {"baudrate": place.baud, "bytesize": data, "parity": parity, "stopbits": stop}
-        port = open_watched(place.url, self._watch_of(wire), {**own, **options})
+        locked = {"exclusive": True}  # a second host takes bytes away from the first
+        port = open_watched(place.url, self._watch_of(wire), {**own, **locked, **options})
         self._opened.callback(port.close)
         return port
 

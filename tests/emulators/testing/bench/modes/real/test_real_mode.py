@@ -12,7 +12,7 @@ import serial
 from tickrig import Bench, InputBank
 from tickrig.device import Rrc, make_epos
 from tickrig.device.twin import Copyable
-from tickrig.emulators.testing.bench.errors import BenchError, NotOnThisBench
+from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError, NotOnThisBench
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DeviceKind,
@@ -235,3 +235,13 @@ def test_a_line_is_at_a_tcp_port_where_there_are_no_ptys(monkeypatch: pytest.Mon
         assert bench.serial(timeout=5).read_until() == b"EV:Initialized\n"
     with Bench(Rrc(), mode="real") as bench:
         assert bench.link.receive(5_000_000).startswith(b"EV:")
+
+
+def test_a_second_host_at_a_line_is_refused() -> None:
+    with Bench(Rrc(), mode="real") as bench, bench.serial(timeout=5) as port:
+        with pytest.raises(BenchBlocked, match="another program uses it"):
+            bench.serial()
+        with pytest.raises(BenchBlocked, match="another program uses it"):
+            _ = bench.link
+        assert port.readline() == b"EV:Initialized\n"
+        bench.serial(exclusive=None).close()  # asked for
