@@ -7,6 +7,7 @@ from typing import Final
 
 from tests.host.spy_link import SpyLink
 from tickrig import Bench
+from tickrig.emulators.testing.bench.errors import OperatorRefused
 from tickrig.host import RrcClient, RrcEvent
 from tickrig.wire.rrc.replies import StatusA
 
@@ -18,6 +19,9 @@ PRESS_US: Final = 30_000
 
 SETTLE_US: Final = 200_000
 """From what an operator does to the last event that it causes."""
+
+ASKED: Final = 3
+"""So often a hand is asked to hold the stick right."""
 
 SAMPLE_US: Final = 10_000
 EDGE_US: Final = 50_000  # how far a sampled edge of a tone may be off
@@ -55,9 +59,23 @@ class Chair:
         self.client.run_for(3 * PRESS_US)
 
     def hold_stick(self, v_pct: int, w_pct: int) -> None:
-        """Move the stick (forward and right are positive) and hold it there."""
-        self.bench.set("stick", v_pct, w_pct)
-        self.client.run_for(PRESS_US)
+        """Move the stick (forward and right are positive) and hold it there.
+
+        Raises:
+            OperatorRefused: a hand holds it elsewhere, by the status that the RRC sends.
+        """
+        for _ in range(ASKED if self.bench.mode == "hardware" else 1):
+            self.bench.set("stick", v_pct, w_pct)
+            self.client.run_for(PRESS_US)
+            told = self.client.latest_status
+            if told is None or self.client.now_us - told.at_us > PRESS_US:
+                return
+            seen = told.value.in_v_pct, told.value.in_w_pct
+            if self.near(seen[0], v_pct) and self.near(seen[1], w_pct):
+                return
+        within = f"within {self.bench.tolerance.stick_pct:g} %"
+        text = f"the stick is held at {seen}, and not at {(v_pct, w_pct)} {within}"
+        raise OperatorRefused(text) if self.bench.mode == "hardware" else AssertionError(text)
 
     def cut_power(self) -> None:
         """Take the RRC's power away for a moment."""

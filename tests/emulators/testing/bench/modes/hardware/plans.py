@@ -27,6 +27,10 @@ class Answers(Terminal):
         super().__init__()
         self._answers, self.asked = list(answers), list[str]()
 
+    def answer(self, *answers: str) -> None:
+        """Answer so after what was said before."""
+        self._answers += answers
+
     def prompt(self, text: str) -> str:
         self.asked.append(text)
         return self._answers.pop(0)
