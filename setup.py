@@ -1,17 +1,24 @@
-"""Refuse to build what has no modules, and keep the links in a source distribution.
+"""Refuse to build what has no modules, keep the links in a source distribution, compile a wheel.
 
+With TICKRIG_COMPILE=1 in the environment a wheel has extension modules too (docs/compiled.md).
 All else about the build stands in pyproject.toml.
 """
 
+import os
+import sys
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
-from setuptools import setup
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
 from setuptools.command.sdist import sdist
 
 FOLDERS = ("device", "emulators", "host", "wire")
 
-package = Path(__file__).parent / "src" / "tickrig"
-if missing := [name for name in FOLDERS if not (package / name / "__init__.py").is_file()]:
+PACKAGE = Path("src", "tickrig")  # where a build runs; tracebacks name these paths
+if missing := [name for name in FOLDERS if not (PACKAGE / name / "__init__.py").is_file()]:
     links = " ".join(f"../../{name}" for name in FOLDERS)
     raise SystemExit(
         f"src/tickrig/{missing[0]} is no link to {missing[0]}/: this checkout has no symbolic"
@@ -31,4 +38,50 @@ class LinkingSdist(sdist):
             Path(base_dir, link).symlink_to(target, target_is_directory=True)
 
 
-setup(cmdclass={"sdist": LinkingSdist})
+class ParallelBuildExt(build_ext):
+    """Compiles with every core: the modules are one library, and setuptools takes file by file."""
+
+    def build_extensions(self) -> None:
+        """Build all of them."""
+        one_by_one, cores = self.compiler.compile, os.cpu_count() or 1
+
+        def compile_all(sources: list[str], **options: Any) -> list[str]:
+            with ThreadPoolExecutor(cores) as pool:
+                made = pool.map(lambda source: one_by_one([source], **options), sources)
+                return [name for names in made for name in names]
+
+        self.compiler.compile, self.parallel = compile_all, cores
+        super().build_extensions()
+
+
+def compiled_modules() -> list[str]:
+    """Return the paths of the modules that are compiled, as pyproject.toml lists them."""
+    table = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["tickrig"]["compiled"]
+    found = {path for room in table["rooms"] for path in PACKAGE.glob(room)}
+    left_out = {path for names in table["left-out"] for path in PACKAGE.glob(names)}
+    return sorted(str(path) for path in found - left_out if path.stem != "__init__")
+
+
+def extensions() -> list[Extension]:
+    """Return the extension modules of a compiled wheel; of anything else, none."""
+    if "bdist_wheel" not in sys.argv:
+        return []
+    from mypyc.build import mypycify  # noqa: PLC0415 - only where something is compiled
+
+    made = mypycify(
+        compiled_modules(),
+        group_name="tickrig",  # of the library that mypyc puts beside the package
+        multi_file=True,  # so that all cores compile
+        opt_level=os.environ.get("MYPYC_OPT_LEVEL", "2"),
+    )
+    for extension in made:  # a product is rounded before it is added, whatever the processor can
+        extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]
+    return made
+
+
+COMPILE = os.environ.get("TICKRIG_COMPILE") == "1"
+setup(
+    cmdclass={"sdist": LinkingSdist, "build_ext": ParallelBuildExt},
+    setup_requires=["mypy[mypyc]>=2.4"] if COMPILE else [],
+    ext_modules=extensions() if COMPILE else [],
+)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.twin import Immutable
 
 
@@ -48,10 +49,10 @@ class InputSignal(Immutable):
     name: str
     text: str
     type: SignalType = SignalType.LEVEL
-    low: float = 0
-    high: float = 1
+    low: int | float = 0
+    high: int | float = 1
     unit: str = ""
-    initial: float = 0
+    initial: int | float = 0
     real: bool = False
 
 
@@ -70,6 +71,7 @@ class OutputSignal(Immutable):
     unit: str = ""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class QuantityBank:
     """The values of a device's physical inputs: whole numbers, and fractions where they are real.
 
@@ -174,6 +176,7 @@ class QuantityBank:
         return item
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class InputBank(QuantityBank):
     """The values of a device whose physical inputs are all whole numbers.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.twin import Copyable
 from tickrig.wire.errors import WireError
@@ -23,6 +24,7 @@ from tickrig.wire.modbus.rtu import (
 )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ModbusSlave(Copyable):
     """Answers a master on an RTU line.
 

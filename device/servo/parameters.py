@@ -5,9 +5,13 @@ Units are in the names; the presets are in `tickrig.device.servo.presets`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
 
 from tickrig.device.twin import Immutable
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,13 +153,13 @@ class ServoParameters(Immutable):
         return self.motor.coulomb_nm + self.gear.coulomb_nm / self.gear.ratio
 
 
-def require_positive(table: object, zero: tuple[str, ...] = ()) -> None:
+def require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> None:
     """Refuse a table with a number that is not above 0; those named in `zero` may be 0.
 
     Raises:
         ValueError: such a number.
     """
-    for name in table.__slots__:  # type: ignore[attr-defined] # a table has slots
+    for name in (item.name for item in fields(table)):
         value = getattr(table, name)
         if not (value > 0 or (name in zero and value == 0)):
             allowed = "0 or more" if name in zero else "more than 0"

@@ -7,24 +7,20 @@ from math import floor
 from tickrig.device.servo.heat import Heat
 from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import Plant
-from tickrig.device.servo.setting import Setting
+from tickrig.device.servo.settings import ServoSettings
 from tickrig.device.servo.thermal import Temperatures
-from tickrig.device.twin import Copyable
 
 
-class Readings(Copyable):
+class Readings(ServoSettings):
     """The servo as seen; `Servo` says what its attributes are.
 
     Whole numbers are what the drive measures, fractions what an observer sees.
     """
 
     __slots__ = (
-        "_ambient_c",
         "_degrees_per_count",
-        "_encoder_unplugged",
         "_heat",
         "_plant",
-        "_supply_v",
         "counts",
         "counts_per_turn",
         "current_limited",
@@ -34,22 +30,15 @@ class Readings(Copyable):
         "resting",
     )
 
-    supply_v = Setting(24.0)
-    ambient_c = Setting(25.0)
-    encoder_unplugged = Setting(False)
-
     def __init__(self, parameters: ServoParameters) -> None:
+        super().__init__(parameters.stage.supply_v)
         self.parameters, self._plant = parameters, Plant(parameters)
         self._heat = Heat(parameters, self.ambient_c)
         self.counts_per_turn = parameters.encoders.counts_per_turn
         self.gear_ratio = parameters.gear.ratio
         self._degrees_per_count = 360.0 / self.counts_per_turn / self.gear_ratio
-        self._supply_v = parameters.stage.supply_v
         self.now_us = self.counts = 0
         self.current_limited = self.resting = False
-
-    def changed(self) -> None:
-        """Take the settings into account: one of them is new."""
 
     @property
     def velocity_counts_s(self) -> int:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from enum import Enum
-from math import floor, inf
+from math import floor
 
 from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import Plant
 from tickrig.device.servo.readings import Readings
-from tickrig.device.servo.setting import Setting
 
 STEP_US = 1_000
 SLOW_US = 20_000  # between two looks at heat and overload
@@ -53,25 +52,14 @@ class Servo(Readings):
     """
 
     __slots__ = (
-        "_blocked",
-        "_current_limit_a",
         "_demand",
         "_limit_a",
         "_limit_v",
-        "_load_kg_m2",
-        "_load_nm",
         "_loops",
         "_lost_counts",
         "_off",
-        "_phase_open",
         "_values",
     )
-
-    load_nm = Setting(0.0)
-    load_kg_m2 = Setting(0.0)
-    blocked = Setting(False)
-    phase_open = Setting(False)
-    current_limit_a = Setting(inf)
 
     def __init__(self, parameters: ServoParameters) -> None:
         super().__init__(parameters)

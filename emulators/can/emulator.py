@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.can.end import Accepted, CanEnd
+from tickrig.emulators.can.bus_device import Accepted
+from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge, CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.record.candump_file import CandumpFile

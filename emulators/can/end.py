@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.device.core import Device
 from tickrig.device.twin import Copyable
+from tickrig.emulators.can.bus_device import Accepted, ErrorAware, Filtering
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -18,42 +19,6 @@ if TYPE_CHECKING:
 
 QUEUE_FRAMES: Final = 4_096
 """Frames that an end keeps, going out and as many coming in; more are lost and counted."""
-
-Accepted = frozenset[int] | None
-"""CAN-IDs that an end listens to, 29-bit ones with bit 29 set; None for all."""
-
-
-@runtime_checkable
-class Filtering(Protocol):
-    """A device that says which CAN-IDs it listens to.
-
-    A filter may pass more than the device wants, never less: the device itself
-    decides, frame by frame. So a frame that could change what it listens to lets
-    all that follow it pass, until the device has handled it.
-    """
-
-    @property
-    def accepts(self) -> Accepted:
-        """The CAN-IDs; None, for all, from power-on or a reset to the first tick."""
-        ...
-
-    @property
-    def reconfigured_by(self) -> frozenset[int]:
-        """CAN-IDs of the frames that may change `accepts` when they are handled."""
-        ...
-
-    @property
-    def on_accepts(self) -> list[Callable[[], None]]:
-        """Whom to call when `accepts` or `reconfigured_by` has changed, in a tick or between."""
-        ...
-
-
-@runtime_checkable
-class ErrorAware(Protocol):
-    """A device that is told the error state of its CAN controller."""
-
-    def bus_state(self, state: ErrorState, /) -> None:
-        """Hear of a change; it is seen to in the next tick."""
 
 
 def _ignore(at_us: int) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.twin import Copyable, Listeners
-from tickrig.emulators.can.end import Accepted, CanEnd
+from tickrig.emulators.can.bus_device import Accepted
+from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.segment import CanSegment
 from tickrig.emulators.can.transmission_outcomes import Observer
@@ -180,6 +182,7 @@ class CanWire(Copyable):
             self._babbler = None
 
 
+@mypyc_attr(native_class=False)  # a subclass of a class in C
 class _Endless(deque[CanFrame]):
     """A queue that is never empty: its node does not care for its error state either."""
 

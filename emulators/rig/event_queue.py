@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from heapq import heappop, heappush
-from typing import Any, Final
+from typing import Final
 
+from tickrig.device.twin import state_of
 from tickrig.wire.instant import NEVER
 
 Action = Callable[[int], None]
@@ -39,9 +40,9 @@ class EventQueue:
         """Let the rig stop at a time, for its watchers to look; as `put` of doing nothing."""
         self.put(key, t_us, _nothing)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> object:
         """Return the state without what was forgotten: it need not be copied."""
-        return {**vars(self), "_heap": sorted(filter(self._holds, self._heap))}
+        return state_of(self, {"_heap": sorted(filter(self._holds, self._heap))})
 
     def drop(self, key: Hashable) -> None:
         """Forget an action; one that is not there is no error."""

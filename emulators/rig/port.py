@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
-from tickrig.device.core import Device, W
+from tickrig.device.core import W
 
 
 class Port(Protocol[W]):
@@ -91,19 +90,6 @@ class Wire(Protocol):
     def advance_until_received(self, until_us: int, /) -> bool:
         """Let things end until a station was woken; False if none was by `until_us`."""
         ...
-
-
-@runtime_checkable
-class WirePort(Port[W], Protocol[W]):
-    """A port that says when traffic has arrived, so that nobody need look."""
-
-    @property
-    def wire(self) -> Wire:
-        """The wire it is an end of."""
-        ...
-
-    def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
-        """Serve a device: call `wake` with the time when traffic has arrived for it."""
 
 
 class OutsideBridge(Protocol):

@@ -8,12 +8,13 @@ from functools import partial
 from typing import Any, Final, Generic, TypeVar, overload
 
 from tickrig.device.core import Device, W
-from tickrig.device.twin import Copyable, Listeners, twin
+from tickrig.device.twin import Copyable, Listeners, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.port import Host, OutsideBridge, Port, Wire, WirePort
+from tickrig.emulators.rig.port import Host, OutsideBridge, Port, Wire
 from tickrig.emulators.rig.timetable import Timetable
+from tickrig.emulators.rig.wire_port import WirePort
 from tickrig.wire.instant import NEVER
 
 LATE_US: Final = 1_000
@@ -117,14 +118,14 @@ class Rig(Copyable):
         self.move_on(port.wire)
         return True
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> object:
         """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
         begun = {"_bridges": (), "_clock": VirtualClock(), "_jumps": not self._dense}
-        return {**vars(self), **begun, "acting_us": None}
+        return state_of(self, {**begun, "acting_us": None})
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: object) -> None:
         """Go on as the rig that was copied; its ports know no devices yet."""
-        vars(self).update(state)
+        restore(self, state)
         for station in self.stations:
             self._attach(station)
 

@@ -10,7 +10,16 @@ from typing import ClassVar
 
 import pytest
 
-from tickrig.device.twin import Cache, Copyable, Immutable, Listeners, NonCopyable, itself, twin
+from tickrig.device.twin import (
+    Cache,
+    Copyable,
+    Immutable,
+    Listeners,
+    NonCopyable,
+    itself,
+    pickler,
+    twin,
+)
 
 
 class Colour(Enum):
@@ -164,7 +173,5 @@ def test_a_closure_that_is_kept_as_state_is_refused() -> None:
 
 
 def test_an_item_that_was_shared_is_found_only_by_its_process() -> None:
-    from tickrig.device import twin as module  # noqa: PLC0415 - a private name
-
     with pytest.raises(TypeError, match="item 3 of a twin was shared within its process"):
-        module._shared(3)
+        pickler._shared(3)

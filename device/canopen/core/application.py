@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import Service
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -12,6 +12,7 @@ from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank
 from tickrig.wire.instant import NEVER
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Application(Service):
     """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
 
@@ -27,11 +28,10 @@ class Application(Service):
         outputs: what the world sees of it; `read` gives the values.
     """
 
-    outputs: Mapping[str, OutputSignal] = MappingProxyType({})
-
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.inputs = QuantityBank()
+        self.outputs: Mapping[str, OutputSignal] = {}
 
     def has_inputs(
         self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from operator import attrgetter
-from typing import Final, Self
+from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
@@ -67,7 +67,7 @@ class Dictionary:
     """All entries of one slave: values of its own, and a description that it shares.
 
     Args:
-        entries: in any order; they are kept sorted.
+        entries: in any order; they are kept sorted. Or the description of another dictionary.
         objects: names and kinds of arrays and records; a variable is called as its entry.
 
     Raises:
@@ -92,18 +92,17 @@ class Dictionary:
         entries: Iterable[EntryDescription],
         objects: Mapping[int, ObjectDescription] = NO_OBJECTS,
     ) -> None:
-        self._describe(DictionaryDescription(entries, objects))
-
-    def _describe(self, description: DictionaryDescription) -> None:
+        if isinstance(entries, DictionaryDescription):
+            description = entries
+        else:
+            description = DictionaryDescription(entries, objects)
         self.description, self._places = description, description.places
         self._entries = list(map(Entry, description.entries))
         self.by_multiplexer: dict[bytes, Entry] = {}
 
-    def copy(self) -> Self:
+    def copy(self) -> Dictionary:
         """Return the same objects with their default values, for another slave."""
-        twin = type(self).__new__(type(self))
-        twin._describe(self.description)
-        return twin
+        return Dictionary(self.description)
 
     @property
     def objects(self) -> Mapping[int, ObjectDescription]:

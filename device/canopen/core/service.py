@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Self
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.twin import Copyable
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
@@ -20,6 +21,7 @@ ALIVE = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
 ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Service(Copyable):
     """One communication service: SDO server, PDOs, SYNC, ...
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.wire.rtc_canopen.port_types import CanopenPortType
@@ -20,7 +20,7 @@ class CanopenPort(Generic[T]):
         port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
     """
 
-    direction: PortDirection
+    direction: ClassVar[PortDirection]
 
     def __init__(self, name: str, port_type: CanopenPortType[T]) -> None:
         self.name, self.port_type = name, port_type
@@ -48,8 +48,8 @@ class CanopenInPort(CanopenPort[T]):
         is_new: whether the bus has written since it was read, also the same value.
     """
 
-    direction = PortDirection.IN
-    is_new = False
+    direction: ClassVar[PortDirection] = PortDirection.IN
+    is_new: bool = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
         """Keep its value in these objects, and hear of each write."""
@@ -69,7 +69,7 @@ class CanopenInPort(CanopenPort[T]):
 class CanopenOutPort(CanopenPort[T]):
     """Where the component writes; its TPDO goes out once in a tick with a write."""
 
-    direction = PortDirection.OUT
+    direction: ClassVar[PortDirection] = PortDirection.OUT
 
     def write(self, value: T) -> None:
         """Leave a value; it is sent in Active, also if it is the same as before.

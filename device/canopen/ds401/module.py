@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.application import Application, number_of
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
@@ -85,6 +86,7 @@ def outputs_by_name(
     return {terminal.output.name: terminal for terminal in found}
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Ds401(Application):
     """Digital and analogue inputs and outputs, as the dictionary has them.
 
@@ -129,9 +131,7 @@ class Ds401(Application):
         self._faults = self._make_faults()
         self._lines = digital_input_names(self._digital_inputs.lines)
         self._terminals = outputs_by_name(self._digital_outputs, self._analogue_outputs)
-        self.outputs: Mapping[str, OutputSignal] = {
-            name: terminal.output for name, terminal in self._terminals.items()
-        }
+        self.outputs = {name: terminal.output for name, terminal in self._terminals.items()}
         self._has_physical_inputs()
         self._watch_objects()
 

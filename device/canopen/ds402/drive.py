@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
@@ -34,7 +35,6 @@ from tickrig.device.canopen.ds402.state.automaton import (
     command_of,
 )
 from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
-from tickrig.device.physical import OutputSignal
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
 
@@ -62,6 +62,7 @@ class AbortConnection(IntEnum):
     QUICK_STOP = 3
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Ds402(Application):
     """A drive of one axis.
 
@@ -106,7 +107,6 @@ class Ds402(Application):
     encoder_error: ClassVar[ErrorCode] = ErrorCode.INCREMENTAL_SENSOR
     limits_are_faults: ClassVar[bool] = False
     more_targets: ClassVar[tuple[int, ...]] = ()
-    outputs: Mapping[str, OutputSignal] = terminals.OUTPUTS
 
     axis: Axis
     switches: Switches
@@ -115,7 +115,7 @@ class Ds402(Application):
 
     def __init__(self, node: CanopenSlave, slot: int, servo: Servo | None = None) -> None:
         super().__init__(node, slot)
-        self._servo = servo
+        self._servo, self.outputs = servo, terminals.OUTPUTS
         motor: Motor = servo or IdealMotor()
         self.parameters = parameters = Parameters(node.dictionary)
         listed = parameters.number(indices.SUPPORTED_MODES)

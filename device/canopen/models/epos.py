@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import ClassVar, Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -79,6 +80,7 @@ PROFILE: Final = CommunicationProfile(
 )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Epos(Ds402):
     """A drive with Maxon's own modes, units and error codes.
 

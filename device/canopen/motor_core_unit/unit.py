@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
@@ -75,6 +76,7 @@ COOLING_US: Final = 1_000_000
 COOLED_C: Final = 0.1
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MotorCoreUnit(Application):
     """A brushless motor with strain wave gear, two encoders and driver (NEDO report, Table 5).
 
@@ -90,11 +92,10 @@ class MotorCoreUnit(Application):
         servo: motor, gear and loops.
     """
 
-    outputs = MappingProxyType({output.name: output for output in OUTPUTS})
-
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.has_inputs(INPUTS)
+        self.outputs = {output.name: output for output in OUTPUTS}
         self.servo = Servo(MOTOR_CORE_UNIT)
         self._shaft, self._references = Shaft(self.servo), References(node, self.request)
         self._motion = Motion(self._shaft, self._references)

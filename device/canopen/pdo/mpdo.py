@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
@@ -62,7 +62,7 @@ class MpdoQueue(TpdoMode):
     An event of an object that waits already adds no frame: the newest data are sent.
     """
 
-    timed = True
+    timed: ClassVar[bool] = True
 
     def __init__(self, sender: PdoSender, node_id: int = 0) -> None:
         super().__init__(sender)

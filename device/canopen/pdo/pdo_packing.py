@@ -65,7 +65,7 @@ def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
     for entry, bits in slots:
         end = position + bits // 8
         if entry is not None:
-            steps.append((make_write(entry), slice(position, end)))
+            steps.append((make_write(entry), position, end))
         position = end
     return partial(_split, steps)
 
@@ -92,9 +92,9 @@ def _join_present(entries: list[Entry]) -> bytes:
     return b"".join(map(present, entries))
 
 
-def _split(steps: list[tuple[Unpack, slice]], data: bytes) -> None:
-    for write, part in steps:
-        write(data[part])
+def _split(steps: list[tuple[Unpack, int, int]], data: bytes) -> None:
+    for write, start, end in steps:
+        write(data[start:end])
 
 
 class _Bits:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from tickrig.wire.instant import NEVER
 
@@ -42,7 +42,9 @@ class TpdoMode:
         on_sync: called with the counter of each SYNC, 0 if it has none.
     """
 
-    synchronous = timed = on_change = False
+    synchronous: ClassVar[bool] = False
+    timed: ClassVar[bool] = False
+    on_change: ClassVar[bool] = False
 
     def __init__(self, sender: PdoSender) -> None:
         self.sender, self.due_us = sender, NEVER
@@ -72,7 +74,8 @@ class Silent(TpdoMode):
 class SynchronousAcyclic(TpdoMode):
     """Type 0: sent with the SYNC after an event, and with the first one."""
 
-    synchronous = on_change = True
+    synchronous: ClassVar[bool] = True
+    on_change: ClassVar[bool] = True
 
     def __init__(self, sender: PdoSender) -> None:
         super().__init__(sender)
@@ -96,7 +99,7 @@ class SynchronousCyclic(TpdoMode):
     whose counter has that value, as in CANopenNode.
     """
 
-    synchronous = True
+    synchronous: ClassVar[bool] = True
 
     def __init__(self, sender: PdoSender) -> None:
         super().__init__(sender)
@@ -127,7 +130,7 @@ class SynchronousCyclic(TpdoMode):
 class RtrSynchronous(TpdoMode):
     """Type 252: sampled with SYNC, and when it begins; sent on a remote frame."""
 
-    synchronous = True
+    synchronous: ClassVar[bool] = True
 
     def __init__(self, sender: PdoSender) -> None:
         super().__init__(sender)
@@ -148,7 +151,8 @@ class EventDriven(TpdoMode):
     Not earlier than the inhibit time after the last one, then with the newest data.
     """
 
-    timed = on_change = True
+    timed: ClassVar[bool] = True
+    on_change: ClassVar[bool] = True
 
     def __init__(self, sender: PdoSender) -> None:
         super().__init__(sender)

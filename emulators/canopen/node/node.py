@@ -10,7 +10,7 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.physical import OutputSignal, QuantityBank
 from tickrig.device.twin import Copyable
-from tickrig.emulators.can.end import Accepted
+from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.noted_signal import NotedSignal, OnSet
 from tickrig.emulators.canopen.node.signals import (

@@ -60,5 +60,5 @@ def test_where_a_wheel_would_be_too_fast_all_are_slower() -> None:
 
 @pytest.mark.parametrize("name", ["wheel_radius_m", "base_radius_m", "response_s", "most_rad_s"])
 def test_a_number_that_is_not_above_0_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match=f"{name} 0 is not above 0"):
-        OmniParameters(**{name: 0})
+    with pytest.raises(ValueError, match=f"{name} 0.0 is not above 0"):
+        OmniParameters(**{name: 0.0})

@@ -166,9 +166,9 @@ def test_the_ground_never_changes_its_speed_faster_than_friction_allows(
     ("wrong", "error"),
     [
         ({"kind": "hexapod"}, "kind 'hexapod' is not one of differential, skid-steer"),
-        ({"wheel_radius_m": 0}, "wheel_radius_m 0 is not above 0"),
+        ({"wheel_radius_m": 0.0}, "wheel_radius_m 0.0 is not above 0"),
         ({"tread_m": float("nan")}, "tread_m nan is not above 0"),
-        ({"mass_kg": -1}, "mass_kg -1 is not 0 or more"),
+        ({"mass_kg": -1.0}, "mass_kg -1.0 is not 0 or more"),
         ({"friction": -0.1}, "friction -0.1 is not 0 or more"),
     ],
 )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.can.can_bench import Log, frames
 from tickrig.device.twin import Listeners
-from tickrig.emulators.can.end import Accepted
+from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame, Frames

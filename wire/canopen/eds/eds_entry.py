@@ -181,7 +181,7 @@ def _factor(file: EdsFile, section: str) -> float:
     try:
         factor = float(text or 1)
     except ValueError:
-        factor = 0
+        factor = 0.0
     if factor and math.isfinite(factor):
         return factor
     file.warn(section, f"Factor={shorten(text)} is no factor: 1 is taken")

@@ -109,7 +109,7 @@ class EntryDescription:
         signed: whether it is a signed integer.
         readable: the bus may read it.
         writable: the bus may write it.
-        shared_by_twins: copies of a slave within the process share it (`device/twin.py`).
+        shared_by_twins: copies of a slave within the process share it (`device/twin`).
         key: index and sub-index in one number.
     """
 

@@ -114,18 +114,18 @@ class _Initiate:
         return cls(*at, frame[4 : 4 + size], size if indicated else None)
 
 
+@dataclass(frozen=True, slots=True)
 class DownloadInitiateRequest(_Initiate):
     """Initiate SDO download."""
 
-    __slots__ = ()
-    COMMAND = ClientCommand.DOWNLOAD
+    COMMAND: ClassVar[int] = ClientCommand.DOWNLOAD
 
 
+@dataclass(frozen=True, slots=True)
 class UploadInitiateResponse(_Initiate):
     """Answer to `UploadInitiateRequest`."""
 
-    __slots__ = ()
-    COMMAND = ServerCommand.UPLOAD
+    COMMAND: ClassVar[int] = ServerCommand.UPLOAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +147,18 @@ class _Named:
         return cls(*index_sub(frame))
 
 
+@dataclass(frozen=True, slots=True)
 class UploadInitiateRequest(_Named):
     """Initiate SDO upload."""
 
-    __slots__ = ()
-    COMMAND = ClientCommand.UPLOAD
+    COMMAND: ClassVar[int] = ClientCommand.UPLOAD
 
 
+@dataclass(frozen=True, slots=True)
 class DownloadInitiateResponse(_Named):
     """Answer to `DownloadInitiateRequest`: expedited data is written, or segments may come."""
 
-    __slots__ = ()
-    COMMAND = ServerCommand.DOWNLOAD
+    COMMAND: ClassVar[int] = ServerCommand.DOWNLOAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,18 +208,18 @@ class _Toggled:
         return cls(bool(frame[0] & TOGGLE))
 
 
+@dataclass(frozen=True, slots=True)
 class UploadSegmentRequest(_Toggled):
     """Ask for the next segment."""
 
-    __slots__ = ()
-    COMMAND = ClientCommand.UPLOAD_SEGMENT
+    COMMAND: ClassVar[int] = ClientCommand.UPLOAD_SEGMENT
 
 
+@dataclass(frozen=True, slots=True)
 class DownloadSegmentResponse(_Toggled):
     """Answer to a `Segment` of a download."""
 
-    __slots__ = ()
-    COMMAND = ServerCommand.DOWNLOAD_SEGMENT
+    COMMAND: ClassVar[int] = ServerCommand.DOWNLOAD_SEGMENT
 
 
 Request = (

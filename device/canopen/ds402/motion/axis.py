@@ -25,7 +25,8 @@ class Axis:
     """
 
     def __init__(self, motor: Motor, settings: Settings) -> None:
-        self.motor, self.settings = motor, settings
+        self.motor: Motor = motor
+        self.settings = settings
         self.reference, self.control = Reference(), Control.POSITION
         self.zero, self.homed = 0.0, False
 
@@ -102,7 +103,7 @@ class Axis:
             motor.drive_position(reference.position, reference.velocity, reference.acceleration)
         elif control is Control.VELOCITY:
             motor.drive_velocity(reference.velocity, reference.acceleration)
-            reference.position = motor.counts
+            reference.position = float(motor.counts)
         else:
             motor.drive_current(reference.current_a)
             reference.place(motor.counts, motor.velocity_counts_s)

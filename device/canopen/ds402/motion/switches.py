@@ -15,7 +15,7 @@ POSITIVE_LIMIT: Final = 0x02
 HOME: Final = 0x04
 """Bits of 60FDh."""
 
-INPUTS: Final = (
+INPUTS: Final[tuple[InputSignal, ...]] = (
     InputSignal("negative_limit_switch", "limit switch in negative direction is pressed by hand"),
     InputSignal("positive_limit_switch", "limit switch in positive direction is pressed by hand"),
     InputSignal("home_switch", "home switch is pressed by hand"),

@@ -1,0 +1,110 @@
+"""Independent copies of machines by pickle; compiled code can make no pickler of its own."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping
+from copyreg import _slotnames  # type: ignore[attr-defined] # what pickle asks, too
+from enum import Enum
+from io import BytesIO
+from typing import Any, Final, NoReturn, TypeVar
+
+T = TypeVar("T")
+
+NOTHING: Final[Mapping[str, object]] = {}
+
+
+def state_of(machine: object, begun: Mapping[str, object] = NOTHING) -> Any:
+    """Return the state that a twin begins with; for `__getstate__`, of compiled classes too.
+
+    Args:
+        machine: what is copied.
+        begun: attributes, and what they are in a twin whatever the original has.
+
+    Returns:
+        Its attributes by name; where some are not in its `__dict__` a pair, of those that are
+        and the others.
+    """
+    state: Any
+    compiled = getattr(type(machine), "__mypyc_attrs__", None)
+    if compiled is None:
+        state = object.__getstate__(machine)
+    else:
+        names = (*compiled, *_slotnames(type(machine)))
+        own = {name: getattr(machine, name) for name in names if hasattr(machine, name)}
+        state = own.pop("__dict__", None) or getattr(machine, "__dict__", None), own
+    if not begun:
+        return state
+    if isinstance(state, tuple):
+        return state[0], {**state[1], **begun}
+    return {**(state or {}), **begun}
+
+
+def restore(machine: object, state: Any) -> None:
+    """Give a twin the state that `state_of` returned; for `__setstate__`."""
+    attributes, others = state if isinstance(state, tuple) else (state, {})
+    for name, value in {**(attributes or {}), **others}.items():
+        setattr(machine, name, value)
+
+
+def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
+    """Return an independent copy of a device, a wire or a rig, as it is now.
+
+    What is `Immutable` in it is shared.
+
+    Args:
+        machine: what is copied, with all that it refers to.
+        memo: of a `copy.deepcopy` that this is a part of: what was copied by `id`.
+
+    Raises:
+        TypeError: something in it belongs to its process, or is a closure or a lambda.
+    """
+    stream = BytesIO()
+    pickler = _Pickler(stream, memo or {})
+    try:
+        pickler.dump(machine)
+    except (AttributeError, pickle.PicklingError) as error:
+        what = machine[0] if isinstance(machine, tuple) else machine
+        raise TypeError(f"{type(what).__name__} cannot be copied: {error}") from error
+    stream.seek(0)
+    unpickler = _Unpickler(stream, pickler.shared)
+    copied: T = unpickler.load()
+    if memo is not None:
+        originals, copies = pickler.memo.copy(), unpickler.memo.copy()
+        memo.setdefault(id(memo), []).append(originals)  # kept alive, so that no id is used twice
+        memo.update((key, copies[place]) for key, (place, _) in originals.items())
+    return copied
+
+
+class _Pickler(pickle.Pickler):
+    """Writes places in `shared` instead of what twins share."""
+
+    def __init__(self, stream: BytesIO, known: dict[int, Any]) -> None:
+        super().__init__(stream, pickle.HIGHEST_PROTOCOL)
+        self.shared: list[object] = []
+        self._known = known
+
+    def reducer_override(self, item: object) -> Any:
+        if isinstance(item, (Enum, type)) or getattr(type(item), "shared_by_twins", False):
+            self.shared.append(item)
+        elif id(item) in self._known and item is not _shared:
+            self.shared.append(self._known[id(item)])
+        else:
+            return NotImplemented
+        return _shared, (len(self.shared) - 1,)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Finds what twins share where `_Pickler` has put it."""
+
+    def __init__(self, stream: BytesIO, shared: list[object]) -> None:
+        super().__init__(stream)
+        self._items = shared
+
+    def find_class(self, module: str, name: str) -> Any:
+        return self._items.__getitem__ if name == "_shared" else super().find_class(module, name)
+
+
+def _shared(place: int) -> NoReturn:
+    """Stand in a stream for the list that only the process has which wrote it."""
+    raise TypeError(f"item {place} of a twin was shared within its process")

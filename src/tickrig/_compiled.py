@@ -1,0 +1,15 @@
+"""Whether this installation is compiled (docs/compiled.md), and what tells mypyc about a class."""
+
+from importlib import import_module
+
+TYPE_CHECKING = False  # as typing has it, without importing it
+if TYPE_CHECKING:
+    from mypy_extensions import mypyc_attr as mypyc_attr  # noqa: PLC0414 - handed on
+else:
+
+    def mypyc_attr(*names, **settings):
+        """Mark a class for mypyc; in Python it changes nothing, and needs no package."""
+        return lambda marked: marked
+
+
+compiled: bool = not str(import_module("tickrig.wire.instant").__file__).endswith(".py")
