@@ -52,15 +52,6 @@ def row(sample: Sample) -> str:
     )
 
 
-def thin(samples: Sequence[Sample], period_s: float) -> list[Sample]:
-    """Keep the first sample of each period."""
-    kept: list[Sample] = []
-    for sample in samples:
-        if not kept or sample.time_s // period_s > kept[-1].time_s // period_s:
-            kept.append(sample)
-    return kept
-
-
 TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32"
 
 

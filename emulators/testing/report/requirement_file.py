@@ -42,7 +42,7 @@ def parse_requirements(text: str, file: str) -> tuple[Requirement, ...]:
     lines: dict[str, int] = {}
     mistakes: list[str] = []
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
-        name, *demand = line.split(maxsplit=1)[:2] or [COMMENT]
+        name, *demand = line.split(maxsplit=1) or [COMMENT]
         if name.startswith(COMMENT):
             continue
         if name in found:
