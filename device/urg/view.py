@@ -92,12 +92,9 @@ class View:
     def _numbers(self, ways_m: Sequence[float]) -> list[int]:
         """Return distances in mm, and codes."""
         near_m, far_m = self.kind.nearest_mm / 1_000, self.kind.farthest_mm / 1_000
+        weak, other = int(NoDistance.WEAK), int(NoDistance.OTHER)
         return [
-            NoDistance.WEAK
-            if way_m > far_m
-            else NoDistance.OTHER
-            if way_m < near_m
-            else round(way_m * 1_000)
+            weak if way_m > far_m else other if way_m < near_m else round(way_m * 1_000)
             for way_m in ways_m
         ]
 

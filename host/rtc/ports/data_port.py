@@ -13,6 +13,8 @@ from tickrig.wire.rtc_types.idl import Struct
 
 T = TypeVar("T", bound=Struct)
 
+_OK: Final = PortStatus.PORT_OK
+
 _OFFERED: Final[Mapping[str, str]] = {
     "dataport.interface_type": ", ".join(InterfaceType),
     "dataport.dataflow_type": ", ".join(DataflowType),
@@ -71,7 +73,7 @@ class OutPort(DataPort[T]):
         if not isinstance(value, self.data_type):
             wanted = self.data_type.__name__
             raise TypeError(f"{self.full_name} takes {wanted}, not {type(value).__name__}")
-        status = PortStatus.PORT_OK
+        status = _OK
         for connector in self.connectors:
             written = connector.write(value)
             status = status or written

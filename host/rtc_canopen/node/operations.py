@@ -11,7 +11,7 @@ from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role
 from tickrig.host.rtc_canopen.events import Notify, ServerEventType
 from tickrig.host.rtc_canopen.node.life_cycle import CONTROLWORD, ENABLING, LIFE_CYCLES
-from tickrig.host.rtc_canopen.proxy.proxy import ProxyRequest, ProxyRtc
+from tickrig.host.rtc_canopen.proxy.proxy import NOTHING, ProxyRequest, ProxyRtc
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 WELL_US: Final = 60_000_000
@@ -106,7 +106,7 @@ class NodeOperations:
 
     def carry_out(self, *, lost: bool) -> None:
         """Say on the bus what was asked for, unless the device is there already."""
-        if self.proxy is None or (requested := self.proxy.take_request()) is ProxyRequest.NOTHING:
+        if self.proxy is None or (requested := self.proxy.take_request()) is NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
         match requested:
@@ -128,7 +128,7 @@ class NodeOperations:
     def follow(self, state: NmtState, *, changed: bool) -> None:
         """Move the proxy to where the device says it is, unless that is about to change."""
         proxy = self.proxy
-        if proxy is None or self._dialogue.moves or proxy.requested is not ProxyRequest.NOTHING:
+        if proxy is None or self._dialogue.moves or proxy.requested is not NOTHING:
             return
         if self._stopping:
             self._stopping = state is not NmtState.STOPPED
@@ -169,7 +169,7 @@ class NodeOperations:
     def go_on(self) -> None:
         """Reset a node that was lost and is heard again, if a restart is left."""
         proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
-        if proxy is None or busy or proxy.requested is not ProxyRequest.NOTHING:
+        if proxy is None or busy or proxy.requested is not NOTHING:
             return
         if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
             proxy.contexts[0].reset_component(proxy)

@@ -36,6 +36,10 @@ class NodePhase(Enum):
     DUPLICATE = "duplicate"
 
 
+READY: Final = NodePhase.READY
+LISTENING: Final = NodePhase.LISTENING
+"""Looked up once: it takes 0.1 us, and each node asks in each period."""
+
 WATCHED: Final = (NodePhase.READY, NodePhase.DUPLICATE)
 """Phases in which heartbeats are awaited."""
 
@@ -210,7 +214,7 @@ class ServedNode:
         self.operations.now_us = now_us
         operations, restart = self.operations, self.operations.restart
         operations.carry_out(lost=self.lost)
-        if self.phase is NodePhase.READY and not self.lost:
+        if self.phase is READY and not self.lost:
             operations.go_on()
         if restart.to_activate and operations.is_inactive:
             restart.to_activate, self.to_start = False, True
@@ -231,7 +235,7 @@ class ServedNode:
 
     def _plan(self) -> None:
         due_us = min(self.dialogue.due_us, self._deadline_us)
-        if self.phase is NodePhase.LISTENING:
+        if self.phase is LISTENING:
             due_us = min(due_us, self._duplicates.sure_us)
         if due_us != self.due_us:
             self.due_us = due_us

@@ -274,3 +274,16 @@ def test_a_time_stamp_keeps_microseconds(now_us: int) -> None:
 
 def test_a_time_stamp_is_seconds_and_nanoseconds() -> None:
     assert Time.from_us(1_500_000) == Time(1, 500_000_000)
+
+
+class Nothing(Struct):
+    """A struct without fields."""
+
+
+def test_a_struct_is_made_by_place_by_name_or_of_zeros() -> None:
+    made = basic.TimedLong(Time(1), data=3)
+    assert made == basic.TimedLong(data=3, tm=Time(sec=1, nsec=0))
+    assert replace(made, data=4) == basic.TimedLong(Time(1), 4)
+    assert (basic.TimedLong(), Nothing()) == (basic.TimedLong(Time(), 0), Nothing())
+    with pytest.raises(TypeError, match="unexpected keyword argument 'late'"):
+        basic.TimedLong(late=1)  # type: ignore[call-arg]
