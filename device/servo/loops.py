@@ -44,6 +44,14 @@ class Loops:
         self._position = gains.position_rad_s
         self.integral_a, self.cut = 0.0, 0
 
+    @property
+    def gains(self) -> tuple[float, float, float, float, float, float]:
+        """For `RunAhead`: rad a count; gains of position, integral, error, speed, friction."""
+        return (
+            *(self._rad, self._position, self._integral),
+            *(self._proportional, self._viscous, self._dry),
+        )
+
     def follow(
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float
     ) -> float:

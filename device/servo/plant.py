@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import exp, pi
 
-from tickrig.device.servo.discretisation import STEP_S, discretise
+from tickrig.device.servo.discretisation import STEP_S, Row, discretise
 from tickrig.device.servo.parameters import ServoParameters
 
 
@@ -79,6 +79,20 @@ class Plant:
     def velocity_counts_s(self) -> float:
         """Speed of the motor, counts/s."""
         return self.speed_rad_s * self._counts_per_rad
+
+    @property
+    def rows(self) -> tuple[Row, Row]:
+        """What makes speed and angle after a step in which the current is led."""
+        return self._step.speed, self._step.angle
+
+    @property
+    def constants(self) -> tuple[float, float, float, float]:
+        """Torque constant, inductance, viscous friction, counts in a radian."""
+        motor = self._motor
+        return (
+            *(motor.torque_constant_nm_a, motor.inductance_h, motor.viscous_nm_s),
+            self._counts_per_rad,
+        )
 
     def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
         """Take another inertia or resistance; the speed stays."""

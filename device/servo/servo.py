@@ -9,6 +9,7 @@ from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import Plant
 from tickrig.device.servo.readings import Readings
+from tickrig.device.servo.run_ahead import Bounds, Demands, RunAhead, work_out
 
 STEP_US = 1_000
 SLOW_US = 20_000  # between two looks at heat and overload
@@ -99,6 +100,43 @@ class Servo(Readings):
             if self.resting:
                 self._wake()
             self._demand, self._values = demand, values
+
+    # several control steps in one go
+
+    @property
+    def plain_steps(self) -> int:
+        """How many control steps at most may be plain, so that `run_ahead` can work them out."""
+        feed = self._values[2]
+        special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
+        if special or feed != 0.0 or self._demand is not Demand.POSITION:
+            return 0
+        return (SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
+
+    def run_ahead(
+        self, demands: Demands, counts: tuple[float, float], error: float, standstill: float
+    ) -> RunAhead:
+        """Work out up to `plain_steps` control steps; they are not made.
+
+        Args:
+            demands: position and velocity for each of them, the first as it is demanded now.
+            counts: as in `Bounds`, where the run ends.
+            error: the same.
+            standstill: the same.
+        """
+        bounds = Bounds(self._limit_a, self._limit_v, counts, error, standstill)
+        encoder = self.counts, self._lost_counts
+        return work_out(self._plant, self._loops, encoder, demands, bounds)
+
+    def follow(self, run: RunAhead, position: float, velocity: float) -> None:
+        """Make the steps of a run, then have a position as `drive_position` does."""
+        plant, losses = self._plant, self._plant.losses
+        plant.position, plant.speed_rad_s = run.position, run.speed_rad_s
+        plant.current_a, self._loops.integral_a = run.current_a, run.integral_a
+        losses.electrical_j, losses.copper_j = run.electrical_j, run.copper_j
+        losses.friction_j, losses.square_a2s = run.friction_j, run.square_a2s
+        self.counts, self.current_limited = run.counts, False
+        self.now_us += run.steps * STEP_US
+        self._values = (position, velocity, 0.0)
 
     # time
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, SupportsIndex, TypeVar
 
 from tickrig.device.core import Device, W
+from tickrig.device.horizon import Horizon
 from tickrig.device.physical import OutputSignal
 from tickrig.device.twin import NonCopyable, itself
 from tickrig.emulators.rig.emulated import Inputs
@@ -136,6 +137,16 @@ class TracedDevice(Generic[W]):
     def read(self, name: str, /) -> Setting:
         """Return an output of the device."""
         return self._device.read(name)  # type: ignore[no-any-return]  # if it has some
+
+    @property
+    def horizon(self) -> Horizon | None:
+        """How far the device may work ahead."""
+        return getattr(self._device, "horizon", None)
+
+    @horizon.setter
+    def horizon(self, horizon: Horizon | None) -> None:
+        if hasattr(self._device, "horizon"):
+            self._device.horizon = horizon
 
     @property
     def accepts(self) -> frozenset[int] | None:

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, Final, Generic, TypeVar, overload
 
 from tickrig.device.core import Device, W
+from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
@@ -104,6 +105,7 @@ class Rig(Copyable):
         periods = {station.tick_us for station in stations}
         self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
         self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
+        self._horizon, self._until_us = Horizon(), 0
         self._wires: tuple[Wire, ...] = ()
         attached = [station for station in stations if self._attach(station)]
         self.stations, self._woken = stations, () if dense else tuple(attached)
@@ -111,11 +113,13 @@ class Rig(Copyable):
 
     def _attach(self, station: Station[Any]) -> bool:
         """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
-        port = station.port
+        port, device = station.port, station.device
         if not isinstance(port, WirePort):
             return False
-        port.attach(station.device, _ignore if self._dense else partial(self._enter, station))
+        port.attach(device, _ignore if self._dense else partial(self._enter, station))
         self.move_on(port.wire)
+        if hasattr(device, "horizon"):
+            device.horizon = None if self._dense else self._horizon
         return True
 
     def __getstate__(self) -> object:
@@ -187,6 +191,7 @@ class Rig(Copyable):
 
     def step(self) -> None:
         """Go to the next time with something to do, and do it; nothing if that never comes."""
+        self._foresee(0)
         if (next_us := self.next_us) != NEVER:
             self._happen(next_us)
 
@@ -198,6 +203,7 @@ class Rig(Copyable):
             host: where to look for something, if given.
         """
         self._enter_due()
+        self._foresee(t_us if host is None else 0)
         while (next_us := self._go_on(t_us, host)) <= t_us:
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
@@ -224,6 +230,7 @@ class Rig(Copyable):
         """
         deadline_us = self.now_us + timeout_us
         self._enter_due()
+        self._foresee(0)
         while not done():
             next_us = min(self._planned_us, self._wires_due_us)
             if next_us > deadline_us or next_us == NEVER:
@@ -232,6 +239,11 @@ class Rig(Copyable):
                 return done()
             self._happen(next_us)
         return True
+
+    def _foresee(self, until_us: int) -> None:
+        """Tell the devices until when nobody looks at them, if nobody comes by `until_us`."""
+        self._until_us, seen = until_us, self.watchers or self._couplings
+        self._horizon.until_us = 0 if seen else min(until_us, self.event_queue.due_us - 1)
 
     def _enter_due(self) -> None:
         """Enter what has come due between steps: inputs set, a dictionary written."""
@@ -298,6 +310,7 @@ class Rig(Copyable):
         finally:
             self.acting_us = None
         self._enter_due()
+        self._foresee(self._until_us)
 
     def _pass_to(self, t_us: int) -> None:
         """Let time pass in which no tick has work."""
@@ -308,7 +321,7 @@ class Rig(Copyable):
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:
             self._clock.wait_until(t_us)
-            self.now_us = t_us
+            self.now_us = self._horizon.passed_us = t_us
         self._open_us = self.now_us + 1
 
     def _run(self, now_us: int) -> None:
@@ -321,6 +334,7 @@ class Rig(Copyable):
         for wire in self._wires:
             wire.advance(now_us)
         self._tick(now_us)
+        self._horizon.passed_us = now_us
         self._couple(now_us)
         for bridge in self._bridges:
             bridge.give_out(now_us)

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
+from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.can_error import ErrorState
@@ -69,6 +70,7 @@ class CanopenSlave(Copyable):
         on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
         sync_handlers: the same as `on_sync`, for what belongs to the slave: RPDOs, TPDOs, then
             the application.
+        horizon: how far its application may work ahead; None, without a rig, for tick by tick.
         model: the ready-made model that it is, empty if it is none; for traces.
         boots: returns at the end of Initialising whether the node boots or stays there.
         admits: returns before each NMT command whether it is carried out.
@@ -96,6 +98,7 @@ class CanopenSlave(Copyable):
         self.entered: Callable[[NmtState, NmtState], None] | None = None
         self.time_of_day: TimeOfDay | None = None
         self.silent_until_us, self.model = 0, ""
+        self.horizon: Horizon | None = None
         self._powered = False
         self._out: list[CanFrame] = []
         self._handlers: dict[int, Handler]

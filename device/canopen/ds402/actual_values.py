@@ -79,6 +79,9 @@ class ActualValues:
     Args:
         drive: what is measured; its `measures` say how.
         dictionary: with the objects.
+
+    Attributes:
+        watched: somebody is told of each change.
     """
 
     def __init__(self, drive: Ds402, dictionary: Dictionary) -> None:
@@ -87,7 +90,7 @@ class ActualValues:
         self._entries = [entry for entry in found if entry is not None]
         for entry in self._entries:
             entry.source, entry.measured = self._shown, True
-        self._kept = True
+        self._kept, self.watched = True, False
 
     def keep(self) -> None:
         """Write all of them before something changes: they are shown up to the end of the tick."""
@@ -102,9 +105,10 @@ class ActualValues:
 
     def renew(self) -> None:
         """Show what the drive has come to; watchers are told."""
-        self._kept = False
+        self._kept = self.watched = False
         for entry in self._entries:
             if entry.watchers:
+                self.watched = True
                 entry.assign(self._encoded(entry))
 
     def _shown(self, entry: Entry) -> bytes:

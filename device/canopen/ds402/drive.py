@@ -35,6 +35,7 @@ from tickrig.device.canopen.ds402.state.automaton import (
     command_of,
 )
 from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
+from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
 
@@ -90,7 +91,6 @@ class Ds402(Application):
         outputs: what the world sees of it; `read` gives the values.
         parameters: its objects, by index.
         offered: the modes that it has and that its dictionary lists, by number.
-        axis: motor, reference, settings and zero.
         limits: of position and velocity, and what they cut.
         automaton: the state machine of CiA 402.
         supervision: of supply, temperature, encoder and following error.
@@ -98,7 +98,6 @@ class Ds402(Application):
         switches: limit switches and home switch.
         mode: the mode of operation at work.
         mode_number: its number, as in 6061h.
-        limited: a limit cut something in this step (bit 11 of the statusword).
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = MODES
@@ -108,7 +107,6 @@ class Ds402(Application):
     limits_are_faults: ClassVar[bool] = False
     more_targets: ClassVar[tuple[int, ...]] = ()
 
-    axis: Axis
     switches: Switches
     mode: Mode
     mode_number: int
@@ -121,21 +119,22 @@ class Ds402(Application):
         listed = parameters.number(indices.SUPPORTED_MODES)
         self.offered: Mapping[int, type[Mode]] = offered(self.modes, listed)
         self._supported = listed or supported(self.offered)
-        self.axis = Axis(motor, read_settings(parameters, motor.counts_per_turn))
-        self.switches, self.stopping = Switches(), Stopping(self.axis, parameters)
-        self.limits = Limits(self.axis, self.switches)
+        self._axis = Axis(motor, read_settings(parameters, motor.counts_per_turn))
+        self.switches, self.stopping = Switches(), Stopping(self._axis, parameters)
+        self.limits = Limits(self._axis, self.switches)
         self._view = DriveView(
             parameters=parameters,
-            axis=self.axis,
+            axis=self._axis,
             switches=self.switches,
             limits=self.limits,
             stopping=self.stopping,
         )
         self.mode, self.mode_number = Mode(self._view), 0
         self.automaton = Automaton(self.stopping, self._begin_mode)
-        self.supervision = Supervision(self.axis, self.bounds)
+        self.supervision = Supervision(self._axis, self.bounds)
         self.actual_values = ActualValues(self, node.dictionary)
-        self.limited, self._stale, self._winding_dc = False, True, 0
+        self._limited, self._stale, self._winding_dc = False, True, 0
+        self._stretch, self._requested = Stretch(self, self._axis, servo), True
         self._faults: list[int] = []
         self._lost: set[int] = set()
         plant = () if servo is None else terminals.PLANT_INPUTS
@@ -151,6 +150,25 @@ class Ds402(Application):
     def state(self) -> DriveState:
         """The state of the drive."""
         return self.automaton.state
+
+    @property
+    def axis(self) -> Axis:
+        """Motor, reference, settings and zero, as the latest tick left them."""
+        self._stretch.catch_up()
+        return self._axis
+
+    @property
+    def limited(self) -> bool:
+        """Whether a limit cut something in the latest tick (bit 11 of the statusword)."""
+        self._stretch.catch_up()
+        return self._limited
+
+    @property
+    def goes_on_plainly(self) -> bool:
+        """Whether its next ticks are those of its mode, and nobody is told of each."""
+        changes = self._stale or self.inputs.changed or self.actual_values.watched
+        waits = self.supervision.waiting or not self.switches.free
+        return self.automaton.operating and not (changes or waits)
 
     @property
     def enabled(self) -> bool:
@@ -179,15 +197,15 @@ class Ds402(Application):
 
     def power_on(self) -> None:
         """Count from 0 on."""
-        self.actual_values.keep()
-        axis = self.axis
+        self._interrupt()
+        axis = self._axis
         axis.motor.release()
         axis.zero, axis.homed = float(axis.motor.counts), False
 
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast; see `Application.without_power`."""
-        self.actual_values.keep()
-        motor = self.axis.motor
+        self._interrupt()
+        motor = self._axis.motor
         motor.release()
         motor.step_to(now_us)
         self._follow_inputs()
@@ -195,6 +213,7 @@ class Ds402(Application):
 
     def start(self) -> None:
         """Switch off."""
+        self._stretch.drop()
         self.actual_values.begin()
         self._faults.clear()
         self._lost.clear()
@@ -222,7 +241,7 @@ class Ds402(Application):
         """Act as 6007h says, while the motor has power."""
         if self.state not in MOVING:
             return
-        self.actual_values.keep()
+        self._interrupt()
         match self.parameters.number(indices.ABORT_CONNECTION):
             case AbortConnection.FAULT:
                 self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
@@ -236,24 +255,52 @@ class Ds402(Application):
 
     def on_execute(self, now_us: int) -> None:
         """Measure, watch, make a step, command the motor, show actual values."""
+        self._stretch.drop()
+        requested, self._requested = self._requested, False
         self.actual_values.begin()
-        self.axis.motor.step_to(now_us)
+        self._axis.motor.step_to(now_us)
         self._follow_outside()
         for code in self.supervision.step(now_us, powered=self.automaton.powered):
             self.fault(code)
-        self.limited = False
+        self._limited = False
         settled = self.automaton.run(self._operate, now_us)
         if self.automaton.powered:
-            self.axis.command()
+            self._axis.command()
         else:
-            self.axis.release()
+            self._axis.release()
         self._view.fresh = False
         self.actual_values.renew()
-        self._sleep(now_us, settled and not self.supervision.waiting)
+        self._sleep(now_us, settled and not self.supervision.waiting, requested=requested)
+
+    def request(self) -> None:
+        """Ask for `on_execute` in this tick; between two ticks, in the next one."""
+        self._requested = True
+        super().request()
+
+    def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
+        """Be as after ticks that a stretch has worked out.
+
+        Args:
+            ticks: how many.
+            now_us: time of the last of them.
+            position: of the reference.
+            velocity: of the reference.
+        """
+        axis = self._axis
+        axis.reference.place(position, velocity)
+        axis.reference.current_a = axis.motor.current_ma / 1_000
+        self.mode.skip(ticks)
+        self.supervision.skip(now_us)
+        self._limited = False
+
+    def _interrupt(self) -> None:
+        """Be where the latest tick has led, and show that: something is about to change."""
+        self._stretch.drop()
+        self.actual_values.keep()
 
     def _note(self, code: int) -> None:
         """Have a fault that the master knows already."""
-        self.actual_values.keep()
+        self._interrupt()
         self._faults.append(code)
         self.parameters.write(indices.ERROR_CODE, code)
         self.automaton.react(code)
@@ -277,15 +324,15 @@ class Ds402(Application):
 
     def _operate(self, now_us: int) -> bool:
         """Run one control period of the mode, or brake if that leads beyond a limit."""
-        mode, axis = self.mode, self.axis
+        mode, axis = self.mode, self._axis
         axis.control = mode.control
         position, velocity = axis.reference.position, axis.reference.velocity
         settled = mode.step(now_us)
-        self.limited = mode.limited
+        self._limited = mode.limited
         code = self.limits.reached() if mode.minds_limits else None
         if code is None:
             return settled
-        self.limited = True
+        self._limited = True
         axis.reference.place(position, velocity)
         if self.limits_are_faults:
             self.fault(code)
@@ -296,15 +343,15 @@ class Ds402(Application):
         self._configure()
         self._follow_inputs()
         if self.switches.by_angle:
-            self.switches.look(self.axis.motor.shaft_deg)
-        self.axis.wrap()
+            self.switches.look(self._axis.motor.shaft_deg)
+        self._axis.wrap()
 
     def _configure(self) -> None:
         if self._stale:
             self._stale = False
-            motor = self.axis.motor
+            motor = self._axis.motor
             motor.step_to(self.node.now_us)
-            self.axis.configure(read_settings(self.parameters, motor.counts_per_turn))
+            self._axis.configure(read_settings(self.parameters, motor.counts_per_turn))
 
     def _follow_inputs(self) -> None:
         inputs = self.inputs
@@ -320,11 +367,11 @@ class Ds402(Application):
         if self._servo is not None:
             terminals.load(self._servo, inputs)
 
-    def _sleep(self, now_us: int, settled: bool) -> None:
-        """Come back in the next tick, or each second while the winding cools, or never."""
-        motor = self.axis.motor
+    def _sleep(self, now_us: int, settled: bool, *, requested: bool) -> None:
+        """Come back when something happens, or each second while the winding cools, or never."""
+        motor = self._axis.motor
         if not (settled and motor.resting):
-            self.schedule(now_us + TICK_US)
+            self.schedule(now_us + TICK_US + self._stretch.plan(now_us, requested=requested))
             return
         self.actual_values.keep()
         if self._winding_dc != motor.winding_dc:
@@ -333,7 +380,7 @@ class Ds402(Application):
 
     def _controlled(self, entry: Entry) -> None:
         """Obey a new controlword, with what was configured before it."""
-        self.actual_values.keep()
+        self._interrupt()
         self._configure()
         before = self._view.controlword
         self._view.controlword = controlword = self.parameters.number(indices.CONTROLWORD)
@@ -354,7 +401,7 @@ class Ds402(Application):
         self._change_mode()
 
     def _change_mode(self) -> None:
-        self.actual_values.keep()
+        self._interrupt()
         number = self.parameters.number(indices.MODES_OF_OPERATION)
         if number in self.offered:
             self.mode_number = number

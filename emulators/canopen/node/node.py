@@ -8,6 +8,7 @@ from typing import ClassVar, Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.horizon import Horizon
 from tickrig.device.physical import OutputSignal, QuantityBank
 from tickrig.device.twin import Copyable
 from tickrig.emulators.can.bus_device import Accepted
@@ -114,6 +115,15 @@ class Node(Copyable):
         if self._pending:
             return 0
         return self.slave.due_us if self._on else self._coasts_us
+
+    @property
+    def horizon(self) -> Horizon | None:
+        """How far the slave may work ahead."""
+        return self.slave.horizon
+
+    @horizon.setter
+    def horizon(self, horizon: Horizon | None) -> None:
+        self.slave.horizon = horizon
 
     @property
     def accepts(self) -> Accepted:

@@ -101,6 +101,27 @@ class CyclicPosition(LatchedSetPoint):
         self._left -= 1
         return False
 
+    def ahead(self, steps: int) -> list[tuple[float, float]]:
+        """Return the rest of the line, and its end."""
+        if self._latched is not None or self.drive.fresh:
+            return []
+        position, left, most = self.reference.position, self._left, self.settings.max_velocity
+        line: list[tuple[float, float]] = []
+        for _ in range(steps):
+            if left:
+                velocity = (self._goal - position) / (left * STEP_S)
+                if not -most <= velocity <= most:
+                    break
+                position, left = position + velocity * STEP_S, left - 1
+                line.append((position, velocity + self._ahead))
+            else:
+                line.append((position, 0.0))
+        return line
+
+    def skip(self, steps: int) -> None:
+        """Be further on the line."""
+        self._left, self.limited = max(0, self._left - steps), False
+
     def _begin(self) -> None:
         settings = self.settings
         self._left = max(1, settings.interpolation_us // STEP_US)
@@ -150,6 +171,10 @@ class InterpolatedPosition(CyclicPosition):
         settled = super().run(now_us)
         self.flags = Statusword.MODE_12 | (Statusword.TARGET_REACHED if settled else 0)
         return settled
+
+    def ahead(self, steps: int) -> list[tuple[float, float]]:
+        """Return nothing: its bits in the statusword change on the way."""
+        return []
 
     def halt(self, now_us: int) -> bool:
         """Brake as 605Dh says; the next record begins a line."""

@@ -99,6 +99,19 @@ class Mode:
         """Run one control period; see `step`."""
         return self.halt(now_us)
 
+    def ahead(self, steps: int) -> list[tuple[float, float]]:
+        """Return position and velocity of the reference after each of the next steps.
+
+        Nothing is changed. What is left out, and what limits cut, is known step by step alone.
+
+        Args:
+            steps: how many at most, without input.
+        """
+        return []
+
+    def skip(self, steps: int) -> None:
+        """Go on as after so many steps; the reference is placed by who skips them."""
+
     def halt(self, now_us: int) -> bool:
         """Brake as 605Dh says; see `step`."""
         stands = self.drive.stopping.by(indices.HALT_OPTION)

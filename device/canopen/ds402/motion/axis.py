@@ -56,9 +56,22 @@ class Axis:
         """Counts from the motor to the reference."""
         return self.reference.position - self.motor.counts
 
+    @property
+    def unwrapped(self) -> tuple[float, float]:
+        """Lowest and highest counts, within a unit, at which `wrap` does nothing."""
+        low, high = self.settings.position_range
+        unit = self.settings.units.per_position
+        first, last = sorted((self.zero + (low + 1) * unit, self.zero + (high - 1) * unit))
+        return first, last
+
+    @property
+    def standstill(self) -> float:
+        """Velocity up to which the motor stands, in counts per second."""
+        return STANDSTILL_TURNS_S * self.motor.counts_per_turn
+
     def is_fast(self, velocity: float) -> bool:
         """Return whether a velocity in counts per second is more than standstill."""
-        return abs(velocity) > STANDSTILL_TURNS_S * self.motor.counts_per_turn
+        return abs(velocity) > self.standstill
 
     def position_of(self, counts: float) -> int:
         """Return the position of the user at these counts."""

@@ -67,6 +67,11 @@ class Switches:
         )
 
     @property
+    def free(self) -> bool:
+        """Whether no limit switch is pressed, nor could be by the shaft."""
+        return not (self.by_angle or self.word & (NEGATIVE_LIMIT | POSITIVE_LIMIT))
+
+    @property
     def negative_limit(self) -> bool:
         """Whether the negative limit switch is pressed."""
         return bool(self.word & NEGATIVE_LIMIT)

@@ -140,6 +140,11 @@ class Automaton:
         """Whether the motor may have torque."""
         return self.state in POWERED
 
+    @property
+    def operating(self) -> bool:
+        """Whether the mode of operation is at work, and is not being left."""
+        return self.state is DriveState.OPERATION_ENABLED and self._leaving is None
+
     def restart(self) -> None:
         """Be as after power-on."""
         self.state, self._leaving = DriveState.NOT_READY_TO_SWITCH_ON, None

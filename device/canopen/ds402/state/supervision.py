@@ -87,6 +87,10 @@ class Supervision:
             found.append(self._stall_code())
         return found
 
+    def skip(self, now_us: int) -> None:
+        """Go on as after ticks up to `now_us` in which the motor followed."""
+        self._error_us = self._stall_us = now_us
+
     def _loses_reference(self, now_us: int) -> bool:
         axis = self._axis
         controlled = axis.control is Control.POSITION
