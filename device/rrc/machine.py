@@ -146,7 +146,7 @@ class Rrc(Copyable):
         self._report_and_account(tick)
         running = self.state in POWERED_ON
         self._buzzer.tick(tick, self._drive.alarm_since if running else None)
-        self._due_us = self._next_due(tick) * TICK_US
+        self._due_us = min(self._next_due(tick) * TICK_US, NEVER)
         return b"".join(self._sent)
 
     def _boot(self, tick: int) -> None:
@@ -291,7 +291,7 @@ class Rrc(Copyable):
         self._drive, self._buzzer, self._load = Drive(), Buzzer(), LoadAccount()
 
     def _next_due(self, tick: int) -> int:
-        """Return the next tick at which something happens without input."""
+        """Return the next tick at which something happens without input, `NEVER` if none does."""
         settings, running = self._settings, self.state in POWERED_ON
         busy = self._buffer or self._load.backlog_pct or (settings.status and running)
         if busy or self._moved == tick:  # a new state looks at buttons from the next tick on
@@ -302,4 +302,4 @@ class Rrc(Copyable):
                 due = min(due, changes_at)
         if running and settings.watchdog_ticks:
             due = min(due, self._renewed + settings.watchdog_ticks)
-        return min(due, NEVER // TICK_US)
+        return due

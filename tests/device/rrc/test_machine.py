@@ -6,9 +6,6 @@ from tests.device.rrc.bench import RrcBench
 from tickrig.device.rrc.machine import Rrc
 from tickrig.wire.instant import NEVER
 
-LAST_TICK_US = NEVER // 10_000 * 10_000
-"""When it is due that waits for nothing."""
-
 
 def test_it_works_every_10_ms_and_begins_at_once() -> None:
     rrc = Rrc()
@@ -17,11 +14,11 @@ def test_it_works_every_10_ms_and_begins_at_once() -> None:
 
 def test_it_is_due_at_once_when_an_input_is_set_or_it_is_reset() -> None:
     bench = RrcBench().power_on()
-    assert bench.rrc.due_us == LAST_TICK_US
+    assert bench.rrc.due_us == NEVER
     bench.set(gauge=1)
     assert bench.rrc.due_us == 0
     bench.step()
-    assert bench.rrc.due_us == LAST_TICK_US
+    assert bench.rrc.due_us == NEVER
     bench.rrc.reset()
     assert bench.rrc.due_us == 0
 

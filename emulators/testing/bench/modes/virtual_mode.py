@@ -29,9 +29,6 @@ LOOK_US: Final = 1_000
 LOOKS: Final = 10_000
 """A condition is looked at each millisecond, in long waits so often."""
 
-ALMOST_NEVER: Final = NEVER // 2
-"""A device that has nothing to do has its next tick at the last one before `NEVER`."""
-
 EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
 
@@ -75,7 +72,7 @@ class VirtualMode(EmulatedMode):
         for_ever = until_us >= NEVER
         look_us = max(LOOK_US, (LONGEST_US if for_ever else within_us) // LOOKS)
         while not done():
-            if rig.now_us >= until_us or (for_ever and rig.next_us >= ALMOST_NEVER):
+            if rig.now_us >= until_us or (for_ever and rig.next_us == NEVER):
                 return False  # time that nothing ends does not pass: the bench keeps its age
             rig.run_until(done, min(look_us, until_us - rig.now_us))
         return True
