@@ -17,10 +17,21 @@ class Bridge:
     The line keeps its baud rate: what the outside writes at once arrives at the
     device byte by byte, and what does not fit into the line's buffer stays in
     the outside's until it does.
+
+    Args:
+        end: the host's end of the line.
+        outside: where the host is.
+        attend: called with the time instead of a poll, as long as the line has no room for
+            what was taken before.
     """
 
-    def __init__(self, end: ByteEnd, outside: Port[bytes]) -> None:
-        self._end, self._outside = end, outside
+    def __init__(
+        self,
+        end: ByteEnd,
+        outside: Port[bytes],
+        attend: Callable[[int], object] = lambda now_us: None,
+    ) -> None:
+        self._end, self._outside, self._attend = end, outside, attend
         self._pending = b""
         self._looked_us = 0
 
@@ -36,7 +47,9 @@ class Bridge:
         written right after that look: a host is not charged a tick for being
         polled.
         """
-        if not self._pending:
+        if self._pending:
+            self._attend(now_us)
+        else:
             self._pending = self._outside.poll(now_us)
         if self._pending:
             room = self._end.room(self._looked_us)

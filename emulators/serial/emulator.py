@@ -34,6 +34,9 @@ class Outside(Port[bytes], Protocol):
         """What the host has set it to, if that is not what the device has."""
         ...
 
+    def attend(self, now_us: int, /) -> None:
+        """Let hosts come and go, but take nothing: the line has no room."""
+
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
@@ -93,7 +96,9 @@ class Emulator(RunningEmulator):
             self.log = WireLog(splitter=line.splitter)
         station = Station(TracedDevice(device, trace) if trace else device, port)
         self.host_end = HostEnd(self.line.b, self.log.hear)
-        bridges = [Bridge(self.line.b, Tap(outside, self.log.hear))] if outside else []
+        bridges = []
+        if outside:
+            bridges = [Bridge(self.line.b, Tap(outside, self.log.hear), outside.attend)]
         self.rig = Rig(station, bridges=bridges, clock=clock, event_queue=self.event_queue)
 
     @property

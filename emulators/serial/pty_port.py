@@ -113,13 +113,17 @@ class PtyPort(NonCopyable):
 
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""
-        if self._setting is not None:
-            self._setting.look(now_us)
-        self._flush()
+        self.attend(now_us)
         try:
             return os.read(self._master, READ_BYTES)
         except BlockingIOError:
             return b""
+
+    def attend(self, now_us: int, /) -> None:
+        """Look at what the host has set, and give it what is kept for it."""
+        if self._setting is not None:
+            self._setting.look(now_us)
+        self._flush()
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Write as much as fits; keep the rest for later."""

@@ -43,6 +43,11 @@ class SerialHub(NonCopyable):
         """Take what the hosts sent."""
         return b"".join([port.poll(now_us) for port in self._ports])
 
+    def attend(self, now_us: int, /) -> None:
+        """Let hosts come and go, and give them what is kept for them."""
+        for port in self._ports:
+            port.attend(now_us)
+
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Send to every host."""
         for port in self._ports:

@@ -37,7 +37,7 @@ class HostConnection:
 
     def __init__(self, connection: socket.socket, buffer_bytes: int) -> None:
         self.connection, self._buffer_bytes = connection, buffer_bytes
-        self._unsent = bytearray()
+        self._unsent, self._held = bytearray(), b""
         self._stuck_us: int | None = None
         self._last_words_us: int | None = None
         self.over, self.mistake, self.is_idle, self.lost = False, "", True, 0
@@ -56,14 +56,19 @@ class HostConnection:
         return self.over or stuck or self._last_words_us is not None
 
     def poll(self, now_us: int) -> bytes:
-        """Take some of what it sent."""
-        self._flush(now_us)
-        self.is_idle = True
-        if self._last_words_us is not None:
-            self.over |= now_us >= self._last_words_us
-        if self.over or self._last_words_us is not None or not self._may_read:
-            return b""
-        return self._take_in(self._read(now_us))
+        """Take some of what it sent; what was held comes first."""
+        if not self._held:
+            return self._look(now_us)
+        data, self._held, self.is_idle = self._held, b"", False
+        if self._last_words_us is not None:  # it is answered from now on
+            self._last_words_us = now_us + LAST_WORDS_US
+        return data
+
+    def hold(self, now_us: int) -> None:
+        """Negotiate while another host has the line, and keep some of what it sends."""
+        if len(self._held) < READ_BYTES and not self.has_ended(now_us):
+            self._held += self._look(now_us)
+        self.over |= self.has_ended(now_us) and not self._held  # it has not waited
 
     def send(self, now_us: int, traffic: bytes) -> None:
         """Send as much as fits, and keep the rest for later."""
@@ -71,7 +76,23 @@ class HostConnection:
             self.lost += len(traffic)
         else:
             self._unsent += self._give_out(traffic)
-        self._flush(now_us)
+        self.flush(now_us)
+
+    def flush(self, now_us: int) -> None:
+        """Send of what is kept as much as fits."""
+        sent = 0
+        try:
+            if self._unsent and not self.over:
+                sent = self.connection.send(self._unsent)
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.over = True
+        del self._unsent[:sent]
+        if sent or not self._unsent:
+            self._stuck_us = None
+        elif self._stuck_us is None:
+            self._stuck_us = now_us
 
     def close(self) -> None:
         """Hang up."""
@@ -91,6 +112,16 @@ class HostConnection:
         """Return how it is sent to the host."""
         return traffic
 
+    def _look(self, now_us: int) -> bytes:
+        """Take some of what comes."""
+        self.flush(now_us)
+        self.is_idle = True
+        if self._last_words_us is not None:
+            self.over |= now_us >= self._last_words_us
+        if self.over or self._last_words_us is not None or not self._may_read:
+            return b""
+        return self._take_in(self._read(now_us))
+
     def _read(self, now_us: int) -> bytes:
         try:
             data = self.connection.recv(READ_BYTES)
@@ -103,21 +134,6 @@ class HostConnection:
         if not data:
             self._last_words_us = now_us + LAST_WORDS_US
         return data
-
-    def _flush(self, now_us: int) -> None:
-        sent = 0
-        try:
-            if self._unsent and not self.over:
-                sent = self.connection.send(self._unsent)
-        except BlockingIOError:
-            pass
-        except OSError:
-            self.over = True
-        del self._unsent[:sent]
-        if sent or not self._unsent:
-            self._stuck_us = None
-        elif self._stuck_us is None:
-            self._stuck_us = now_us
 
 
 def _tune(connection: socket.socket) -> None:

@@ -42,7 +42,9 @@ class NetworkPort(NonCopyable):
     """A `Port[bytes]` that a host reaches over TCP; hosts may come and go, one at a time.
 
     A second host is told so in a line of text and is left, unless the present one sends no
-    more, or has not read for 30 s. While there is no host, what the device sends is gone, as
+    more, or has not read for 30 s. Whether it does is known only behind all that it sent: until
+    that is on the line one more host is listened to, and a little of what it sends is kept.
+    While there is no host, what the device sends is gone, as
     on a line without one. Nothing here ever waits, and what is kept for a host is bounded. There
     is no password: a port that other machines can reach is warned of.
 
@@ -66,6 +68,7 @@ class NetworkPort(NonCopyable):
         self._listener = _listen(url)
         self._buffer_bytes, self._baud = buffer_bytes, 115_200
         self._host: HostConnection | None = None
+        self._next: tuple[HostConnection, str] | None = None
         self._dismissed: list[DismissedHost] = []
         self._lost, self._peer, self._quiet_until_us = 0, "", 0
         self._setting: HostSetting | None = None
@@ -105,15 +108,25 @@ class NetworkPort(NonCopyable):
         """Take some of what the host sent; let hosts come and go."""
         data = self._host.poll(now_us) if self._host else b""
         if self._host and self._host.mistake:
-            self._leave(self._host, now_us)
+            self._leave(self._host, self._peer, now_us)
+            self._forget(self._host)
         elif self._host and self._host.over:
             self._hang_up()
+        self.attend(now_us)
+        self._let_in(now_us)
+        return data
+
+    def attend(self, now_us: int, /) -> None:
+        """Let hosts come and go, and give them what is kept for them, but take nothing.
+
+        It is called between polls as long as the line has no room for what was taken before.
+        """
+        if self._host is not None:
+            self._host.flush(now_us)
         self._dismissed = [host for host in self._dismissed if not host.is_gone(now_us)]
-        if self._host is None or self._host.is_idle or self._host.has_ended(now_us):
-            self._accept(now_us)
+        self._attend_next(now_us)
         if self._setting is not None:
             self._setting.look(now_us)
-        return data
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Send to the host, if there is one, as much as fits; keep the rest for later."""
@@ -125,6 +138,8 @@ class NetworkPort(NonCopyable):
         self._hang_up()
         for host in self._dismissed:
             host.close()
+        if self._next is not None:
+            self._next[0].close()
         self._listener.close()
         self._setting = None
 
@@ -132,18 +147,37 @@ class NetworkPort(NonCopyable):
     def _present_setting(self) -> str:
         return self._host.setting if self._host else ""
 
-    def _accept(self, now_us: int) -> None:
-        try:
-            connection, address = self._listener.accept()
-        except OSError:  # nobody, or gone again, or no descriptor is left
+    def _attend_next(self, now_us: int) -> None:
+        """Accept the next host, and listen to it until the line is its own."""
+        if self._next is None:
+            with suppress(OSError):  # nobody, or gone again, or no descriptor is left
+                connection, address = self._listener.accept()
+                self._next = self._connected(connection), "{}:{}".format(*address[:2])
             return
-        peer = "{}:{}".format(*address[:2])
-        if self._host is not None and not self._host.has_ended(now_us):
-            self._refuse(connection, peer, now_us)
+        host, peer = self._next
+        host.hold(now_us)
+        if host.mistake:
+            self._leave(host, peer, now_us)
+        elif host.over:
+            host.close()
+        else:
             return
-        self._hang_up()
-        self._host, self._peer = self._connected(connection), peer
-        _log.info("%s: host %s", self.url, peer)
+        self._next = None
+
+    def _let_in(self, now_us: int) -> None:
+        """Give the line to the next host, or refuse it, as soon as it is known which."""
+        if self._next is None:
+            return
+        host, peer = self._next
+        if self._host is None or self._host.has_ended(now_us):
+            self._hang_up()
+            self._host, self._peer = host, peer
+            _log.info("%s: host %s", self.url, peer)
+        elif self._host.is_idle:
+            self._refuse(host.connection, peer, now_us)
+        else:
+            return
+        self._next = None
 
     def _connected(self, connection: socket.socket) -> HostConnection:
         if self.url.startswith("socket:"):
@@ -161,11 +195,10 @@ class NetworkPort(NonCopyable):
         self._warn(now_us, f"{reason}; {peer} was refused")
         self._dismiss(connection, now_us, reason)
 
-    def _leave(self, host: HostConnection, now_us: int) -> None:
+    def _leave(self, host: HostConnection, peer: str, now_us: int) -> None:
         """Send a host away that cannot be understood."""
-        self._warn(now_us, f"{self.url}: host {self._peer} was left: {host.mistake}")
+        self._warn(now_us, f"{self.url}: host {peer} was left: {host.mistake}")
         self._dismiss(host.connection, now_us, host.mistake)
-        self._forget(host)
 
     def _dismiss(self, connection: socket.socket, now_us: int, reason: str) -> None:
         self._dismissed.append(DismissedHost(connection, now_us, reason))

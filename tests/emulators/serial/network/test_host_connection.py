@@ -111,3 +111,34 @@ def test_a_host_that_is_gone_is_over_and_sending_to_it_is_nothing(ends: Ends) ->
     assert connection.over
     connection.send(0, b"RRC\n")
     assert connection.poll(0) == b""
+
+
+def test_what_is_held_comes_first_and_is_little(ends: Ends) -> None:
+    connection, host = ends
+    host.send(b"a" * 3 * READ_BYTES)
+    for _ in range(5):
+        connection.hold(0)
+    assert connection.poll(0) == b"a" * READ_BYTES
+    assert not connection.is_idle
+    host.send(b"b")
+    rest = b"".join(connection.poll(0) for _ in range(4))
+    assert rest == b"a" * 2 * READ_BYTES + b"b"
+
+
+def test_one_that_ended_while_it_was_held_is_answered_from_its_turn_on(ends: Ends) -> None:
+    connection, host = ends
+    host.send(b"device\n")
+    host.shutdown(socket.SHUT_WR)
+    for now_us in (0, 1, 5 * LAST_WORDS_US):
+        connection.hold(now_us)
+    assert (connection.over, connection.poll(9 * LAST_WORDS_US)) == (False, b"device\n")
+    assert connection.poll(10 * LAST_WORDS_US - 1) == b""
+    connection.send(10 * LAST_WORDS_US - 1, b"RRC\n")
+    assert (connection.over, read_all(host)) == (False, b"RRC\n")
+
+
+def test_one_that_left_while_it_was_held_is_over(ends: Ends) -> None:
+    connection, host = ends
+    host.close()
+    connection.hold(0)
+    assert connection.over

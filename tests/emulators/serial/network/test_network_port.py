@@ -8,19 +8,22 @@ import logging
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 
 import pytest
 
+from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.network.host_connection import LAST_WORDS_US, STUCK_US
 from tickrig.emulators.serial.network.network_port import MAX_DISMISSED, QUIET_US, NetworkPort
 from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
 from tickrig.emulators.serial.serial_hub import SerialHub
+from tickrig.emulators.serial.serial_line import SerialLine
 
 pytestmark = pytest.mark.realtime
 
 PATIENCE_S = 10.0
 SET_9600 = b"\xff\xfa\x2c\x01\x00\x00\x25\x80\xff\xf0"
+IS_9600 = b"\xff\xfa\x2c\x65\x00\x00\x25\x80\xff\xf0"
 
 
 @contextmanager
@@ -130,6 +133,70 @@ def test_the_next_host_is_taken_when_all_of_the_last_one_was(last: bytes) -> Non
         with connected(port) as host:
             host.send(b"#")
             assert until(port, lambda received: received.endswith(b"#")) == last + b"#"
+
+
+def negotiated(host: socket.socket, look: Callable[[], object]) -> None:
+    """Look until a setting of the host is answered; it has asked for it."""
+    host.setblocking(False)
+    answer, deadline = b"", time.monotonic() + PATIENCE_S
+    while not answer.endswith(IS_9600):
+        assert time.monotonic() < deadline, answer
+        look()
+        with suppress(BlockingIOError):
+            answer += host.recv(1_000)
+    host.settimeout(PATIENCE_S)
+
+
+def test_the_next_host_negotiates_while_bytes_of_the_last_one_are_still_to_be_taken() -> None:
+    with served("rfc2217") as port:
+        host = greeted(port)
+        host.send(b"x" * 20_000)
+        host.close()
+        port.poll(0)  # it is not idle: the first kilobyte of its bytes
+        with connected(port) as host:
+            host.send(SET_9600 + b"#")
+            negotiated(host, lambda: port.attend(0))
+            assert port.host_setting == ""
+            assert until(port, lambda received: b"#" in received).strip(b"x") == b"#"
+            port.send(0, b"hello")
+            assert host.recv(100) == b"hello"
+
+
+def test_the_next_host_negotiates_while_the_line_is_full() -> None:
+    line = SerialLine(baud=300)
+    with served("rfc2217") as port, greeted(port) as last:
+        bridge = Bridge(line.b, port, port.attend)
+        last.send(b"x" * 8_000)
+        while line.b.room(0):
+            bridge.take_in(0)
+        bridge.take_in(0)
+        last.close()
+        with connected(port) as host:
+            host.send(SET_9600)
+            negotiated(host, lambda: bridge.take_in(0))
+
+
+def test_a_host_that_comes_while_another_has_still_to_be_heard_is_refused_in_the_end() -> None:
+    with served() as port, greeted(port) as first:
+        first.send(b"x" * 3_000)
+        with connected(port) as second:
+            second.send(b"let me in")
+            received = until(port, lambda received: len(received) == 3_000)
+            told = f"{port.url} has a host already: {{}}:{{}}\r\n".format(*first.getsockname())
+            received += until(port, lambda _: not port.poll(0) and bool(port._dismissed))
+            assert second.recv(1_000).decode() == told
+            assert received == b"x" * 3_000
+
+
+def test_a_host_that_has_not_waited_for_the_line_makes_room_for_others() -> None:
+    with served("rfc2217") as port, greeted(port) as first:
+        first.send(b"x" * 3_000)
+        port.poll(0)
+        with connected(port):
+            port.attend(0)
+        with connected(port) as host:
+            host.send(SET_9600)
+            negotiated(host, lambda: port.attend(0))
 
 
 def test_a_host_that_ended_its_sending_is_answered_for_a_while() -> None:

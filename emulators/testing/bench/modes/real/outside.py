@@ -70,7 +70,8 @@ class Outside:
         own = self._own_port(door.link)
         served = [self._serve(url) for url in door.serve]
         self.ports[mount.name] = [own, *served]
-        self.bridges.append(Bridge(mount.line.b, SerialHub([own, *served]) if served else own))
+        hub = SerialHub([own, *served])
+        self.bridges.append(Bridge(mount.line.b, hub, hub.attend))
         url = own.url if isinstance(own, NetworkPort) else own.path
         self.places[mount.name] = LinePlace(url, mount.settings.baud)
 
