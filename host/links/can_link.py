@@ -14,11 +14,17 @@ from typing import Any, Final
 
 import can
 
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import CONTROLLER_BYTE, ControllerFlag, ErrorClass, ErrorState
+from tickrig.wire.can_error import (
+    CONTROLLER_BYTE,
+    ControllerFlag,
+    ErrorClass,
+    ErrorFrame,
+    ErrorState,
+)
 
 DRIFT: Final = 5_000
 """Two clocks part by less than one in so many: 200 ppm."""
@@ -103,11 +109,13 @@ class CanLink:
 
     Attributes:
         lost: frames that the bus did not take.
+        on_error_frame: called with each error frame that the driver tells of.
         on_error_state: called with the error state of the controller, where the driver says it.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
         self._bus, self._name, self._drops, self.lost = bus, name, drops, 0
+        self.on_error_frame: Callable[[ErrorFrame], object] = lambda frame: None
         self.on_error_state: Callable[[ErrorState], None] | None = None
         self._stamps, self._polled_us = StampClock(), self.now_us
 
@@ -206,7 +214,8 @@ class CanLink:
             raise LinkClosed(f"cannot read from {self._name}: {error}") from error
 
     def _take(self, message: can.Message) -> StampedFrames:
-        if message.is_error_frame:
+        if (error := to_error_frame(message)) is not None:
+            self.on_error_frame(error)
             state = _error_state(message)
             if state is not None and self.on_error_state is not None:
                 self.on_error_state(state)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import can
 
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 
 
 def to_message(frame: CanFrame, at_us: int = 0) -> can.Message:
@@ -35,3 +36,11 @@ def to_frame(message: can.Message) -> CanFrame | None:
         message.is_extended_id,
         message.dlc if remote else 0,
     )
+
+
+def to_error_frame(message: can.Message) -> ErrorFrame | None:
+    """Return what an error frame says; None for any other message."""
+    if not message.is_error_frame:
+        return None
+    data = bytes(message.data)[:8].ljust(8, b"\0")
+    return ErrorFrame(message.arbitration_id & ERROR_CLASS_MASK, data)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import can
 
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import CAN_FD, Tally
-from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
+from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import WireError
 
 BAD_FRAMES = "frames that CAN cannot have"
@@ -22,9 +22,7 @@ def to_record(message: can.Message, channel: str, tally: Tally) -> Record | None
     except ValueError:
         tally.passed_over[NO_TIME] += 1
         return None
-    if message.is_error_frame:
-        data = bytes(message.data)[:8].ljust(8, b"\0")
-        error = ErrorFrame(message.arbitration_id & ERROR_CLASS_MASK, data)
+    if (error := to_error_frame(message)) is not None:
         return Record(at_us, channel, error, not message.is_rx)
     frame = to_frame(message)
     try:

@@ -55,3 +55,43 @@ def test_tests_run_on_real_devices(pytester: pytest.Pytester, run: Run) -> None:
     )
     tests = read_run(pytester.path / "run.json").tests
     assert [test.mode for test in tests] == ["hardware"] * 4
+
+
+def test_an_error_frame_of_a_real_bus_fails_the_test(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makefile(
+        ".toml",
+        rig="""
+        [device.drive]
+        type = "epos"
+        node_id = 5
+        [hardware.can]
+        interface = "virtual"
+        channel = "error frames"
+        """,
+    )
+    pytester.makepyfile(
+        """
+        import can
+        import pytest
+
+        def disturb(bench):
+            host = bench.can_bus()
+            with can.Bus("error frames", "virtual") as drive:
+                drive.send(can.Message(arbitration_id=0x88, data=b"\\0\\0\\4", is_error_frame=True))
+            host.recv(0)
+
+        def test_disturbed(bench):
+            disturb(bench)
+
+        @pytest.mark.allows("error frames")
+        def test_allowed(bench):
+            disturb(bench)
+
+        def test_quiet(bench):
+            bench.can_bus().recv(0)
+        """
+    )
+    result = run("--bench", "rig.toml", "--bench-mode", "hardware")
+    skip_if_too_slow(result)
+    result.assert_outcomes(passed=2, failed=1)
+    result.stdout.fnmatch_lines(["can: an error frame that no fault ordered, at * bit stuffing*"])

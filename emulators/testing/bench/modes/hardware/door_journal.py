@@ -12,11 +12,11 @@ from weakref import WeakSet
 
 from tickrig.emulators.testing.bench.journal import Journal
 from tickrig.emulators.testing.bench.modes.hardware.port_record import PortRecord
-from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, HostPace
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, HostPace, Seen
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting
-from tickrig.wire.can import Frames
+from tickrig.wire.can import CanFrame, Frames
 
 
 class DoorJournal(Journal):
@@ -67,10 +67,13 @@ class DoorJournal(Journal):
             hear(self._now_us(), mark, data)
         self._after()
 
-    def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Frames) -> None:
-        """Note frames that passed a door, unless another one of its bus has told of them."""
+    def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Seen) -> None:
+        """Note frames that passed a door, unless another one of its bus has told of them.
+
+        The trace has no error frames.
+        """
         with self._lock:
-            self.record.passed(wire, mark, frames)
+            self.record.passed(wire, mark, [each for each in frames if isinstance(each, CanFrame)])
             for frame in frames:
                 if mark is Mark.FROM_DEVICE:
                     if watch.known[str(frame)] > 0:
@@ -80,12 +83,12 @@ class DoorJournal(Journal):
                 self.add(self._now_us(), mark, str(frame).encode(), wire)
         self._after()
 
-    def announce(self, wire: str, watch: _BusWatch, frames: Frames, by: int = 1) -> None:
+    def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
         """Let all doors of a bus but one know frames, or forget them again."""
         with self._lock:
             self._announce(wire, watch, frames, by)
 
-    def _announce(self, wire: str, watch: _BusWatch, frames: Frames, by: int = 1) -> None:
+    def _announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
         for other in self._watches[wire]:
             if other is not watch:
                 for frame in frames:
@@ -116,7 +119,7 @@ class _BusWatch:
     def used(self) -> None:
         """Anybody may, at any time."""
 
-    def passed(self, mark: Mark, frames: Frames) -> None:
+    def passed(self, mark: Mark, frames: Seen) -> None:
         self._journal.hear_frames(self._wire, self, mark, frames)
 
     @contextmanager

@@ -8,6 +8,11 @@ from time import monotonic_ns
 from typing import Any, Protocol
 
 from tickrig.host.text.trace import Mark
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+Seen = tuple[CanFrame | ErrorFrame, ...]
+"""What passes a door of a bus."""
 
 
 class DoorWatch(Protocol):

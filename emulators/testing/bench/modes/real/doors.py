@@ -17,6 +17,7 @@ from tickrig.emulators.testing.bench.modes.real.watched_link import (
 )
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.text.trace import Mark
 
 if TYPE_CHECKING:
     import can
@@ -63,7 +64,7 @@ class Doors:
         place, watch = self._place(wire), self._watch_of(wire)
         link: WatchedLink[Any]
         if isinstance(place, BusPlan):
-            link = WatchedFrameLink(_frame_link(place), watch)
+            link = WatchedFrameLink(_frame_link(place, watch), watch)
         else:
             link = WatchedLink(_line_link(place), watch)
         self._opened.callback(link.close)
@@ -137,7 +138,7 @@ def _line_link(place: LinePlace) -> Link[bytes]:
         raise LinkGone(str(error)) from error
 
 
-def _frame_link(place: BusPlan) -> StampedLink:
+def _frame_link(place: BusPlan, watch: DoorWatch) -> StampedLink:
     from tickrig.emulators.can.outside.bus_port import ECHOING  # noqa: PLC0415 - slow
     from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415 - slow
         name_of,
@@ -146,4 +147,5 @@ def _frame_link(place: BusPlan) -> StampedLink:
     from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
 
     link = CanLink(open_bus(place, {}), name_of(place))
+    link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
     return EchoFreeLink(link) if place.interface in ECHOING else link

@@ -11,10 +11,10 @@ from typing import Any, Final
 import can
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
+from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links.can_link import keep_to_group
-from tickrig.host.links.can_message import to_frame
+from tickrig.host.links.can_message import to_error_frame, to_frame
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
@@ -37,7 +37,8 @@ class _Watched(can.BusABC):
         with self._told_if_gone():
             message = super().recv(timeout)
         if message is not None:
-            self._pass_on(Mark.FROM_DEVICE, message)
+            error = to_error_frame(message)
+            self._pass_on(Mark.FROM_DEVICE, _frames_of(message) if error is None else (error,))
         elif timeout is not None:
             self._watch.waited(round(timeout * 1e6), (monotonic_ns() - begun_ns) // 1_000)
         return message
@@ -46,7 +47,7 @@ class _Watched(can.BusABC):
         self._watch.used()
         with self._watch.sending(_frames_of(msg)), self._told_if_gone():
             super().send(msg, timeout)  # type: ignore[safe-super]  # of the class that is watched
-        self._pass_on(Mark.TO_DEVICE, msg)
+        self._pass_on(Mark.TO_DEVICE, _frames_of(msg))
 
     @contextmanager
     def _told_if_gone(self) -> Iterator[None]:
@@ -58,8 +59,8 @@ class _Watched(can.BusABC):
                 raise
             raise BusGone(f"{self.channel_info}: {error}", code) from error
 
-    def _pass_on(self, mark: Mark, message: can.Message) -> None:
-        if frames := _frames_of(message):
+    def _pass_on(self, mark: Mark, frames: Seen) -> None:
+        if frames:
             self._watch.passed(mark, frames)
 
 

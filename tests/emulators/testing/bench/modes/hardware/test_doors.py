@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import can
 import pytest
@@ -28,6 +29,7 @@ PLAN = RigPlan(
     hardware=HardwarePlan(buses={"can": BUS}),
 )
 BOOT_UP = can.Message(arbitration_id=0x705, data=b"\x00", is_extended_id=False)
+STUFF_ERROR = can.Message(arbitration_id=0x88, data=b"\0\0\4", is_error_frame=True)
 START = can.Message(arbitration_id=0, data=b"\x01\x05", is_extended_id=False)
 
 
@@ -63,6 +65,24 @@ def test_a_frame_that_two_doors_see_is_told_once(bench: Bench, drive: can.BusABC
     assert boots()
     assert (first.recv(1) is not None, third.recv(0) is not None) == (True, True)
     assert told(bench) == ["< 705#00"] * 3
+
+
+@pytest.mark.parametrize("doors", [["can_bus"], ["link"], ["link", "can_bus"]])
+def test_an_error_frame_is_told_once_and_is_in_no_trace(
+    bench: Bench, drive: can.BusABC, doors: list[str], tmp_path: Path
+) -> None:
+    hosts = [bench.can_bus() if door == "can_bus" else bench.link for door in doors]
+    drive.send(STUFF_ERROR)
+    for host in hosts:
+        if isinstance(host, can.BusABC):
+            message = host.recv(0)
+            assert message is not None
+            assert message.is_error_frame
+        else:
+            assert host.receive(0) == ()
+    assert told(bench) == ["< 20000088#0000040000000000"]
+    bench.save_trace(tmp_path / "run.trace")
+    assert "#" not in (tmp_path / "run.trace").read_text().partition("\n")[2]
 
 
 def test_what_a_host_sends_is_no_answer_at_another_door(bench: Bench, drive: can.BusABC) -> None:
