@@ -33,6 +33,13 @@ class CanSegment(TransmissionOutcomes):
     Which frame goes next is a plan until its first bit is out: a frame sent at
     that very time still takes part in the arbitration.
 
+    Args:
+        bit_rate: bits a second.
+        start_us: when it begins.
+        faults: what is armed.
+        observers: called with all that ends on it.
+        on_traffic: called when something may end on it earlier than it said.
+
     Attributes:
         now_us: how far the bus was moved on.
         shorted: nobody can send.
@@ -40,9 +47,14 @@ class CanSegment(TransmissionOutcomes):
     """
 
     def __init__(
-        self, bit_rate: int, start_us: int, faults: CanFaults, observers: Listeners[Observer]
+        self,
+        bit_rate: int,
+        start_us: int,
+        faults: CanFaults,
+        observers: Listeners[Observer],
+        on_traffic: Listeners[Callable[[], None]],
     ) -> None:
-        super().__init__(bit_rate, faults, observers)
+        super().__init__(bit_rate, faults, observers, on_traffic)
         self.now_us, self.shorted = start_us, False
         self.received: bool
         self._lengths: Cache[CanFrame, int] = Cache()
@@ -153,7 +165,8 @@ class CanSegment(TransmissionOutcomes):
     def _withdraw(self) -> None:
         """Take the plan back."""
         self._arbiter.put_back(self._winners)
-        self._winners, self._stale, self._start = [], True, NEVER
+        self._winners, self._start = [], NEVER
+        self._plan_anew()
 
     def _plan(self) -> None:
         """Find out what ends next, and when."""
@@ -178,8 +191,8 @@ class CanSegment(TransmissionOutcomes):
 
     def _plan_return(self) -> None:
         """Let the node that is back first be what ends next."""
-        self._withdraw()
-        self._stale, self._start = False, self._recovery.due
+        self._arbiter.put_back(self._winners)
+        self._winners, self._start = [], self._recovery.due
         self._finish, self._due_us = self._come_back, -(-self._start // self.unit)
 
     def _length(self, frame: CanFrame) -> int:

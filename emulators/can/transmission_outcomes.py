@@ -41,12 +41,18 @@ class TransmissionOutcomes:
         busy: from when to when the latest frames kept the bus busy, in units.
     """
 
-    def __init__(self, bit_rate: int, faults: CanFaults, observers: Listeners[Observer]) -> None:
+    def __init__(
+        self,
+        bit_rate: int,
+        faults: CanFaults,
+        observers: Listeners[Observer],
+        on_traffic: Listeners[Callable[[], None]],
+    ) -> None:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
         self.routes = CanRoutes()
         self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
-        self._faults, self._observers = faults, observers
+        self._faults, self._observers, self._on_traffic = faults, observers, on_traffic
         self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
         self._recovery = Recovery(self.bit)
         self._arbiter = CanArbiter()
@@ -187,5 +193,12 @@ class TransmissionOutcomes:
         self._on_bus = len(states) - states.count(ErrorState.BUS_OFF)
         self.routes.forget()
         if self._repeating:
-            self._repeating, self._stale = False, True
+            self._repeating = False
             self._arbiter.free = max(self._arbiter.free, now_us * self.unit)
+            self._plan_anew()
+
+    def _plan_anew(self) -> None:
+        """Find out anew what ends next when somebody asks; tell that it may be earlier."""
+        self._stale = True
+        for tell in self._on_traffic:
+            tell()

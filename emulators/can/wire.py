@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import Final
 
 from tickrig._compiled import mypyc_attr
@@ -44,6 +45,7 @@ class CanWire(Copyable):
         bus: what all connected ends hear.
         faults: what is armed; `arm` and `clear` act at the time the bus has reached.
         observers: called with each frame and each error frame on the bus with its time.
+        on_traffic: called when something may end earlier than `due_us` said.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()
@@ -58,7 +60,8 @@ class CanWire(Copyable):
         self.bit_rate = bit_rate
         self.faults = CanFaults(seed, self._fault_changed)
         self.observers: Listeners[Observer] = Listeners()
-        self.bus = CanSegment(bit_rate, 0, self.faults, self.observers)
+        self.on_traffic: Listeners[Callable[[], None]] = Listeners()
+        self.bus = CanSegment(bit_rate, 0, self.faults, self.observers, self.on_traffic)
         self._apart: dict[int, CanSegment] = {}  # ends that are disconnected, each by itself
         self._count = 0
         self._babbler: CanEnd | None = None
@@ -135,7 +138,8 @@ class CanWire(Copyable):
         if end.number not in self._apart:
             now_us = self.bus.now_us
             self.bus.leave(end, now_us)
-            apart = CanSegment(self.bit_rate, now_us, CanFaults(0, _ignore), Listeners())
+            faults = CanFaults(0, _ignore)
+            apart = CanSegment(self.bit_rate, now_us, faults, Listeners(), self.on_traffic)
             self._apart[end.number] = apart
             apart.join(end, now_us)
 

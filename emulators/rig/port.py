@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sized
 from typing import Protocol
 
 from tickrig.device.core import W
@@ -82,6 +83,16 @@ class Wire(Protocol):
     @property
     def due_us(self) -> int:
         """When something ends on it next, `NEVER` if nothing is on its way."""
+        ...
+
+    @property
+    def on_traffic(self) -> list[Callable[[], None]]:
+        """Whom to call when something may end on it earlier than it said."""
+        ...
+
+    @property
+    def observers(self) -> Sized:
+        """Who hears of all that ends on it."""
         ...
 
     def advance(self, now_us: int, /) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import compress
+from operator import not_
 from typing import Any, Final, Generic, TypeVar, overload
 
 from tickrig.device.core import Device, W
@@ -16,6 +18,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import Host, OutsideBridge, Port, Wire
 from tickrig.emulators.rig.timetable import Timetable
 from tickrig.emulators.rig.wire_port import WirePort
+from tickrig.emulators.rig.wires import Wires
 from tickrig.wire.instant import NEVER
 
 LATE_US: Final = 1_000
@@ -104,19 +107,19 @@ class Rig(Copyable):
         self._jumps = not dense and isinstance(self._clock, VirtualClock)
         periods = {station.tick_us for station in stations}
         self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
-        self._timetable, self._open_us = Timetable(), 1  # no tick is entered before open_us
+        self._timetable, self._wires = Timetable(), Wires(self._periods)
         self._horizon, self._until_us = Horizon(), 0
-        self._wires: tuple[Wire, ...] = ()
-        attached = [station for station in stations if self._attach(station)]
-        self.stations, self._woken = stations, () if dense else tuple(attached)
-        self._looked_at = tuple(s for s in stations if s not in self._woken)
+        attached = [self._attach(station) and not dense for station in stations]
+        self.stations, self._woken = stations, tuple(compress(stations, attached))
+        self._looked_at = tuple(compress(stations, map(not_, attached)))
 
     def _attach(self, station: Station[Any]) -> bool:
         """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
         port, device = station.port, station.device
         if not isinstance(port, WirePort):
             return False
-        port.attach(device, _ignore if self._dense else partial(self._enter, station))
+        enter = partial(self._timetable.enter, station)
+        port.attach(device, _ignore if self._dense else enter)
         self.move_on(port.wire)
         if hasattr(device, "horizon"):
             device.horizon = None if self._dense else self._horizon
@@ -130,6 +133,7 @@ class Rig(Copyable):
     def __setstate__(self, state: object) -> None:
         """Go on as the rig that was copied; its ports know no devices yet."""
         restore(self, state)
+        self._wires.hear_again()
         for station in self.stations:
             self._attach(station)
 
@@ -180,20 +184,20 @@ class Rig(Copyable):
         Args:
             wire: the wire.
         """
-        if wire not in self._wires:
-            self._wires += (wire,)
+        self._wires.join(wire)
 
     @property
     def next_us(self) -> int:
         """When there is something to do next: an action, a tick with work, an end on a wire."""
         self._enter_due()
-        return min(self._planned_us, self._wires_due_us)
+        return min(self._planned_us, self._wires.due_us)
 
     def step(self) -> None:
         """Go to the next time with something to do, and do it; nothing if that never comes."""
         self._foresee(0)
         if (next_us := self.next_us) != NEVER:
             self._happen(next_us)
+            self._wires.advance(self.now_us)
 
     def run_to(self, t_us: int, host: Host | None = None) -> None:
         """Step through all that happens up to and at a time, or until something is at a host.
@@ -207,6 +211,7 @@ class Rig(Copyable):
         while (next_us := self._go_on(t_us, host)) <= t_us:
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
+                self._wires.advance(self.now_us)
                 return
         self._pass_to(t_us)
 
@@ -232,12 +237,13 @@ class Rig(Copyable):
         self._enter_due()
         self._foresee(0)
         while not done():
-            next_us = min(self._planned_us, self._wires_due_us)
+            next_us = min(self._planned_us, self._wires.due_us)
             if next_us > deadline_us or next_us == NEVER:
                 if deadline_us < NEVER:
                     self._idle_to(deadline_us)
                 return done()
             self._happen(next_us)
+            self._wires.advance(self.now_us)
         return True
 
     def _foresee(self, until_us: int) -> None:
@@ -249,13 +255,7 @@ class Rig(Copyable):
         """Enter what has come due between steps: inputs set, a dictionary written."""
         for station in self._woken:
             if (due_us := station.device.due_us) < station.at_us:
-                self._enter(station, due_us)
-
-    def _enter(self, station: Station[Any], at_us: int) -> None:
-        """Let a station have work at the first tick from `at_us` on."""
-        if at_us < station.at_us:
-            tick_us = station.tick_us
-            self._timetable.enter(station, -(-max(at_us, self._open_us) // tick_us) * tick_us)
+                self._timetable.enter(station, due_us)
 
     @property
     def _planned_us(self) -> int:
@@ -273,24 +273,14 @@ class Rig(Copyable):
                 next_us = min(next_us, now_us - now_us % tick_us + tick_us)
         return max(now_us, next_us)
 
-    @property
-    def _wires_due_us(self) -> int:
-        return min((wire.due_us for wire in self._wires), default=NEVER)
-
     def _go_on(self, until_us: int, host: Host | None) -> int:
         """Let frames end up to the next tick with work, or one at a host; return its time."""
-        hosts = [*self.hosts] if host is None else [*self.hosts, host]
+        hosts = (*self.hosts,) if host is None else (*self.hosts, host)
         while True:
             next_us = self._planned_us
-            if not self._wires:
-                return next_us
-            if hosts and (arrived_us := min(each.arrived_us for each in hosts)) < next_us:
+            if hosts and (arrived_us := min([each.arrived_us for each in hosts])) < next_us:
                 return max(self.now_us, arrived_us)
-            limit_us = end_us = min(next_us - 1, until_us)
-            if len(self._wires) > 1:  # what ends on one may let a station send on another
-                end_us = min(limit_us, self._wires_due_us)
-            received = [wire.advance_until_received(end_us) for wire in self._wires]
-            if not any(received) and self._wires_due_us > limit_us:
+            if not self._wires.advance_until_received(min(next_us - 1, until_us), hosts):
                 return next_us
 
     def _happen(self, next_us: int) -> None:
@@ -314,31 +304,30 @@ class Rig(Copyable):
 
     def _pass_to(self, t_us: int) -> None:
         """Let time pass in which no tick has work."""
-        for wire in self._wires:
-            wire.advance(t_us)
+        self._wires.advance(t_us)
         self._idle_to(t_us)
 
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:
             self._clock.wait_until(t_us)
             self.now_us = self._horizon.passed_us = t_us
-        self._open_us = self.now_us + 1
+        self._timetable.open_us = self.now_us + 1
 
     def _run(self, now_us: int) -> None:
         late_us = self._clock.wait_until(now_us)
-        self.now_us = self._open_us = now_us
+        self.now_us = self._timetable.open_us = now_us
         if late_us > 0:
             self._note_late(late_us)
         for bridge in self._bridges:
             bridge.take_in(now_us)
-        for wire in self._wires:
-            wire.advance(now_us)
+        self._wires.advance_busy(now_us)
         self._tick(now_us)
         self._horizon.passed_us = now_us
         self._couple(now_us)
         for bridge in self._bridges:
             bridge.give_out(now_us)
         if self.watchers:
+            self._wires.advance(now_us)
             self._watch(now_us)
             self._enter_due()
 
@@ -371,17 +360,16 @@ class Rig(Copyable):
             received = station.port.poll(now_us)
             if received or self._dense or station.device.due_us <= now_us:
                 sent.append((station.port, station.device.tick(now_us, received)))
-        woken, enter = self._timetable.take(now_us), self._timetable.enter
-        self._open_us = now_us + 1
+        timetable = self._timetable
+        woken, enter = timetable.take(now_us), timetable.enter
+        timetable.open_us = now_us + 1
         for station in woken:
             device, port = station.device, station.port
             received = port.poll(now_us)
             if received or device.due_us <= now_us:
                 sent.append((port, device.tick(now_us, received)))
             if (due_us := device.due_us) < NEVER:
-                tick_us = station.tick_us
-                first_us = now_us + tick_us
-                enter(station, -(-due_us // tick_us) * tick_us if due_us > first_us else first_us)
+                enter(station, due_us)
         for port, traffic in sent:
             port.send(now_us, traffic)
 

@@ -19,17 +19,22 @@ class Timetable:
 
     Attributes:
         first_us: the soonest tick with work, `NEVER` if there is none.
+        open_us: no tick is entered before this.
     """
 
-    __slots__ = ("_stations", "_ticks", "first_us")
+    __slots__ = ("_stations", "_ticks", "first_us", "open_us")
 
     def __init__(self) -> None:
-        self.first_us = NEVER
+        self.first_us, self.open_us = NEVER, 1
         self._ticks: list[int] = []  # a heap
         self._stations: dict[int, list[Station[Any]]] = {}
 
     def enter(self, station: Station[Any], at_us: int) -> None:
-        """Let a station have work at a tick; nothing if it has some before."""
+        """Let a station have work at the first tick from `at_us` on, unless it has some before."""
+        if at_us >= station.at_us:
+            return
+        tick_us = station.tick_us
+        at_us = -(-max(at_us, self.open_us) // tick_us) * tick_us
         if at_us >= station.at_us:
             return
         station.at_us = at_us

@@ -11,7 +11,7 @@ from tickrig.wire.instant import NEVER
 
 
 def stations(count: int) -> list[Station[bytes]]:
-    return [Station(Echo(), SerialLine().a) for _ in range(count)]
+    return [Station(Echo(tick_us=1), SerialLine().a) for _ in range(count)]
 
 
 def test_a_station_stands_at_the_earliest_tick_it_was_entered_for() -> None:
@@ -34,6 +34,17 @@ def test_a_tick_that_all_have_left_is_passed_over() -> None:
     table.enter(one, 10)
     assert table.take(10) == [one]
     assert table.first_us == 30
+
+
+def test_a_tick_is_a_multiple_of_the_period_and_none_that_has_been() -> None:
+    table, station = Timetable(), Station(Echo(tick_us=10), SerialLine().a)
+    table.open_us = 31
+    table.enter(station, 21)
+    assert (table.first_us, station.at_us) == (40, 40)
+    table.enter(station, 39)
+    assert table.take(40) == [station]
+    table.enter(station, 50)
+    assert table.first_us == 50
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(1, 9)) | st.integers(1, 4), max_size=60))
