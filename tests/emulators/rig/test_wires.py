@@ -114,11 +114,12 @@ def test_what_observers_hear_is_in_the_order_of_time_and_of_joining(
 ) -> None:
     made, heard = [Bus(number, each) for number, each in enumerate(nodes)], list[tuple[int, int]]()
 
-    def hear(number: int, at_us: int, _: object) -> None:
-        heard.append((at_us, number))
+    def hear(place: int, at_us: int, _: object) -> None:
+        heard.append((at_us, place))
 
-    for number, bus in enumerate(made):
-        bus.wire.observers.append(partial(hear, number))
+    joined = sorted(made, key=lambda bus: not bus.nodes)  # stations bring their bus along
+    for place, bus in enumerate(joined):
+        bus.wire.observers.append(partial(hear, place))
     run(made, played)
     assert heard == sorted(heard)
 
