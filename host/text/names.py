@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Final
 
 MOST: Final = 40
 SHOWN: Final = 8
+_NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
 def known(names: Iterable[str]) -> str:
@@ -36,8 +38,12 @@ def near(name: str, names: Iterable[str]) -> str:
 def closest(name: str, names: Iterable[str]) -> list[str]:
     """Return the name that could be meant, if there is one; small and capital letters are alike.
 
+    A name that differs in its numbers alone is another one, and no slip.
+
     >>> closest("EPOS", ["epos", "rrc"]), closest("stik", ["left/stick", "right/stick"])
     (['epos'], ['left/stick'])
+    >>> closest("0x5000", ["0x2000", "3/0x5000"]), closest("0x5000", ["0x2000"])
+    (['3/0x5000'], [])
     """
     from difflib import get_close_matches  # noqa: PLC0415 - only for mistakes
 
@@ -46,4 +52,14 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
         alike.setdefault(each.casefold(), each)
     for each in names:  # of a device that was not said
         alike.setdefault(each.rpartition("/")[2].casefold(), each)
-    return [alike[each] for each in get_close_matches(name.casefold(), alike, n=1)]
+    asked = name.casefold()
+    meant = [each for each in alike if not _is_another(asked, each)]
+    return [alike[each] for each in get_close_matches(asked, meant, n=1)]
+
+
+def _is_another(asked: str, name: str) -> bool:
+    """Return whether a name is another one for its numbers, however near it looks."""
+    form = _NUMBER.sub("#", asked)
+    if any(map(str.isalpha, form)):
+        return asked != name and form == _NUMBER.sub("#", name)
+    return not set(_NUMBER.findall(asked)) <= set(_NUMBER.findall(name))
