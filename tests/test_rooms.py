@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.import_graph import FLOORS, ROOT, circles, imports, modules
+from tests.import_graph import FLOORS, ROOT, Graph, circles, imports, modules
 
 MOST = 15
 ROOMS = [
@@ -18,7 +19,12 @@ ROOMS = [
     if any(folder.glob("*.py"))
 ]
 PACKAGES = sorted(name for name, path in modules().items() if path.name == "__init__.py")
-GRAPH = imports()
+
+
+@cache
+def graph() -> Graph:
+    """Read the imports, for the first test that asks: not each time that tests are collected."""
+    return imports()
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=[str(room.relative_to(ROOT)) for room in ROOMS])
@@ -30,12 +36,12 @@ def test_a_room_is_small_and_says_what_lives_there(room: Path) -> None:
 
 
 def test_a_circle_is_found() -> None:
-    graph = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}
-    assert circles({name: frozenset(used) for name, used in graph.items()}) == [["b", "c"]]
+    ring = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}
+    assert circles({name: frozenset(used) for name, used in ring.items()}) == [["b", "c"]]
 
 
 def test_no_modules_need_each_other_at_run_time() -> None:
-    assert circles(GRAPH) == []
+    assert circles(graph()) == []
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -49,9 +55,9 @@ def between(package: str) -> dict[str, frozenset[str]]:
     def entry(name: str) -> str:
         return name.removeprefix(f"{package}.").partition(".")[0]
 
-    graph: defaultdict[str, set[str]] = defaultdict(set)
-    for name, used in GRAPH.items():
+    found: defaultdict[str, set[str]] = defaultdict(set)
+    for name, used in graph().items():
         if name.startswith(f"{package}."):
             inner = {entry(other) for other in used if other.startswith(f"{package}.")}
-            graph[entry(name)] |= inner - {entry(name)}
-    return {name: frozenset(used & graph.keys()) for name, used in graph.items()}
+            found[entry(name)] |= inner - {entry(name)}
+    return {name: frozenset(used & found.keys()) for name, used in found.items()}
