@@ -1,18 +1,26 @@
-"""The whole test run: the plug-in from the tree, Hypothesis, Ctrl-C."""
+"""The whole test run: the plug-in from the tree, Hypothesis, Ctrl-C, what coverage measures."""
 
 from __future__ import annotations
 
 import signal
+import sys
+from collections.abc import Generator
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.soak import examples
 from tickrig.emulators.testing.plugin import pytest_plugin
 
 collect_ignore = ["tests/outside", "tests/stranger"]  # of others: tests/test_*.py install them
 
 # How long an example takes says something about the machine, not about the code.
-settings.register_profile("tickrig", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "tickrig",
+    deadline=None,
+    max_examples=examples(100),
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("tickrig")
 
 
@@ -24,3 +32,16 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 def pytest_configure(config: pytest.Config) -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell
         signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C works in children
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Leave out of coverage what is marked so: measured, it takes four times as long."""
+    if item.get_closest_marker("unmeasured") is None:
+        return (yield)
+    tracing = sys.gettrace()
+    sys.settrace(None)
+    try:
+        return (yield)
+    finally:
+        sys.settrace(tracing)

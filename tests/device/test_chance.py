@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.device.chance import Chance
+import pytest
+
+from tickrig.device.chance import Chance, check_rate
 
 
 def test_draws_are_passed_over_at_once() -> None:
@@ -12,3 +14,22 @@ def test_draws_are_passed_over_at_once() -> None:
     assert other.draw() == draws[9]
     other.skip(0)
     assert other.draw() == one.draw()
+
+
+@pytest.mark.parametrize(
+    ("rate", "rated", "said"),
+    [
+        (None, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got no rate"),
+        (0.0, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got 0"),
+        (1.5, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got 1.5"),
+        (0.5, False, "loss takes no rate, got 0.5"),
+    ],
+)
+def test_a_rate_that_cannot_be_is_refused(rate: float | None, rated: bool, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        check_rate("loss", rate, rated=rated)
+
+
+def test_a_rate_is_for_what_has_one() -> None:
+    check_rate("loss", 1.0, rated=True)
+    check_rate("cut", None, rated=False)

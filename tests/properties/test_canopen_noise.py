@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.reference import NODE_ID, make_dictionary
 from tests.device.canopen.slave_bench import Bus
+from tests.soak import examples
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 
@@ -17,7 +18,7 @@ frames = st.builds(CanFrame, can_ids, st.binary(max_size=8)) | st.builds(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(80))
 @given(st.lists(st.lists(frames, max_size=6).map(tuple), max_size=40))
 def test_any_frames_leave_the_slave_able_to_answer_an_sdo(
     ticks: list[tuple[CanFrame, ...]],

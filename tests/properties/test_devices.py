@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from tests.device.canopen import reference
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.rtc_lite.reference_model import checked
+from tests.soak import examples
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.device_rtc.component import CanopenEcho
@@ -139,7 +140,7 @@ def rh3(parameters: BaseParameters) -> dict[str, Any]:
         "device_type": partial(Rh3Base, parameters),
         "traffic": strategies.chunks(orders),
         "start": RH3_ENABLED,
-        "max_examples": 15,
+        "max_examples": examples(6),
     }
 
 
@@ -177,7 +178,7 @@ def canopen(make: Callable[[], CanopenSlave]) -> dict[str, Any]:
         "wire": CanWire,
         "traffic": strategies.frames(CAN_FRAMES, CAN_IDS),
         "start": [(10_000, "send", (CanFrame.parse("000#0105"),))],
-        "max_examples": 15,
+        "max_examples": examples(6),
     }
 
 
@@ -187,7 +188,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "device_type": Rrc,
         "traffic": strategies.chunks(RRC_LINES),
         "start": RRC_ON,
-        "max_examples": 60,
+        "max_examples": examples(20),
     },
     "RTC-Lite node": lite(),
     "its timer": lite(context=LiteContextType.TIMER, rate_hz=300),
@@ -207,9 +208,10 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("name", KINDS)
 def test_a_device_keeps_what_every_device_must_keep(name: str) -> None:
-    check_device(**KINDS[name])
+    check_device(**{"max_examples": examples(10), **KINDS[name]})
 
 
 @pytest.fixture(scope="module")
@@ -224,13 +226,14 @@ def go_on(pickled: bytes, session: Session) -> list[tuple[object, ...]]:
     return bench.play(session)
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("name", KINDS)
 def test_a_device_goes_on_in_another_process(name: str, elsewhere: ProcessPoolExecutor) -> None:
     kind = {"wire": SerialLine, "start": (), **KINDS[name]}
     make = kind["device_type"]
     sessions = strategies.sessions(make(), kind["traffic"])
 
-    @settings(max_examples=3)
+    @settings(max_examples=examples(3))
     @given(sessions, sessions)
     def check(before: Session, after: Session) -> None:
         bench = _Bench(make, kind["wire"], kind["start"])
@@ -241,9 +244,10 @@ def test_a_device_goes_on_in_another_process(name: str, elsewhere: ProcessPoolEx
     check()
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("name", DEVICES.built_in)
 def test_so_does_each_type_as_it_is_registered(name: str) -> None:
-    check_device(DEVICES.load(name), max_examples=5)
+    check_device(DEVICES.load(name), max_examples=examples(3))
 
 
 def test_a_reset_of_a_base_that_rolls_is_the_same_however_often_it_was_ticked() -> None:

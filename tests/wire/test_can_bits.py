@@ -63,6 +63,7 @@ def random_frames(count: int) -> list[CanFrame]:
     return made
 
 
+@pytest.mark.unmeasured
 def test_ten_thousand_random_frames_are_as_long_as_counted_bit_by_bit() -> None:
     for frame in random_frames(10_000):
         assert frame_bits(frame) == counted(frame), str(frame.checked())

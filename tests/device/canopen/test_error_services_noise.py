@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -10,6 +11,8 @@ from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.slave import TICK_US, UNCONFIGURED
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
+
+pytestmark = pytest.mark.unmeasured
 
 CAN_IDS = st.one_of(
     st.sampled_from([0x000, 0x080, 0x082, 0x100, 0x705, 0x707, 0x708, 0x7E4, 0x7E5]),

@@ -12,6 +12,8 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.candump import parse_log
 
+pytestmark = pytest.mark.unmeasured
+
 ENCODER_DEG = 360 / 409_600
 ADC_STEP_V = 5 / 4095
 

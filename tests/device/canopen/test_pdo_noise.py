@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -9,6 +10,8 @@ from tests.device.canopen.pdo_bench import PdoBench, u8, u32, u64
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.pdo import Dispatched, Scanned
+
+pytestmark = pytest.mark.unmeasured
 
 CAN_IDS = st.one_of(
     st.sampled_from((0x000, 0x080, 0x0B0, 0x185, 0x205, 0x285, 0x305, 0x405, 0x505)),

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,6 +11,8 @@ from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
+
+pytestmark = pytest.mark.unmeasured
 
 PROFILES: list[tuple[type[Application], str, list[int]]] = [
     (Ds401, GENERIC_IO, [0x6002, 0x6003, 0x6005, 0x6008, 0x6202, 0x6207, 0x6208, 0x6421, 0x6423]),

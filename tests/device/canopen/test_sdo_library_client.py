@@ -15,6 +15,8 @@ from tests.device.canopen.sdo_client import booted, offer_blocks_of, pattern
 from tests.device.canopen.slave_bench import Bus
 from tickrig.wire.can import CanFrame
 
+pytestmark = pytest.mark.unmeasured
+
 SIZES = [1, 2, 4, 5, 7, 8, 127, 889, 890, 5_000]
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,6 +17,8 @@ from tickrig.wire.canopen.sdo.sdo import (
     parse_response,
 )
 from tickrig.wire.canopen.sdo.sdo_block import BlockEnded
+
+pytestmark = pytest.mark.unmeasured
 
 READ_TYPE, TYPE = "605#4000100000000000", ["585#4300100091010F00"]
 ABORT = "605#8000000000000008"

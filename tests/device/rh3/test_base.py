@@ -405,3 +405,18 @@ def test_parameters_that_cannot_be_are_refused(name: str, value: float, allowed:
 
 def test_a_radian_of_the_wheel_has_the_counts_of_the_specification() -> None:
     assert pytest.approx(23_844.6, abs=0.1) == COUNTS_PER_RAD
+
+
+def test_what_happened_to_it_is_due_at_once() -> None:
+    driven = moving()
+    assert driven.base.due_us > 0
+    driven.base.inputs.set("bumper", 1)
+    assert driven.base.due_us == 0
+
+
+def test_milliseconds_that_nobody_ticked_are_made_up_for() -> None:
+    ticked, left_alone = moving(), moving()
+    ticked.run(50)
+    left_alone.now_us += 49_000
+    left_alone.run(1)
+    assert left_alone.read("position_left") == ticked.read("position_left")

@@ -13,7 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.device.rrc.reference_model import INPUTS, NAMES, ReferenceRrc, check
+from tests.soak import examples
 from tickrig.device.rrc.machine import Rrc
+
+pytestmark = pytest.mark.unmeasured
 
 TICK_US = 10_000
 FAULTS = ("bus_noise", "joystick_fault", "power_module_fault", "vr2_fault", "bus_unplugged")
@@ -429,7 +432,7 @@ POWER_ON = (Act(ticks=2), Act((), {"power_button": 1}), Act((), {"power_button":
 
 
 @settings(
-    max_examples=200,
+    max_examples=examples(80),
     deadline=None,
     derandomize=True,
     database=None,

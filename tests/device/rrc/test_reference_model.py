@@ -219,6 +219,7 @@ def test_gear_walk_in_mode_3() -> None:
         assert [bench.model.out_v, bench.model.out_w] == vector["out"]
 
 
+@pytest.mark.unmeasured
 def test_float_noise_of_r16_never_decides_against_the_exact_value() -> None:
     for span in range(1, 101):
         for part in range(1, span):

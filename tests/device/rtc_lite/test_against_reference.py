@@ -15,6 +15,8 @@ from tests.device.rtc_lite.reference_model import NO_ARGUMENTS, ReferenceNode, c
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.wire.rtc_lite.codes import LiteContextType
 
+pytestmark = pytest.mark.unmeasured
+
 CALLBACKS = (
     *("on_initialize", "on_finalize", "on_startup", "on_shutdown", "on_activated"),
     *("on_deactivated", "on_execute", "on_aborting", "on_error", "on_reset"),

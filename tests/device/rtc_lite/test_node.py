@@ -9,7 +9,7 @@ import pytest
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.physical import InputSignal
-from tickrig.device.rtc_lite.component import LiteComponent
+from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
@@ -417,3 +417,28 @@ def test_a_port_that_does_not_fit_is_refused(name: str, most: int | None, error:
 def test_a_configuration_that_no_node_has_is_refused(settings: dict[str, Any], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         LiteConfig(**settings)
+
+
+def test_what_happened_to_it_is_due_in_the_next_millisecond() -> None:
+    bench = NodeBench()
+    assert bench.node.tick_us == 1_000
+    bench.ask("CI")
+    assert bench.node.due_us > bench.now_us
+    bench.node.inputs.set("power_cut", 1)
+    assert bench.node.due_us == 0
+
+
+def test_a_node_that_computes_is_due_when_it_is_free_again() -> None:
+    bench = NodeBench()
+    bench.node.inputs.set("callback_ms", 30)
+    bench.ask("CI")
+    assert bench.node.due_us == bench.now_us + 30_000
+
+
+def test_the_echo_hands_on_what_is_new() -> None:
+    bench = NodeBench(LiteEcho)
+    bench.ask("CI")
+    bench.ask("AA")
+    bench.ask(WRITE_42)
+    assert bench.ask("AE") == f"{DATA_42} AE@A"
+    assert bench.ask("AE") == "AE@A"

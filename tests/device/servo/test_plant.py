@@ -79,6 +79,7 @@ def test_holding_a_turning_shaft_turns_its_motion_into_heat(parameters: ServoPar
     assert plant.losses.friction_j - before == pytest.approx(motion)
 
 
+@pytest.mark.unmeasured
 @given(st.floats(1, 900), st.floats(0.3, 10))
 def test_a_coasting_shaft_stops_when_friction_says(speed_rad_s: float, scale: float) -> None:
     plant, motor = Plant(EPOS_WHEEL), EPOS_WHEEL.motor
@@ -163,6 +164,7 @@ commands = st.lists(
 )
 
 
+@pytest.mark.unmeasured
 @settings(max_examples=60)
 @given(st.sampled_from(list(PRESETS.values())), commands)
 def test_energy_is_balanced(
@@ -187,6 +189,7 @@ def test_energy_is_balanced(
     assert left_j == pytest.approx(kinetic_j(plant, parameters), abs=1e-3 * through_j)
 
 
+@pytest.mark.unmeasured
 @settings(max_examples=60)
 @given(st.sampled_from(list(PRESETS.values())), st.floats(-3_000, 3_000), st.floats(0.1, 10))
 def test_a_released_motor_never_gains_energy(

@@ -59,6 +59,7 @@ def play(parameters: ServoParameters, script: list[Event], dense: bool) -> list[
     return seen
 
 
+@pytest.mark.unmeasured
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(list(PRESETS.values())), events)
 def test_each_millisecond_and_seldom_are_the_same_to_the_bit(

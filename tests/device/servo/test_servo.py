@@ -179,6 +179,7 @@ def test_the_peak_comes_back_after_a_while(servo: Servo) -> None:
     assert servo.resting
 
 
+@pytest.mark.unmeasured
 def test_a_hot_winding_gets_less_current() -> None:
     servo = Servo(QUICKLY_WARM)
     servo.blocked = True

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.host.rtc_canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
+from tests.soak import examples
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.rtc_canopen.node.served_node import NodePhase
 from tickrig.host.rtc_canopen.serve import read_files, serve
@@ -31,7 +32,7 @@ frames = st.builds(
 steps = st.tuples(st.sampled_from((0, 1, 1_000, 10_000, 100_000, 600_000)), st.lists(frames))
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(st.lists(steps, max_size=40), st.lists(st.sampled_from(ErrorState), max_size=2))
 def test_noise_is_survived(
     noise: list[tuple[int, list[CanFrame]]], states: list[ErrorState]
@@ -49,7 +50,7 @@ def test_noise_is_survived(
 bursts = st.lists(st.tuples(st.integers(0, 150), st.lists(frames, max_size=6)), max_size=12)
 
 
-@settings(max_examples=15, phases=NO_SHRINKING)
+@settings(max_examples=examples(15), phases=NO_SHRINKING)
 @given(bursts)
 def test_after_noise_the_nodes_can_be_set_up_again(noise: list[tuple[int, list[CanFrame]]]) -> None:
     bench = Bench(PALETTE_AND_MOTOR)

@@ -72,6 +72,7 @@ def test_an_mpdo_has_a_node_id_of_seven_bits(node_id: int) -> None:
         Mpdo(False, node_id, 0x2000, 0, b"")
 
 
+@pytest.mark.unmeasured
 @given(FIELDS)
 def test_bits_round_trip(fields: list[tuple[int, int]]) -> None:
     data = pack_bits(fields)

@@ -32,6 +32,7 @@ replies: st.SearchStrategy[Reply] = st.one_of(
 )
 
 
+@pytest.mark.unmeasured
 @given(replies)
 def test_what_was_written_is_read_back(reply: Reply) -> None:
     assert parse_reply(reply.encode()[:-1]) == reply

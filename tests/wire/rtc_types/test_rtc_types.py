@@ -139,6 +139,7 @@ class Long64(Struct):
     unsigned: ULongLong = 0
 
 
+@pytest.mark.unmeasured
 @given(st.data(), st.sampled_from([*TYPES, Long64]), st.sampled_from(Endian))
 def test_what_is_encoded_is_decoded_again(
     data: st.DataObject, kind: type[Struct], endian: Endian

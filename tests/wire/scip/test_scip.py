@@ -175,3 +175,7 @@ def test_noise_without_an_end_does_not_fill_the_memory() -> None:
 @given(st.binary())
 def test_any_noise_is_survived(data: bytes) -> None:
     ReplySplitter().push(data + b"\n\n")
+
+
+def test_the_last_answer_in_scip_1_has_no_sum() -> None:
+    assert Reply.parse(b"SCIP2.0\n0") == Reply(b"SCIP2.0", "0")

@@ -72,6 +72,7 @@ def test_a_line_has_the_levels_of_its_bits() -> None:
     assert UartSetting(1_000_000, 5, "N", 1.5).duration_ps(3) == 22_500_000
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("data_bits", "parity", "stop_bits"), FRAMES)
 def test_equal_settings_understand_each_other(
     data_bits: int, parity: Parity, stop_bits: float

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
+from tests.soak import examples
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
@@ -13,6 +15,8 @@ from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPor
 from tickrig.device.component import ERROR, Result
 from tickrig.wire.can import CanFrame
 from tickrig.wire.rtc_canopen.port_types import OCTET, SHORT
+
+pytestmark = pytest.mark.unmeasured
 
 Traffic = list[tuple[int, CanFrame | None]]
 """Ticks to wait, then a frame; None presses or releases the button."""
@@ -87,7 +91,7 @@ def play(traffic: Traffic, *, sparse: bool) -> list[tuple[int, CanFrame]]:
     return sent + run_to(bus, now_us + 300 * TICK_US, sparse=sparse)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(40))
 @given(TRAFFIC)
 def test_dense_and_sparse_runs_are_the_same(traffic: Traffic) -> None:
     assert play(traffic, sparse=True) == play(traffic, sparse=False)

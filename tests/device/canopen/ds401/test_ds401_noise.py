@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.ds401.board import BOOL, NODE_ID, REAL, U8, Row, make_dictionary
+from tests.soak import examples
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.ds401 import Ds401
@@ -14,6 +16,8 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
+
+pytestmark = pytest.mark.unmeasured
 
 NUMBERS = [kind for kind in DataType if kind.is_integer or kind is REAL]
 INDICES = [
@@ -107,7 +111,7 @@ def run(dictionary: Dictionary, story: list[Event], *, dense: bool) -> list[str]
     return seen
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(60))
 @given(events)
 def test_left_out_idle_ticks_are_not_visible(story: list[Event]) -> None:
     dense = run(make_dictionary(ROWS, SENT), story, dense=True)
@@ -127,7 +131,7 @@ rows = st.lists(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(60))
 @given(rows, events)
 def test_any_board_of_any_types_works(board: list[Row], story: list[Event]) -> None:
     sent = run(make_dictionary(board), story, dense=False)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.ds402.wheel import Wheel
+from tests.soak import examples
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.models import epos
+
+pytestmark = pytest.mark.unmeasured
 
 PROFILE = [
     (entry.index, entry.sub, entry.size)
@@ -32,7 +36,7 @@ def writes(draw: st.DrawFn) -> tuple[int, int, bytes]:
     return index, sub, draw(st.sampled_from(edges) | st.binary(min_size=size, max_size=size))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.tuples(writes(), st.integers(1, 30)), max_size=25))
 def test_no_values_stop_the_drive(steps: list[tuple[tuple[int, int, bytes], int]]) -> None:
     wheel = Wheel()

@@ -9,6 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.ds402.wheel import Wheel
+from tests.soak import examples
+
+pytestmark = pytest.mark.unmeasured
 
 Step = tuple[int, Callable[[Wheel], None]]
 
@@ -89,7 +92,7 @@ def test_set_points_homing_and_records_are_the_same_without_idle_ticks(pause_ms:
     assert play(steps, sparse=True) == play(steps, sparse=False)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(sorted(ACTIONS)), st.integers(1, 400)), max_size=8))
 def test_whatever_is_done_to_it_idle_ticks_are_not_visible(steps: list[tuple[str, int]]) -> None:
     steps = [("shutdown", 2), ("enable", 2), *steps]

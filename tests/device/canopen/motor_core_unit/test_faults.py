@@ -125,6 +125,7 @@ def test_a_fault_takes_the_power_off_and_is_told(
     assert bench.emergencies == [emcy]
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("cause", "emcy", "name"), FAULTS)
 def test_a_fault_whose_cause_is_gone_is_cleared_by_a_write_to_the_mode(
     bench: UnitBench, cause: Callable[[UnitBench], None], emcy: str, name: str
@@ -143,6 +144,7 @@ def test_a_fault_whose_cause_is_gone_is_cleared_by_a_write_to_the_mode(
     assert (bench.read(0x1001), bench.emergencies) == (0, [emcy, "000000"])
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     "cause", [cause_under_voltage, cause_over_voltage, cause_hot_housing, cause_hot_winding]
 )
@@ -248,6 +250,7 @@ def test_i2t_cuts_the_peak_current_to_the_continuous_one(bench: UnitBench) -> No
     assert bench.status & LIMITED
 
 
+@pytest.mark.unmeasured
 def test_a_hot_winding_gets_less_current(bench: UnitBench) -> None:
     bench.set("ambient_c", WARM_C)
     bench.pass_ms(7_200_000)

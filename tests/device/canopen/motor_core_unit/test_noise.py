@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.motor_core_unit.bench import UnitBench
+from tests.soak import examples
 from tickrig.device.canopen.motor_core_unit.unit import INPUTS
 from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
+
+pytestmark = pytest.mark.unmeasured
 
 OBJECTS = (0x1016, 0x1017, 0x1029, 0x2000, 0x2010, 0x2011, 0x6411, 0x6443, 0x6444)
 
@@ -64,7 +68,7 @@ def told(bench: UnitBench) -> list[object]:
     return [bench.log, bench.status, *map(bench.unit.read, names)]
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=examples(25))
 @given(things)
 def test_dense_and_sparse_runs_are_the_same(
     wanted: list[tuple[int, str | tuple[str, float]]],

@@ -165,6 +165,7 @@ def test_a_new_request_after_the_last_segment_begins_anew() -> None:
     assert bus.step("605#4007200000000000") == ["585#4107200005000000"]
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("block_size", range(1, 128))
 def test_every_block_size_serves(block_size: int) -> None:
     bus = booted()
@@ -195,6 +196,7 @@ def test_no_bytes_are_an_empty_segment() -> None:
     assert bus.slave.dictionary[0x2008, 0].data == b""
 
 
+@pytest.mark.unmeasured
 @given(
     size=st.integers(1, 3_000),
     block_size=st.integers(1, 127),

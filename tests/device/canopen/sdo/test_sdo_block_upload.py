@@ -103,6 +103,7 @@ def test_every_state_times_out_ends_and_begins_anew(steps: list[str]) -> None:
     assert anew.step("605#4000100000000000") == ["585#4300100091010F00"]
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("block_size", range(1, 128))
 def test_every_block_size_serves(block_size: int) -> None:
     bus = booted()
@@ -111,6 +112,7 @@ def test_every_block_size_serves(block_size: int) -> None:
         assert Client(bus).block_upload(0x2008, [block_size]) == pattern(size)
 
 
+@pytest.mark.unmeasured
 @given(st.integers(1, 3_000), st.lists(st.integers(1, 127), min_size=1, max_size=20))
 def test_the_block_size_may_change_with_every_block(size: int, sizes: list[int]) -> None:
     bus = booted()
@@ -118,6 +120,7 @@ def test_the_block_size_may_change_with_every_block(size: int, sizes: list[int])
     assert Client(bus).block_upload(0x2008, sizes) == pattern(size)
 
 
+@pytest.mark.unmeasured
 @given(st.integers(1, 600), st.lists(st.integers(0, 5), max_size=50))
 def test_the_data_arrives_whatever_is_acknowledged(size: int, receipts: list[int]) -> None:
     bus = booted()

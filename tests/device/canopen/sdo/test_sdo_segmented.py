@@ -212,6 +212,7 @@ def test_an_object_that_cannot_hold_so_much_stops_a_download_without_a_size() ->
     assert bus.slave.dictionary[0x2007, 0].value == "short"
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("size", [*range(30), 889, 890, 10_000, 20_000])
 @pytest.mark.parametrize("sized", [True, False])
 def test_every_size_goes_there_and_back(size: int, sized: bool) -> None:

@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.testing.signals.signal_bench import Meter, SignalBench, signals_of
+from tests.soak import examples
 from tickrig.emulators.testing.signals.mistake import Mistake
 from tickrig.emulators.testing.signals.scope import check_signals
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
@@ -89,7 +90,7 @@ def usable(tables: dict[str, Any]) -> dict[str, SignalSpec]:
     return signals
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(tables, st.lists(st.sampled_from([1, 700, 4_000, 9_999, 250_000]), max_size=8))
 def test_dense_and_sparse_ticks_and_pieces_of_time_make_no_difference(
     tables: dict[str, Any], pieces_us: list[int]
@@ -107,7 +108,7 @@ def test_dense_and_sparse_ticks_and_pieces_of_time_make_no_difference(
     assert values[0] == values[1]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 @given(tables, st.integers(0, 1_000_000))
 def test_a_fork_goes_on_as_the_original(tables: dict[str, Any], at_us: int) -> None:
     signals = usable(tables)
@@ -172,7 +173,7 @@ json = st.recursive(
 KEYS = sorted({key for form in FORMS.values() for key in form.keys})
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(
     json
     | st.sampled_from(sorted(FORMS)).flatmap(

@@ -101,6 +101,7 @@ def next_index(edge: float, direction: int) -> int:
     return (ceil(edge / TURN) if direction > 0 else floor(edge / TURN)) * TURN
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("start", HOME_DEG)
 @pytest.mark.parametrize("method", range(1, 15))
 def test_home_is_the_index_pulse_behind_the_edge(method: int, start: str) -> None:

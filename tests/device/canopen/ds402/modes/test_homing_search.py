@@ -110,6 +110,7 @@ def test_a_method_ends_at_its_index_pulse_from_everywhere(method: int, start: fl
     assert 0 <= beyond <= TICK_WAY + 1e-6
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("start", STARTS.values(), ids=STARTS)
 @pytest.mark.parametrize("method", HOMES)
 def test_the_method_16_later_ends_at_the_edge_from_everywhere(method: int, start: float) -> None:
@@ -120,6 +121,7 @@ def test_the_method_16_later_ends_at_the_edge_from_everywhere(method: int, start
     assert 0 <= beyond <= TICK_WAY + 1e-6
 
 
+@pytest.mark.unmeasured
 @given(
     st.sampled_from(sorted(HOMES)),
     st.floats(NEGATIVE_AT - 50, POSITIVE_AT + 50),

@@ -15,6 +15,7 @@ from tests.device.canopen.ds402.wheel import (
     Wheel,
     make_lenient,
 )
+from tests.soak import examples
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds402.motion.trapezoid import PathLimits
@@ -326,7 +327,8 @@ def test_a_way_goes_on_when_the_limit_switch_is_released() -> None:
     assert wheel.read(0x6062) == 100_000
 
 
-@settings(max_examples=30)
+@pytest.mark.unmeasured
+@settings(max_examples=examples(30))
 @given(
     st.lists(
         st.tuples(

@@ -187,6 +187,7 @@ def test_a_path_ends_on_its_target(
     assert last.position == pytest.approx(target, abs=2e-6 * speed + 1e-4)
 
 
+@pytest.mark.unmeasured
 @given(
     st.lists(
         st.tuples(st.integers(-10_000, 10_000).map(float), LIMITS, st.integers(0, 40)),
