@@ -8,8 +8,9 @@ from typing import Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
-from tickrig.device.twin import Copyable, Immutable
+from tickrig.device.twin import Copyable, Immutable, Listeners
 from tickrig.emulators.rig.port import Port
+from tickrig.host.text.trace import Mark
 
 Fault = Callable[[int, W], W]
 """What a fault makes of the traffic that passes at a time in us; it is state, so no closure."""
@@ -40,6 +41,10 @@ class FaultyPort(Copyable, Generic[W]):
         port: the port behind it.
         fault_types: the faults that can be armed, by name.
         seed: seed of all chance in it.
+
+    Attributes:
+        listeners: called with the time, the direction, what was sent and what faults left of
+            it, where that differs. Nobody listens to a twin.
     """
 
     def __init__(
@@ -49,6 +54,7 @@ class FaultyPort(Copyable, Generic[W]):
         self.fault_types = fault_types
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
+        self.listeners: Listeners[Callable[[int, Mark, W, W], None]] = Listeners()
 
     @property
     def armed(self) -> tuple[str, ...]:
@@ -83,15 +89,21 @@ class FaultyPort(Copyable, Generic[W]):
 
     def poll(self, now_us: int, /) -> W:
         """Take what has arrived and survived."""
-        return _suffer(self._to_device, now_us, self._port.poll(now_us))
+        return self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
 
     def send(self, now_us: int, traffic: W, /) -> None:
         """Send what the faults leave of one tick's traffic."""
-        self._port.send(now_us, _suffer(self._from_device, now_us, traffic))
+        left = self._suffer(Mark.FROM_DEVICE, self._from_device, now_us, traffic)
+        self._port.send(now_us, left)
 
-
-def _suffer(faults: Mapping[str, Fault[W]], now_us: int, traffic: W) -> W:
-    for fault in faults.values():
-        if traffic:
-            traffic = fault(now_us, traffic)
-    return traffic
+    def _suffer(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int, traffic: W) -> W:
+        if not (faults and traffic):
+            return traffic
+        left = traffic
+        for fault in faults.values():
+            if left:
+                left = fault(now_us, left)
+        if left != traffic:
+            for hear in self.listeners:
+                hear(now_us, mark, traffic, left)
+        return left

@@ -58,6 +58,7 @@ class PtyPort(NonCopyable):
     Attributes:
         path: the terminal, as `/dev/pts/7`.
         lost: bytes dropped because nobody read.
+        spoken: whether a host ever sent something.
 
     Raises:
         FileExistsError: `link` exists, and no emulator left it over.
@@ -71,7 +72,7 @@ class PtyPort(NonCopyable):
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
-        self.lost = 0
+        self.lost, self.spoken = 0, False
         self._buffer_bytes, self._unsent = buffer_bytes, b""
         self._link: PtyLink | None = None
         self._setting: HostSetting | None = None
@@ -115,9 +116,11 @@ class PtyPort(NonCopyable):
         """Read without waiting."""
         self.attend(now_us)
         try:
-            return os.read(self._master, READ_BYTES)
+            data = os.read(self._master, READ_BYTES)
         except BlockingIOError:
             return b""
+        self.spoken = True
+        return data
 
     def attend(self, now_us: int, /) -> None:
         """Look at what the host has set, and give it what is kept for it."""

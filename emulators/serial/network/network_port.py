@@ -56,6 +56,7 @@ class NetworkPort(NonCopyable):
         url: where hosts of this machine connect, as pyserial opens it, with its port.
         address: the address that it listens at.
         port: its TCP port.
+        spoken: whether a host ever sent something.
 
     Raises:
         OSError: the port is taken, or the host is no address of this machine; the URL is its
@@ -72,6 +73,7 @@ class NetworkPort(NonCopyable):
         self._dismissed: list[DismissedHost] = []
         self._lost, self._peer, self._quiet_until_us = 0, "", 0
         self._setting: HostSetting | None = None
+        self.spoken = False
         self.address, self.port = self._listener.getsockname()[:2]
         self.url = str(replace(url, host=_reachable(self.address), port=self.port))
         if not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback:
@@ -107,6 +109,7 @@ class NetworkPort(NonCopyable):
     def poll(self, now_us: int, /) -> bytes:
         """Take some of what the host sent; let hosts come and go."""
         data = self._host.poll(now_us) if self._host else b""
+        self.spoken |= bool(data)
         if self._host and self._host.mistake:
             self._leave(self._host, self._peer, now_us)
             self._forget(self._host)

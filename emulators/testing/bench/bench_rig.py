@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_order import FaultOrder
@@ -29,6 +30,10 @@ from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.emulators.serial.network.network_port import NetworkPort
+    from tickrig.emulators.serial.pty_port import PtyPort
 
 
 class BenchOperator(Operator):
@@ -181,7 +186,10 @@ class BenchRig(RunningEmulator):
         state: what it consists of.
         journal: what happens.
         orders: faults that were ordered; those of a control socket are not among them.
+        ports: where hosts are in real time, by the name of the line.
     """
+
+    ports: Mapping[str, Sequence[PtyPort | NetworkPort]]
 
     def __init__(self, name: str, state: RigState, link: str = "") -> None:
         super().__init__(name, state.assembly, state.faults, link, state.recorder)
@@ -189,11 +197,13 @@ class BenchRig(RunningEmulator):
         self.event_queue = state.rig.event_queue
         self.log = self.journal = Journal()
         self.orders: list[FaultOrder] = []
+        self.ports = {}
         self.operator.note = self._note
         for mount in state.mounts.values():
             if isinstance(mount, LineMount):
                 hear = self.journal.of_line(mount.name, mount.settings.splitter)
                 mount.tap.listeners.append(hear)
+                mount.faults.listeners.append(self.journal.of_faults(mount.name))
             else:
                 mount.wire.observers.append(self.journal.of_bus(mount.name))
 

@@ -17,10 +17,15 @@ KEPT: Final = 10_000
 """So many lines are kept; of those before it is known how many there were."""
 
 
+ENDS: Final = (b"host", b"device")
+
+
 class Journal(WireLog):
     """The latest lines and frames of all wires, and what was done, in the order of happening.
 
-    A line counts as passed when the device takes its end, or sends it.
+    A line counts as passed when the device takes its end, or sends it. A serial line has what the
+    host sent and hears; what a fault changed of it, as the device takes or sends it, is a line of
+    the mark `~`.
     """
 
     def __init__(self) -> None:
@@ -35,6 +40,24 @@ class Journal(WireLog):
         log.listeners.append(lambda line: self.add(line.at_us, line.mark, line.data, source))
         self._logs.append((source, log))
         return log.hear
+
+    def of_faults(self, source: str) -> Callable[[int, Mark, bytes, bytes], None]:
+        """Return what takes the bytes of a serial line as they were sent, and as they are heard."""
+
+        def hear(at_us: int, mark: Mark, sent: bytes, received: bytes) -> None:
+            sender, receiver = ENDS if mark is Mark.TO_DEVICE else ENDS[::-1]
+            words = (
+                b"the",
+                receiver,
+                b"hears",
+                received or b"nothing",
+                b"where the",
+                sender,
+                b"sent",
+            )
+            self.add(at_us, Mark.WIRE, b" ".join((*words, sent)), source)
+
+        return hear
 
     def of_bus(self, source: str) -> Callable[[int, CanFrame | ErrorFrame], None]:
         """Return an observer of a CAN bus."""

@@ -73,8 +73,8 @@ class LineMount(Copyable):
         self._ports.append(port)
 
     @property
-    def faults(self) -> WireFaults:
-        """Where faults are armed: those of the first device's end."""
+    def faults(self) -> FaultyPort[bytes]:
+        """Where faults are armed, and heard of: those of the first device's end."""
         return self._ports[0]
 
     @property

@@ -13,6 +13,7 @@ import pytest
 
 from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
 from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
@@ -168,10 +169,22 @@ class BenchedTest:
         if unheard := self.take_unheard():
             pytest.fail("\n".join(unheard), pytrace=False)
         complaints = self._health.complaints(self._allowed) if self._health else ()
-        if found := [*complaints, *unsafe(bench, self._safe)]:
+        if found := [*complaints, *self._unsafe(bench)]:
             text = "after the test the bench is not as it has to be:"
             pytest.fail("\n".join([text, *found]), pytrace=False)
         self._passed = True
+
+    def _unsafe(self, bench: Bench) -> list[str]:
+        """Return what is not safe; a test that has passed is not skipped for what nobody can tell.
+
+        Raises:
+            BenchBlocked: this bench cannot do what the check asks.
+        """
+        try:
+            return unsafe(bench, self._safe)
+        except NotOnThisBench as error:
+            text = f"the test has passed, but bench_safe cannot be checked: {error}"
+            raise BenchBlocked(text) from None
 
     def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         """Say what blocked a phase of the test, and tell with a failure what there is to know."""

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import copy
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -58,6 +60,23 @@ def test_a_cut_line_passes_nothing_either_way() -> None:
     assert received(port, loop, b"abc") == b""
     port.clear("cut")
     assert received(port, loop, b"abc") == b"abc"
+
+
+def test_who_listens_is_told_what_was_sent_and_what_was_left_of_it() -> None:
+    port, _ = faulty()
+    heard = list[tuple[int, str, bytes, bytes]]()
+    port.listeners.append(lambda *change: heard.append(change))
+    port.arm("dup", 1)
+    port.send(1, b"a")
+    assert port.poll(2) == b"aaaa"
+    port.arm("cut")
+    port.send(3, b"b")
+    port.send(4, b"")
+    copy.deepcopy(port).send(5, b"c")
+    port.clear("cut")
+    port.clear("dup")
+    port.send(6, b"d")
+    assert heard == [(1, "<", b"a", b"aa"), (2, ">", b"aa", b"aaaa"), (3, "<", b"b", b"")]
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,7 @@ class Health:
         with suppress(NotOnThisBench):
             if LOST not in allowed:
                 found += self._mode.act(self._lost)
+                found += self._mode.act(self._unread)
             found += self._mode.act(_broken_off)
             found += self._mode.act(_without_value)
         return tuple(found)
@@ -69,6 +70,14 @@ class Health:
             f"{name}: {counted(on.lost, self._unit(name))} found a buffer full"
             for name, on in rig.state.mounts.items()
             if on.lost and name in self._spoken - self._faulty
+        ]
+
+    def _unread(self, rig: BenchRig) -> list[str]:
+        return [
+            f"{name}: {counted(port.lost, 'byte')} dropped at its port: the host did not read"
+            for name, ports in rig.ports.items()
+            for port in ports
+            if port.lost and port.spoken and name not in self._faulty
         ]
 
     def _unit(self, wire: str) -> str:

@@ -35,6 +35,13 @@ def bench_safe():
     return {safe}
 """
 
+REFUSAL = """
+from tickrig import NotOnThisBench
+
+def refuse(bench):
+    raise NotOnThisBench("nobody sees the lamp")
+"""
+
 UNSAFE = "state is Standby, and safe is WaitPowerOn"
 
 
@@ -77,3 +84,27 @@ def test_a_check_of_a_fixture_is_asked_too(pytester: pytest.Pytester, run: Run) 
     result = run("--bench", "rig.toml", "-k", "test_safe")
     result.assert_outcomes(failed=1, deselected=1)
     result.stdout.fnmatch_lines(["the lamp is on"])
+
+
+def test_a_check_that_this_bench_cannot_do_skips_no_test_that_has_passed(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makefile(".toml", rig=RIG)
+    pytester.makepyfile(
+        TESTS
+        + """
+def test_failed(bench):
+    assert 0
+
+def test_skipped(bench):
+    refuse(bench)
+"""
+        + REFUSAL
+    )
+    pytester.makeconftest(REFUSAL + FIXTURE.format(safe="refuse"))
+    result = run("--bench", "rig.toml", "-k", "not unsafe")
+    result.assert_outcomes(errors=1, failed=1, skipped=1)
+    told = "the test has passed, but bench_safe cannot be checked: nobody sees the lamp"
+    result.stdout.fnmatch_lines(
+        [f"ERROR *::test_safe - blocked: {told}", "FAILED *::test_failed - *assert 0"]
+    )

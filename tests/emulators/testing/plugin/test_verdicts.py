@@ -1,10 +1,11 @@
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as Xml
 
 import pytest
 
-from tests.emulators.testing.plugin.conftest import Run
+from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
 from tickrig.emulators.testing.report.report_file import read_run
 
@@ -56,6 +57,44 @@ def test_a_failure_shows_a_line_that_did_not_end(pytester: pytest.Pytester, run:
     result.stdout.fnmatch_lines(
         ["0.* rrc > device", "0.* rrc < RRC", "0.* rrc > vers  (not ended)"]
     )
+
+
+def test_a_failure_shows_what_was_heard_where_a_fault_changed_it(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        def ask(bench, fault):
+            bench.fault(fault)
+            port = bench.serial(timeout=0.1)
+            port.write(b"device\\n")
+            return port.read(100)
+
+        def test_one(bench):
+            bench.run_for("100ms")
+            assert ask(bench, "cut") == b""
+            bench.clear("cut")
+            assert ask(bench, "dup=1") == b"OK:device"
+        """
+    )
+    result = run("--bench-report", "run.html", "--bench-artifacts", "kept")
+    result.assert_outcomes(failed=1)
+    told = [
+        "0.110000 rrc ! cut",
+        "0.110000 rrc > device",
+        "0.110000 rrc ~ the device hears nothing where the host sent device?n",
+        "0.* rrc ! cut=0",
+        "0.* rrc > device",
+        "0.* rrc ~ the device hears ddeevviiccee?n?n where the host sent device?n",
+        "0.* rrc ~ the host hears EERR::*?n?n where the device sent ER:*?n",
+        "0.* rrc < EERR::*",
+    ]
+    result.stdout.fnmatch_lines(told)
+    (transcript,) = (pytester.path / "kept").glob("*.txt")
+    pytest.LineMatcher(transcript.read_text().splitlines()).fnmatch_lines(told)
+    page = (pytester.path / "run.html").read_text()
+    assert re.search('<li class="act"><i>[^<]*</i> ~ the device hears nothing where the ', page)
 
 
 def test_frames_are_told_with_what_they_mean(pytester: pytest.Pytester, run: Run) -> None:
@@ -366,3 +405,38 @@ def test_a_bench_that_broke_down_is_told(pytester: pytest.Pytester, run: Run) ->
     result.stdout.fnmatch_lines_random(
         ["*ZeroDivisionError: the device is broken", "it is broken: *the device is broken*"]
     )
+
+
+@pytest.mark.realtime
+def test_a_host_that_does_not_read_loses_bytes(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        import pytest
+
+        def overflow(bench):
+            (port,) = bench._mode.act(lambda rig: rig.ports["rrc"])
+            bench._mode.act(lambda rig: port.send(0, bytes(5_000)))  # more than it keeps
+
+        def talk(bench):
+            with bench.serial(timeout=5) as host:
+                host.write(b"device\\n")
+                assert host.read_until(b"RRC\\n").endswith(b"RRC\\n")
+
+        def test_unread(bench):
+            talk(bench)
+            overflow(bench)
+
+        @pytest.mark.allows("lost")
+        def test_allowed(bench):
+            talk(bench)
+            overflow(bench)
+
+        def test_nobody_there(bench):
+            overflow(bench)
+        """
+    )
+    result = run("--bench-mode", "real")
+    skip_if_too_slow(result)
+    result.assert_outcomes(passed=2, failed=1)
+    result.stdout.fnmatch_lines(["rrc: 5000 bytes dropped at its port: the host did not read"])

@@ -73,6 +73,7 @@ class RealMode(EmulatedMode):
         self._pace, self._waits = _Watch(self._thread), CpuWaits(spares_looker=True)
         self._doors = Doors(outside.places, lambda wire: self._pace)
         rig.rig.watchers.append(self._waits.look)
+        rig.ports = outside.ports
         self._watch_settings(outside)
         for close in (outside.close, self._thread.stop, self._doors.close):
             self._stack.callback(close)
