@@ -184,3 +184,30 @@ def test_in_real_time_a_host_keeps_its_clock(pytester: pytest.Pytester, run: Run
         """
     )
     run("--bench-mode", "real").assert_outcomes(passed=1)
+
+
+def test_a_wait_that_was_swallowed_is_told_at_the_end_in_a_line(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    file = pytester.makepyfile(
+        """
+        import threading
+        import time
+
+        def beat():
+            try:
+                time.sleep(1)
+            except RuntimeError:
+                pass
+
+        def test_beat(bench, bench_time):
+            thread = threading.Thread(target=beat)
+            thread.start()
+            thread.join()
+        """
+    )
+    result = run()
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines([f"{file.name}:6: time.sleep: *"])
+    result.stdout.no_fnmatch_line("*patched_time*")
