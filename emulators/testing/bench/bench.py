@@ -193,7 +193,7 @@ class Bench(BenchDevice):
 
         Args:
             done: says whether it is, such as `on_line("OK:beep")`; it only looks.
-            within: for how long at most; for ever unless given.
+            within: for how long at most; unless given for ever, in virtual time for a day.
 
         Returns:
             False if the time was over first.
@@ -205,7 +205,7 @@ class Bench(BenchDevice):
 
         Args:
             name: of the input or output.
-            within: for how long at most; for ever unless given.
+            within: for how long at most; unless given for ever, in virtual time for a day.
 
         Returns:
             Its value then: the old one if the time was over first.
@@ -247,7 +247,7 @@ class Bench(BenchDevice):
 
         Raises:
             TypeError: it awaits something else, such as `asyncio.sleep`.
-            RuntimeError: what it waits for never comes.
+            RuntimeError: what it waits for never comes, or not within a day of virtual time.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):

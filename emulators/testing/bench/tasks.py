@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Generator
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.triggers import text_of
+from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
+
+DAY_US: Final = 86_400_000_000
+"""In virtual time a body that does not say for how long it waits has waited in vain then."""
 
 T = TypeVar("T")
 
@@ -52,7 +57,8 @@ def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
 
     Raises:
         TypeError: it awaits something else, such as `asyncio.sleep`.
-        RuntimeError: what it waits for never comes.
+        RuntimeError: what it waits for never comes, or not within a day of virtual time.
+        KeyboardInterrupt: Ctrl-C; the text says what it waits for, and how long.
     """
     came: bool | None = None
     while True:
@@ -61,9 +67,23 @@ def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
         except StopIteration as end:
             result: T = end.value
             return result
-        came = waiting.wait_until(wait.done, max(0, wait.until_us - waiting.now_us))
-        if not came and wait.until_us == NEVER:
+        came = _wait(waiting, wait)
+
+
+def _wait(waiting: Waiting, wait: Wait) -> bool:
+    """Let time pass until something is so; False if it was not in time."""
+    begun_us, for_ever = waiting.now_us, wait.until_us == NEVER
+    try:
+        came = waiting.wait_until(wait.done, max(0, wait.until_us - begun_us))
+    except KeyboardInterrupt:
+        now = format_time(waiting.now_us)
+        raise KeyboardInterrupt(f"{now} s old, waiting for {text_of(wait.done)}") from None
+    if for_ever and not came:
+        if waiting.now_us - begun_us < DAY_US:
             raise RuntimeError("nothing will ever happen for which this body waits")
+        what = text_of(wait.done)
+        raise RuntimeError(f"{what} did not come in a day of the bench; within= waits longer")
+    return came
 
 
 class Task(Generic[T]):

@@ -12,6 +12,7 @@ from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
+from tickrig.emulators.testing.bench.tasks import DAY_US
 from tickrig.emulators.testing.host_clock.rig_passing import LONGEST_US, RigPassing
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
@@ -63,13 +64,14 @@ class VirtualMode(EmulatedMode):
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Let time pass until something is so; False if it was not in time.
 
+        Without an end it is waited for until nothing happens any more, or for a day.
         It is looked at after each step, and now and then between: a host that is polled in it
         may have something to do.
         """
         self._check_open()
         rig = self._rig.rig
-        until_us = rig.now_us + within_us
-        for_ever = until_us >= NEVER
+        for_ever = rig.now_us + within_us >= NEVER
+        until_us = rig.now_us + (DAY_US if for_ever else within_us)
         look_us = max(LOOK_US, (LONGEST_US if for_ever else within_us) // LOOKS)
         while not done():
             if rig.now_us >= until_us or (for_ever and rig.next_us == NEVER):

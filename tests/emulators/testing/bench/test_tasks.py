@@ -6,6 +6,8 @@ import pytest
 
 from tickrig import Bench
 from tickrig.device import Rrc
+from tickrig.emulators.testing.bench import tasks
+from tickrig.emulators.testing.bench.modes import virtual_mode
 
 
 async def blink(bench: Bench, times: list[int]) -> str:
@@ -88,3 +90,34 @@ def test_what_never_comes_is_told() -> None:
         with pytest.raises(RuntimeError, match="nothing will ever happen"):
             bench.run(body(bench))
         assert bench.now_us < 10_000_000  # it ends with what happened last
+
+
+def test_what_has_not_come_in_a_day_is_waited_for_no_longer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in (tasks, virtual_mode):  # a whole day of a URG takes seconds
+        monkeypatch.setattr(module, "DAY_US", 10_000_000)
+
+    async def body(bench: Bench) -> None:
+        await bench.until(lambda: False)
+
+    with Bench("urg") as bench:
+        with pytest.raises(RuntimeError, match=r"test_tasks\.py:\d+ .* in a day .*within="):
+            bench.run(body(bench))
+        assert bench.now_us == 10_000_000
+
+
+def test_ctrl_c_says_what_a_body_waits_for_and_the_time() -> None:
+    def interrupted() -> bool:
+        if bench.now_us >= 2_000_000:
+            raise KeyboardInterrupt
+        return False
+
+    async def body(bench: Bench) -> None:
+        await bench.until(interrupted, within="100s")
+
+    with (
+        Bench(Rrc()) as bench,
+        pytest.raises(KeyboardInterrupt, match=r"^2\.0\d* s old, waiting for .* test_tasks\.py:"),
+    ):
+        bench.run(body(bench))
