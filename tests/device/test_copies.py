@@ -126,7 +126,7 @@ def classes() -> Iterator[type]:
 
 
 def is_machine(kind: type) -> bool:
-    is_device = all(hasattr(kind, name) for name in ("tick", "reset", "tick_us"))
+    is_device = all(hasattr(kind, name) for name in ("tick", "reset"))
     is_body = ".body." in kind.__module__ and hasattr(kind, "step")
     return is_device or is_body or issubclass(kind, Service)
 

@@ -175,3 +175,17 @@ def test_a_closure_that_is_kept_as_state_is_refused() -> None:
 def test_an_item_that_was_shared_is_found_only_by_its_process() -> None:
     with pytest.raises(TypeError, match="item 3 of a twin was shared within its process"):
         pickler._shared(3)
+
+
+class Compiled(Machine):
+    """What mypyc makes of a machine: it says which attributes are in none of its `__dict__`s."""
+
+    __mypyc_attrs__ = ("part", "never_set")
+    part: Part
+
+
+def test_attributes_of_a_compiled_machine_are_copied() -> None:
+    machine = Compiled(Part(5))
+    other = twin(machine)
+    other.event()
+    assert (machine.part.count, other.part.count) == (5, 6)

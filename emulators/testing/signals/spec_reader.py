@@ -5,7 +5,7 @@
 >>> for mistake in read_signal_spec({"ramp": [12.0], "ower": "10s"}, ("supply_v",)):
 ...     print(mistake)
 supply_v.ramp: it takes two numbers, as [0, 5], not [12.0]
-supply_v.ower: not a key of ramp; known: over, repeat, from, every, min, max, step
+supply_v.ower: not a key of ramp; did you mean 'over'?
 supply_v.over: it is missing
 """
 
