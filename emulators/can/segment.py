@@ -57,7 +57,7 @@ class CanSegment(TransmissionOutcomes):
         super().__init__(bit_rate, faults, observers, on_traffic)
         self.now_us, self.shorted = start_us, False
         self.received: bool
-        self._lengths: Cache[CanFrame, int] = Cache()
+        self._lengths: Cache[int, tuple[CanFrame, int]] = Cache()  # of the latest by CAN-ID
         self._finish: Callable[[], None]  # of the plan
 
     @property
@@ -179,7 +179,8 @@ class CanSegment(TransmissionOutcomes):
                 self._start, winners = arbiter.free, arbiter.take()
             self._winners = winners
             frame = winners[0].queue[0]
-            bits = self._lengths.get(frame) or self._length(frame)
+            latest = self._lengths.get(frame[0])
+            bits = latest[1] if latest and latest[0] == frame else self._length(frame)
             if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
                 self._settle(self._deliver, bits)
             else:
@@ -198,7 +199,8 @@ class CanSegment(TransmissionOutcomes):
     def _length(self, frame: CanFrame) -> int:
         if len(self._lengths) >= KEPT_LENGTHS:
             self._lengths.clear()
-        bits = self._lengths[frame] = frame_bits(frame)
+        bits = frame_bits(frame)
+        self._lengths[frame[0]] = frame, bits
         return bits
 
     def _judge(self, frame: CanFrame, bits: int) -> None:

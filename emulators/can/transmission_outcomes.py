@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Listeners
 from tickrig.emulators.can.arbitration import CanArbiter, dominant
+from tickrig.emulators.can.busy_time import BusyTime
 from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.routes import CanRoutes
@@ -24,7 +24,6 @@ Observer = Callable[[int, CanFrame | ErrorFrame], None]
 
 RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
 SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
-KEPT_SPANS: Final = 32_768
 
 
 class TransmissionOutcomes:
@@ -38,7 +37,7 @@ class TransmissionOutcomes:
         unit: units in a microsecond.
         bit: units in a bit.
         routes: the ends and who of them receives what.
-        busy: from when to when the latest frames kept the bus busy, in units.
+        busy: when the latest frames kept the bus busy, in units.
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class TransmissionOutcomes:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
         self.routes = CanRoutes()
-        self.busy: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
+        self.busy = BusyTime()
         self._faults, self._observers, self._on_traffic = faults, observers, on_traffic
         self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
         self._recovery = Recovery(self.bit)
@@ -77,7 +76,7 @@ class TransmissionOutcomes:
         for observe in self._observers:
             observe(at_us, frame)
         arbiter.free = self._free
-        self.busy.append((self._start, self._free))
+        self.busy.note(self._start, self._free)
         if queue:
             arbiter.push(sender)
         self._winners = []
@@ -156,7 +155,7 @@ class TransmissionOutcomes:
     def _end_attempt(self) -> None:
         """Let the bus be free for the next frame."""
         self._arbiter.free = self._free
-        self.busy.append((self._start, self._free))
+        self.busy.note(self._start, self._free)
         if self._confinement.marked:
             self._suspend(self._winners)
         if self._recovery.active:

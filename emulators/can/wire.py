@@ -125,9 +125,7 @@ class CanWire(Copyable):
         bus = self.bus
         now = bus.now_us * bus.unit
         first = max(0, now - window_us * bus.unit)
-        spans = (*bus.busy, bus.present)
-        busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
-        return 1_000 * busy // (now - first) if now > first else 0
+        return bus.busy.permille(first, now, bus.present)
 
     def disconnect(self, end: CanEnd) -> None:
         """Pull a node's plug: it is alone, and nobody acknowledges what it sends.
