@@ -73,10 +73,11 @@ class VirtualMode(EmulatedMode):
         for_ever = rig.now_us + within_us >= NEVER
         until_us = rig.now_us + (DAY_US if for_ever else within_us)
         look_us = max(LOOK_US, (LONGEST_US if for_ever else within_us) // LOOKS)
-        while not done():
+        found = done()
+        while not found:
             if rig.now_us >= until_us or (for_ever and rig.next_us == NEVER):
                 return False  # time that nothing ends does not pass: the bench keeps its age
-            rig.run_until(done, min(look_us, until_us - rig.now_us))
+            found = rig.run_until(done, min(look_us, until_us - rig.now_us))
         return True
 
     def _check_open(self) -> None:

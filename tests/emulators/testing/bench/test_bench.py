@@ -21,6 +21,13 @@ def test_a_host_and_hands_share_one_time() -> None:
         assert (bench.get("out_v_pct"), bench.now_us) == (30, client.now_us)
 
 
+def test_what_is_so_for_one_look_ends_a_wait() -> None:
+    with Bench(Rrc()) as bench:
+        looks = iter([False] * 20 + [True])
+        assert bench.wait_until(lambda: next(looks, False), within="1s")
+        assert next(looks, None) is None
+
+
 def test_waiting_in_vain_takes_exactly_the_time() -> None:
     with Bench(Rrc()) as bench:
         assert not bench.wait_until(lambda: False, within="123ms")
