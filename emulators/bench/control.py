@@ -81,6 +81,9 @@ class EmulatorControl(RequestDispatcher):
     def _set(self, request: Object) -> Object:
         name, value = text_of(request, "name"), request.get("value")
         values = value if isinstance(value, list) else [value]
+        device = self._emulator.device
+        if name in device.outputs and name not in device.inputs.table:
+            raise ValueError(f"{name} is an output: it can be read, not set")
         self._emulator.operator.set(name, *[_setting(item) for item in values])
         return {}
 

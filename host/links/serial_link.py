@@ -133,6 +133,8 @@ def explain_open_error(url: str, error: Exception) -> str:
         error = around  # pyserial names the port again, around it
     number = error.errno if isinstance(error, OSError) else None
     if sys.platform != "win32":
+        if around is not None and around.args[:1] == (errno.ENOTTY,):
+            return "it is no serial port"
         if number in (errno.EAGAIN, errno.EBUSY):
             return f"another program uses it{_holder(url)}"
         if number == errno.EACCES:

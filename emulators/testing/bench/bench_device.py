@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
@@ -58,18 +58,19 @@ class BenchDevice:
     def __init__(self, mode: BenchMode, name: str = "") -> None:
         self._mode, self.name = mode, name
 
-    def set(self, name: str, *values: Setting) -> None:
+    def set(self, name: str, *values: Setting | Sequence[Setting]) -> None:
         """Set an input, or all inputs of a group.
 
         Args:
             name: of the input or group, as `stick`.
-            values: one, or one for each input of the group.
+            values: one, or one for each input of the group; a list of them will do.
 
         Raises:
             ValueError: there is none, or it does not take the values.
             NotOnThisBench: nobody can do that here.
         """
-        self._mode.request("set", name=self._full(name), value=list(values))
+        each = values[0] if len(values) == 1 and isinstance(values[0], list | tuple) else values
+        self._mode.request("set", name=self._full(name), value=list(each))
 
     def get(self, name: str) -> Setting:
         """Return the present value of an input or output.

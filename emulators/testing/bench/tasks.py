@@ -20,6 +20,14 @@ DAY_US: Final = 86_400_000_000
 
 T = TypeVar("T")
 
+NO_LOOP: Final = "no running event loop"
+"""What asyncio says where there is none."""
+
+WHAT_WAITS: Final = (
+    "a bench waits for bench.sleep, bench.until, bench.edge, and for tasks of bench.start,"
+    " which run beside the body"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Wait:
@@ -63,7 +71,7 @@ def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
     came: bool | None = None
     while True:
         try:
-            wait = _wait_of(body.send(came))
+            wait = _step(body, came)
         except StopIteration as end:
             result: T = end.value
             return result
@@ -144,7 +152,7 @@ class Task(Generic[T]):
 
     def _go_on(self, came: bool | None) -> None:
         try:
-            self._wait = _wait_of(self._body.send(came))
+            self._wait = _step(self._body, came)
         except StopIteration as end:
             self._result = [end.value]
             self._end()
@@ -161,10 +169,17 @@ class Task(Generic[T]):
         self._rig.rig.watchers.remove(self._look)
 
 
+def _step(body: Coroutine[Any, Any, Any], came: bool | None) -> Wait:
+    """Let a body run to its next wait; one that asks for the loop of asyncio is told what to do."""
+    try:
+        return _wait_of(body.send(came))
+    except RuntimeError as error:
+        if error.args == (NO_LOOP,):
+            error.args = (f"{NO_LOOP}: asyncio has none here; {WHAT_WAITS}",)
+        raise
+
+
 def _wait_of(wait: object) -> Wait:
     if not isinstance(wait, Wait):
-        raise TypeError(
-            "a bench waits for bench.sleep, bench.until, bench.edge, and for tasks of bench.start,"
-            f" which run beside the body; not for {wait!r:.60}"
-        )
+        raise TypeError(f"{WHAT_WAITS}; not for {wait!r:.60}")
     return wait

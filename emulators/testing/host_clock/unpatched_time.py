@@ -22,6 +22,11 @@ WAITS: Final = ("sleep", "monotonic", "monotonic_ns")
 STAMPS: Final = ("time", "time_ns")
 """What installed packages may call: they stamp what they write."""
 
+IN_A_THREAD: Final = (
+    "is called in a thread, which cannot make virtual time pass: let the test poll, or mark it"
+    """ needs("real or hardware")"""
+)
+
 WHAT_TO_DO: Final = (
     "in virtual time the clock of this machine means nothing: take the fixture bench_time, or wait"
     """ by bench.run_for or bench.sleep, or mark the test needs("real or hardware")"""
@@ -45,7 +50,8 @@ def unpatched_time_fails(
     """
     others = threading.enumerate() if others is None else others
     refusals: list[str] = []
-    spared = {thread.ident for thread in others} - {threading.get_ident()}
+    owner = threading.get_ident()
+    spared = {thread.ident for thread in others} - {owner}
 
     def refuse(
         name: str, original: Callable[..., Any], frame: FrameType, *args: Any, **kwargs: Any
@@ -56,7 +62,9 @@ def unpatched_time_fails(
         stamped = name in STAMPS and is_installed(frame.f_code.co_filename)
         if stamped or package_of(frame) in allowed or threading.get_ident() in spared:
             return original(*args, **kwargs)
-        refusals.append(f"{line_of(frame)}: time.{name} is called, but {WHAT_TO_DO}")
+        alone = threading.get_ident() == owner
+        told = f"is called, but {WHAT_TO_DO}" if alone else IN_A_THREAD
+        refusals.append(f"{line_of(frame)}: time.{name} {told}")
         raise UnpatchedTimeError(refusals[-1])
 
     own = [name for name in (*WAITS, *STAMPS) if id(root_of(vars(time)[name])) in KEEPABLE]

@@ -33,6 +33,8 @@ from tickrig.host.text.toml_document import Mistake
 from tickrig.host.text.toml_reader import read_toml
 
 SEED: Final = "seed"
+MAX_MB: Final = 4
+"""Size of a rig file at most, in MB of 2^20 bytes; somebody's log or trace is told to be none."""
 
 
 def read_rig_file(path: Path) -> RigPlan:
@@ -49,7 +51,8 @@ def read_rig_file(path: Path) -> RigPlan:
         RigFileError: all that is wrong with it.
     """
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read((MAX_MB << 20) + 1)
     except FileNotFoundError as error:
         if not _is_device(str(path)):
             raise
@@ -68,6 +71,9 @@ def _is_device(text: str) -> bool:
 
 def decode_rig_file(data: bytes, path: Path) -> RigPlan:
     """Read the bytes of a rig file; see `read_rig_file`."""
+    if len(data) > MAX_MB << 20:
+        reason = f"more than {MAX_MB} MB: this is no rig file"
+        raise RigFileError(str(path), (Mistake(1, reason),))
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

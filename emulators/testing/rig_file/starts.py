@@ -70,6 +70,9 @@ class StartReader:
                 section.wrong(f"{name} is given twice", *keys)
             elif name not in (table := physical.inputs.table):
                 names = names or [*physical.inputs.groups, *table]
+                if name in physical.outputs:
+                    section.wrong(f"{name} is an output: it can be read, not set", *keys)
+                    continue
                 section.wrong(f"no input {shown(name)}; {near(name, _alike(name, names))}", *keys)
             elif (found := self._value(section, keys, value, f"{device}{SLASH}{name}")) is not None:
                 start[name] = found

@@ -85,6 +85,11 @@ def test_a_port_that_is_not_there_is_told_in_few_words() -> None:
     assert str(refused.value) == "cannot open '/dev/no-such-port': No such file or directory"
 
 
+def test_a_file_that_is_no_port_is_told() -> None:
+    with pytest.raises(LinkClosed, match=r"'/dev/null': it is no serial port$"):
+        SerialLink("/dev/null")
+
+
 @pytest.mark.realtime
 def test_the_client_works_on_a_pty() -> None:
     with pty() as port, live_rrc(port) as rrc, RrcClient.open(port.path) as client:

@@ -45,6 +45,13 @@ def test_a_button_is_let_go_whoever_makes_time_pass() -> None:
         assert "1.060000 rrc ! power_button=0" in bench.transcript()
 
 
+def test_a_group_takes_a_list_as_in_a_rig_file() -> None:
+    with Bench("rrc") as bench:
+        bench.set("stick", [50, -20])
+        bench.set("gauge", (3,))
+        assert [bench.get(name) for name in ("stick_v_pct", "stick_w_pct", "gauge")] == [50, -20, 3]
+
+
 def test_a_group_is_set_at_once() -> None:
     with Bench(Rrc()) as bench:
         bench.set("stick", 100, -20)
@@ -55,6 +62,7 @@ def test_a_group_is_set_at_once() -> None:
     ("act", "text"),
     [
         (lambda bench: bench.set("stik", 1), "no input 'stik'; did you mean 'stick'?"),
+        (lambda bench: bench.set("state", 1), "state is an output: it can be read, not set"),
         (lambda bench: bench.get("nothing"), "no input or output .*nothing.*; known: .*state"),
         (lambda bench: bench.press("state"), "no button 'state'; known: .*power_button"),
         (lambda bench: bench.fault("smoke"), "no fault 'smoke'; known: .*cut"),

@@ -82,6 +82,18 @@ def test_what_is_no_wait_of_a_bench_is_told() -> None:
         bench.run(body())
 
 
+def test_who_asks_for_the_loop_of_asyncio_is_told_what_to_do() -> None:
+    async def body() -> None:
+        await asyncio.sleep(1)
+
+    told = r"no running event loop: .*waits for bench\.sleep"
+    with Bench(Rrc()) as bench:
+        with pytest.raises(RuntimeError, match=told):
+            bench.run(body())
+        with pytest.raises(RuntimeError, match=told):
+            bench.start(body()).result()
+
+
 def test_what_never_comes_is_told() -> None:
     async def body(bench: Bench) -> None:
         await bench.until(lambda: False)

@@ -296,6 +296,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
             ["8: device.b.wire: 'rrc' is on this serial line; one of type rs485 takes several"],
         ),
         (RRC + "start.stik = 5", ["3: device.rrc.start.stik: no input 'stik'; .*'stick'?"]),
+        (RRC + "start.state = 5", ["3: .*state: state is an output: it can be read, not set"]),
         (RRC + "start.stick = 5", ["3: .*it takes [stick_v_pct, stick_w_pct], not 5"]),
         (RRC + "start.stick = [1, 200]", ["3: .*stick[2]: stick_w_pct 200 is not in -100..100 %"]),
         (RRC + "start.gauge = 1.5", ["3: .*gauge takes a whole number, not 1.5"]),
@@ -396,6 +397,16 @@ def test_a_file_that_is_no_text_is_told_with_its_line(tmp_path: Path) -> None:
         read_rig_file(file)
     with pytest.raises(FileNotFoundError):
         read_rig_file(tmp_path / "nowhere.toml")
+
+
+def test_what_is_far_too_big_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "run.trace"
+    path.write_bytes(b"#" * (4 << 20))
+    with pytest.raises(RigFileError, match="1: no device"):
+        read_rig_file(path)
+    path.write_bytes(b"#" * (4 << 20) + b"#")
+    with pytest.raises(RigFileError, match="1: more than 4 MB: this is no rig file"):
+        read_rig_file(path)
 
 
 def test_a_store_that_is_none_is_told(tmp_path: Path) -> None:
