@@ -44,22 +44,28 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
     (['epos'], ['left/stick'])
     >>> closest("0x5000", ["0x2000", "3/0x5000"]), closest("0x5000", ["0x2000"])
     (['3/0x5000'], [])
+    >>> closest("left/speed_rpm", ["left/load_nm"]), closest("left/lod_nm", ["left/load_nm"])
+    ([], ['left/load_nm'])
     """
     from difflib import get_close_matches  # noqa: PLC0415 - only for mistakes
 
+    names, (device, slash, signal) = list(names), name.rpartition("/")
+    own = [each.removeprefix(device + slash) for each in names if each.startswith(device + slash)]
+    if slash and own:  # a device that there is
+        return [f"{device}/{each}" for each in closest(signal, own)]
     alike: dict[str, str] = {}
-    for each in (names := list(names)):
+    for each in names:
         alike.setdefault(each.casefold(), each)
     for each in names:  # of a device that was not said
         alike.setdefault(each.rpartition("/")[2].casefold(), each)
-    asked = name.casefold()
-    meant = [each for each in alike if not _is_another(asked, each)]
-    return [alike[each] for each in get_close_matches(asked, meant, n=1)]
+    wanted = name.casefold()
+    meant = [each for each in alike if not _is_another(wanted, each)]
+    return [alike[each] for each in get_close_matches(wanted, meant, n=1)]
 
 
-def _is_another(asked: str, name: str) -> bool:
+def _is_another(wanted: str, name: str) -> bool:
     """Return whether a name is another one for its numbers, however near it looks."""
-    form = _NUMBER.sub("#", asked)
+    form = _NUMBER.sub("#", wanted)
     if any(map(str.isalpha, form)):
-        return asked != name and form == _NUMBER.sub("#", name)
-    return not set(_NUMBER.findall(asked)) <= set(_NUMBER.findall(name))
+        return wanted != name and form == _NUMBER.sub("#", name)
+    return not set(_NUMBER.findall(wanted)) <= set(_NUMBER.findall(name))

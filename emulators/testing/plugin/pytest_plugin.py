@@ -180,9 +180,14 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Complete the reports of tests that have a bench."""
+    if (test := item.stash.get(BENCHED, None)) is None:
+        return (yield)
+    if call.excinfo is not None and not item.config.getoption("fulltrace", False):
+        from tickrig.emulators.testing.plugin.traceback_end import end_at_caller  # noqa: PLC0415
+
+        end_at_caller(call.excinfo.value)
     report = yield
-    if (test := item.stash.get(BENCHED, None)) is not None:
-        test.judge(report, call)
+    test.judge(report, call)
     return report
 
 

@@ -72,7 +72,8 @@ def _is_device(text: str) -> bool:
 def decode_rig_file(data: bytes, path: Path) -> RigPlan:
     """Read the bytes of a rig file; see `read_rig_file`."""
     if len(data) > MAX_MB << 20:
-        reason = f"more than {MAX_MB} MB: this is no rig file"
+        head = data[:1_000].decode("utf-8", "replace")
+        reason = no_rig_file(head) or f"more than {MAX_MB} MB: this is no rig file"
         raise RigFileError(str(path), (Mistake(1, reason),))
     try:
         text = data.decode("utf-8")

@@ -404,6 +404,9 @@ def test_what_is_far_too_big_is_not_read(tmp_path: Path) -> None:
     path.write_bytes(b"#" * (4 << 20))
     with pytest.raises(RigFileError, match="1: no device"):
         read_rig_file(path)
+    path.write_bytes(b"# tickrig-trace v2 {}\n" + b"#" * (4 << 20))
+    with pytest.raises(RigFileError, match="1: it is a trace"):
+        read_rig_file(path)
     path.write_bytes(b"#" * (4 << 20) + b"#")
     with pytest.raises(RigFileError, match="1: more than 4 MB: this is no rig file"):
         read_rig_file(path)

@@ -104,6 +104,8 @@ class RigThread:
 
     def _result(self, future: Future[T]) -> T:
         try:
+            if (error := future.exception()) is not None:
+                raise error  # without the frames of `result`
             return future.result()
         finally:
             self._awaited.discard(future)

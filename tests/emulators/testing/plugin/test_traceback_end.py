@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import pytest
+
+from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
+from tests.emulators.testing.plugin.test_bench_fixture import RRC
+
+pytest_plugins = ("pytester",)
+
+MISSPELT = """
+def helper(bench):
+    bench.fault("ctu")
+
+def test_one(bench):
+    helper(bench)
+"""
+
+
+@pytest.mark.parametrize("mode", ["virtual", pytest.param("real", marks=pytest.mark.realtime)])
+def test_a_refusal_is_shown_in_the_line_of_the_caller(
+    pytester: pytest.Pytester, run: Run, mode: str
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(MISSPELT)
+    result = run("--bench-mode", mode)
+    skip_if_too_slow(result)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        ['>*bench.fault("ctu")', "E *ValueError: no fault 'ctu'; did you mean 'cut'?"]
+    )
+    result.stdout.no_fnmatch_line("*bench_device.py*")
+    result.stdout.no_fnmatch_line("*rig_thread.py*")
+
+
+def test_all_of_it_is_shown_to_who_asks(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(MISSPELT)
+    run("--full-trace").stdout.fnmatch_lines(["*bench_device.py:*"])
+
+
+def test_what_is_no_refusal_is_shown_whole(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        """
+        from tickrig.emulators.testing.bench.bench_device import BenchDevice
+
+        def test_one(bench):
+            BenchDevice(None).press("power_button")
+        """
+    )
+    run().stdout.fnmatch_lines(["E *AttributeError: *", "*bench_device.py:*: AttributeError"])
