@@ -22,6 +22,8 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 UPLOAD = bytes.fromhex("4002200000000000")
 CALLS = 20_000
 DOMAIN_BYTES = 20_000
+CYCLES = 50
+"""In a second of the networks."""
 RW = Access.READ | Access.WRITE
 EDS = Path(__file__).parents[2] / "tests" / "golden" / "canopen" / "r1.eds"
 
@@ -35,8 +37,10 @@ def run(seconds: float) -> None:
     for name, make in PEERS.items():
         segmented(name, make)
     block_download()
+    sync_to_tpdo()
     construction()
     network()
+    network(buses=8)
 
 
 def expedited(name: str, ask: Peer) -> None:
@@ -145,30 +149,54 @@ def construction() -> None:
     tracemalloc.stop()
 
 
-def network() -> None:
-    """Run 127 slaves: heartbeats each 100 ms, SYNC each 20 ms with one TPDO of 8 bytes each."""
-    wire, count = CanWire(), [0]
+def network(buses: int = 1) -> None:
+    """Run 127 slaves a bus: heartbeats each 100 ms, SYNC each 20 ms with a TPDO of 8 bytes each."""
+    wires, count = [CanWire() for _ in range(buses)], [0]
 
     def hear(at_us: int, heard: object) -> None:
         count[0] += 1
 
-    wire.observers.append(hear)
-    slaves = [make_slave(tpdo_dictionary(n == 1), n) for n in range(1, 128)]
-    rig = Rig(*(Station(slave, wire.end()) for slave in slaves))
-    master = wire.end(accepts=frozenset())
+    slaves = [make_slave(tpdo_dictionary(n == 1), n) for _ in wires for n in range(1, 128)]
+    ends = [wire.end() for wire in wires for _ in range(127)]
+    rig = Rig(*map(Station, slaves, ends))
+    masters = [wire.end(accepts=frozenset()) for wire in wires]
     rig.run_for(100_000)
-    master.send(rig.now_us, (CanFrame(0, b"\x01\x00"),))
+    for master in masters:
+        master.send(rig.now_us, (CanFrame(0, b"\x01\x00"),))
     rig.run_for(1_000_000)
-    count[0] = 0
 
-    def work() -> None:
-        for _ in range(50):
+    def work(cycles: int = CYCLES // buses) -> None:
+        for _ in range(cycles):
             change(slaves)
             rig.run_for(20_000)
 
-    work()
-    what = f"127 slaves, {count[0]} frames/s, {wire.load_permille() / 10} % load"
-    rates(what, 1, "x real time", work)
+    for wire in wires:
+        wire.observers.append(hear)
+    work(CYCLES)
+    for wire in wires:
+        wire.observers.clear()
+    load = wires[0].load_permille() / 10
+    where = f" on {buses} buses" if buses > 1 else ""
+    what = f"{len(slaves)} slaves{where}, {count[0]} frames/s, {load} % load"
+    rates(what, CYCLES // buses / CYCLES, "x real time", work)
+
+
+def sync_to_tpdo() -> None:
+    """Let SYNC fetch a TPDO of eight bytes, in process."""
+    slave, sync = make_slave(tpdo_dictionary(produces_sync=False), NODE_ID), (CanFrame(0x80),)
+    slave.tick(1_000, ())
+    slave.dictionary[0x1017, 0].assign(bytes(2))
+    slave.tick(2_000, (CanFrame(0, b"\x01\x00"),))
+    now_us = 2_000
+
+    def work() -> None:
+        nonlocal now_us
+        for _ in range(CALLS):
+            now_us += 1_000
+            sent = slave.tick(now_us, sync)
+        assert [frame.can_id for frame in sent] == [0x180 + NODE_ID]
+
+    rates("SYNC in, TPDO out, in process", CALLS, "/s", work)
 
 
 def change(slaves: list[CanopenSlave]) -> None:

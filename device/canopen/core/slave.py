@@ -161,6 +161,14 @@ class CanopenSlave(Copyable):
         """
         self._out.append(data_frame(can_id, data))
 
+    def put(self, frame: CanFrame) -> None:
+        """Put a frame into this tick's traffic that was made before.
+
+        Args:
+            frame: a data frame.
+        """
+        self._out.append(frame)
+
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
         """Raise an error: it is active until it is cleared, and raising it again is none.
 

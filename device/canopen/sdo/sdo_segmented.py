@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import (
     FRAME_BYTES,
@@ -106,7 +107,8 @@ class SegmentedDownload:
         self._data, self._toggle = bytearray(), 0
         announced = int.from_bytes(request[4:], "little") if request[0] & SIZE_INDICATED else None
         self._size = DownloadSize(server, entry, announced)
-        self._most = self._size.most
+        self._most, self._put = self._size.most, server.node.put
+        self._taken = {at: data_frame(server.response_id, TAKEN[at]) for at in TAKEN}
         server.confirm(ServerCommand.DOWNLOAD)
         server.wait(self._segment)
 
@@ -121,7 +123,7 @@ class SegmentedDownload:
             self._size.check(len(data))
         if command & LAST:
             self._commit()
-        self._server.respond(TAKEN[toggle])
+        self._put(self._taken[toggle])
         self._toggle = toggle ^ TOGGLE
         if command & LAST:
             self._server.end()
