@@ -282,3 +282,10 @@ def test_no_time_passes_on_a_bench_that_is_closed() -> None:
     bench.close()
     with pytest.raises(BenchError, match="the bench is closed: no time passes"):
         bench.run_for("1s")
+
+
+def test_a_condition_that_takes_what_it_sees_is_true_once_and_that_is_enough() -> None:
+    with Bench(Rrc()) as bench:
+        host = bench.link  # EV:Initialized comes
+        assert bench.wait_until(lambda: bool(host.receive(0)), within="1s")
+        assert bench.now_us < 100_000
