@@ -217,9 +217,12 @@ class Table(Immutable):
         right = bisect_right(self.times_us, at_us)
         if right in (0, len(self.values)) or not self.linear:
             return self.values[max(0, right - 1)]
+        left, then = self.values[right - 1 : right + 1]
+        if left == then:
+            return left  # to the bit: it is said not to change
         left_us, right_us = self.times_us[right - 1 : right + 1]
         way = (at_us - left_us) / (right_us - left_us)
-        return self.values[right - 1] * (1 - way) + self.values[right] * way
+        return left * (1 - way) + then * way
 
     def next_us(self, t_us: int, /) -> int:
         """Return the time at which it may be another."""

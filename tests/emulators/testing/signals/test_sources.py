@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isclose, pi, sin
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tickrig.emulators.testing.signals.sources import (
@@ -95,6 +95,7 @@ sources = st.one_of(
 
 @settings(max_examples=300)
 @given(sources, st.integers(0, 20_000))
+@example(Table((0, 375), (77.0, 77.0)), 0)
 def test_nothing_changes_before_it_says_so(source: Source, at_us: int) -> None:
     next_us = source.next_us(at_us)
     assert next_us > at_us
