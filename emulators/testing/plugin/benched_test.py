@@ -168,23 +168,18 @@ class BenchedTest:
         bench.check_tasks()
         if unheard := self.take_unheard():
             pytest.fail("\n".join(unheard), pytrace=False)
-        complaints = self._health.complaints(self._allowed) if self._health else ()
-        if found := [*complaints, *self._unsafe(bench)]:
+        found = list(self._health.complaints(self._allowed)) if self._health else []
+        try:
+            found += unsafe(bench, self._safe)
+        except NotOnThisBench as error:  # no reason to skip a test that has passed
+            refusal = f"bench_safe cannot be checked: {error}"
+            if not found:
+                raise BenchBlocked(f"the test has passed, but {refusal}") from None
+            found.append(refusal)
+        if found:
             text = "after the test the bench is not as it has to be:"
             pytest.fail("\n".join([text, *found]), pytrace=False)
         self._passed = True
-
-    def _unsafe(self, bench: Bench) -> list[str]:
-        """Return what is not safe; a test that has passed is not skipped for what nobody can tell.
-
-        Raises:
-            BenchBlocked: this bench cannot do what the check asks.
-        """
-        try:
-            return unsafe(bench, self._safe)
-        except NotOnThisBench as error:
-            text = f"the test has passed, but bench_safe cannot be checked: {error}"
-            raise BenchBlocked(text) from None
 
     def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
         """Say what blocked a phase of the test, and tell with a failure what there is to know."""

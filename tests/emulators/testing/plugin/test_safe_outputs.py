@@ -108,3 +108,23 @@ def test_skipped(bench):
     result.stdout.fnmatch_lines(
         [f"ERROR *::test_safe - blocked: {told}", "FAILED *::test_failed - *assert 0"]
     )
+
+
+def test_a_check_that_this_bench_cannot_do_hides_nothing_else(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makefile(".toml", rig='[device.urg]\ntype = "urg"\n')
+    pytester.makepyfile(
+        """
+        def test_lost(bench):
+            bench.run_for("3s")
+            bench.link.send(b"SCIP2.0\\nBM\\nMD0044072501000\\n")
+            bench.run_for("5s")  # nobody reads
+        """
+    )
+    pytester.makeconftest(REFUSAL + FIXTURE.format(safe="refuse"))
+    result = run("--bench", "rig.toml")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        ["urg: * bytes found a buffer full", "bench_safe cannot be checked: nobody sees the lamp"]
+    )
