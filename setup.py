@@ -73,6 +73,7 @@ def extensions() -> list[Extension]:
         group_name="tickrig",  # of the library that mypyc puts beside the package
         multi_file=True,  # so that all cores compile
         opt_level=os.environ.get("MYPYC_OPT_LEVEL", "2"),
+        debug_level="0",
     )
     for extension in made:  # a product is rounded before it is added, whatever the processor can
         extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Final
 from zlib import crc32
 
+from tickrig.device.twin import Part
+
 _MASK: Final = 2**64 - 1
 _GOLDEN_GAMMA: Final = 0x9E37_79B9_7F4A_7C15
 
 
-class Chance:
+class Chance(Part):
     """A seeded generator of integers (SplitMix64: Steele, Lea, Flood 2014).
 
     Args:

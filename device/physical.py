@@ -101,11 +101,11 @@ class QuantityBank:
         self._values = {name: item.initial for name, item in self.table.items()}
         self._on_change, self.changed = on_change, True
 
-    def __getitem__(self, name: str) -> float:
+    def __getitem__(self, name: str) -> int | float:
         """Return the present value of an input."""
         return self._values[name]
 
-    def set(self, name: str, value: float | str) -> None:
+    def set(self, name: str, value: int | float | str) -> None:
         """Set an input.
 
         Args:
@@ -120,7 +120,7 @@ class QuantityBank:
         if self._on_change is not None:
             self._on_change()
 
-    def check(self, name: str, value: float | str) -> float:
+    def check(self, name: str, value: int | float | str) -> int | float:
         """Check a value, without setting it.
 
         Args:

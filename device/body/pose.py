@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, remainder, sin, tau
 
+from tickrig.device.twin import Immutable
+
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(Immutable):
     """A place on a plane, and the way to look.
 
     Attributes:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.device.twin import Immutable
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.modbus.requests import ExceptionCode, Refusal
 
 WORD: Final = 0x1_0000
@@ -39,7 +39,7 @@ class Register(Immutable):
     writable: bool = False
 
 
-class Registers:
+class Registers(Part):
     """The numbers of a device.
 
     A number of 32 bits is written as a whole; half of it is an illegal address.

@@ -128,7 +128,7 @@ class Rh3Base(Copyable):
         """Begin as after power-up, where it stands."""
         self._restarted = True
 
-    def read(self, name: str, /) -> float:
+    def read(self, name: str, /) -> int | float:
         """Look at an output, as it was left by the latest tick.
 
         Args:

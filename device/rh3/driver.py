@@ -12,6 +12,7 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rh3.register_map import TABLE
 from tickrig.device.rh3.side import Side
 from tickrig.device.rh3.terminals import SIDES
+from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rh3 import Command, Fault, Mode, Status
 
@@ -23,7 +24,7 @@ DELAYED: Final = TARGETS | {"mode", "command"}
 """What takes effect after the delay."""
 
 
-class Driver:
+class Driver(Part):
     """Runs two wheels as its registers say (rh3-control, drive protocol, register map A).
 
     A fault of one wheel takes the power from both and shorts the motors; it stays until

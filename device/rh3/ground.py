@@ -8,12 +8,13 @@ from tickrig.device.body.contact import Contact
 from tickrig.device.body.pose import Pose, arc
 from tickrig.device.chance import Chance
 from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.twin import Part
 
 STEP_S: Final = 1e-3
 HALF: Final = 2.0**63
 
 
-class Ground:
+class Ground(Part):
     """Takes the turning of two wheels for a way over the ground, on exact arcs.
 
     Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.

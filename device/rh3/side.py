@@ -11,6 +11,7 @@ from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import PER_MILLE, BaseParameters
 from tickrig.device.rh3.speed_loop import PositionLoop, SpeedLoop
 from tickrig.device.rh3.wheel import Wheel
+from tickrig.device.twin import Part
 from tickrig.wire.rh3 import Fault
 
 STALL_MS: Final = 500
@@ -19,7 +20,7 @@ STALL_MS: Final = 500
 INT32: Final = 2**32
 
 
-class Side:
+class Side(Part):
     """A wheel, its encoder counter and its servo.
 
     Args:

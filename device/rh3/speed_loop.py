@@ -7,12 +7,13 @@ from typing import Final
 
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.rh3.parameters import PER_MILLE
+from tickrig.device.twin import Part
 
 DEADBAND: Final = 1
 """Counts that are near enough."""
 
 
-class PositionLoop:
+class PositionLoop(Part):
     """A PID loop from counts to counts/ms, with gains P in 1/s, I in 1/s2, D plain.
 
     Args:
@@ -52,7 +53,7 @@ INTEGRAL_LIMIT: Final = 10_000.0
 """Counts that the integral holds at most; a choice."""
 
 
-class SpeedLoop:
+class SpeedLoop(Part):
     """A PID loop on the counts of each millisecond (rh3-control, wheel servo).
 
     Torque in per mille = VP e + VI sum(e) + VD delta(e), with e in counts/ms, cut to the

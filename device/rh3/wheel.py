@@ -6,6 +6,7 @@ from math import copysign, floor
 from typing import Final
 
 from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.twin import Part
 
 SLOW: Final = 0.5
 """Counts/ms below which friction can hold a wheel."""
@@ -14,7 +15,7 @@ BRAKE: Final = 500.0
 """Per mille of torque with which the shorted motor brakes; a choice."""
 
 
-class Wheel:
+class Wheel(Part):
     """Turns by torque against friction and load, a millisecond a step.
 
     Not emulated: inductance and back-EMF of the motor, play and stiffness of the gear,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from tickrig.device.servo.parameters import PowerStage, ServoParameters
 from tickrig.device.servo.thermal import Temperatures, ThermalModel
+from tickrig.device.twin import Part
 
 
-class I2t:
+class I2t(Part):
     """The I2t protection of a power stage.
 
     A budget of (peak^2 - continuous^2) * time fills by the square of the
@@ -64,7 +65,7 @@ def derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
 AGES_S = 1e9  # after this all temperatures stand still
 
 
-class Heat:
+class Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:

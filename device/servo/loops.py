@@ -6,9 +6,10 @@ from math import copysign, pi
 
 from tickrig.device.servo.discretisation import STEP_S
 from tickrig.device.servo.parameters import ServoParameters
+from tickrig.device.twin import Part
 
 
-class Loops:
+class Loops(Part):
     """A position loop around a velocity loop, in control steps of 1 ms.
 
     Position: proportional, in whole counts; an error below one count counts as

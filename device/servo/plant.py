@@ -7,6 +7,7 @@ from math import exp, pi
 
 from tickrig.device.servo.discretisation import STEP_S, Row, discretise
 from tickrig.device.servo.parameters import ServoParameters
+from tickrig.device.twin import Part
 
 
 @dataclass(slots=True)
@@ -29,7 +30,7 @@ class Losses:
 BREAKAWAY = 1.02  # static friction by dry friction; it ends a creep, and makes no jump
 
 
-class Plant:
+class Plant(Part):
     """The electro-mechanical part of a servo, at the motor shaft.
 
     Dry friction is a torque within bounds that is as large as it must be to

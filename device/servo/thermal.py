@@ -6,20 +6,21 @@ from dataclasses import dataclass
 from math import expm1, sqrt
 
 from tickrig.device.servo.parameters import MotorParameters
+from tickrig.device.twin import Immutable, Part
 
 COPPER_PER_K = 0.0039  # growth of the resistance of copper, of its value at 25 degC
 HOTTEST_C = 1_000.0  # no motor is left beyond this, and no model
 
 
 @dataclass(frozen=True, slots=True)
-class Temperatures:
+class Temperatures(Immutable):
     """Temperatures of a motor, degC."""
 
     winding_c: float
     housing_c: float
 
 
-class ThermalModel:
+class ThermalModel(Part):
     """Winding and housing, heated by the current in the winding.
 
     The heat is R I^2, and R grows with the temperature, which keeps the

@@ -6,7 +6,7 @@ take bound methods of compiled classes for atoms, and such a copy would act on t
 original.
 """
 
-from tickrig.device.twin.copyable import Copyable, Immutable, NonCopyable, itself
+from tickrig.device.twin.copyable import Copyable, Immutable, NonCopyable, Part, itself
 from tickrig.device.twin.listeners import Cache, Listeners
 from tickrig.device.twin.pickler import restore, state_of, twin
 
@@ -16,6 +16,7 @@ __all__ = [
     "Immutable",
     "Listeners",
     "NonCopyable",
+    "Part",
     "itself",
     "restore",
     "state_of",

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, NoReturn, SupportsIndex, TypeVar
 
 from tickrig._compiled import mypyc_attr
-from tickrig.device.twin.pickler import state_of, twin
+from tickrig.device.twin.pickler import restore, state_of, twin
 
 T = TypeVar("T")
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
+@mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Immutable:
     """A description that never changes once it is made, as that of a dictionary.
 
@@ -22,7 +22,15 @@ class Immutable:
     """
 
     __slots__ = ()
-    shared_by_twins = True
+    shared_by_twins: ClassVar[bool] = True
+
+    def __getstate__(self) -> object:
+        """Return the state for a pickle."""
+        return state_of(self)
+
+    def __setstate__(self, state: object) -> None:
+        """Become what was pickled."""
+        restore(self, state)
 
     def __copy__(self: T) -> T:
         """Return it itself."""
@@ -33,7 +41,14 @@ class Immutable:
         return self
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
+@mypyc_attr(serializable=True)
+class Part:
+    """What a machine consists of; it is copied with it."""
+
+    __slots__ = ()
+
+
+@mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Copyable:
     """A machine whose twin is had by `copy.deepcopy`, `pickle` or `twin`.
 
@@ -70,7 +85,7 @@ class NonCopyable:
     """
 
     __slots__ = ()
-    why_not_copied = "the copy would act on the original; make a new one"
+    why_not_copied: ClassVar[str] = "the copy would act on the original; make a new one"
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> NoReturn:
         """Refuse; everything that copies asks here."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import copyreg
 import pickle
 from collections.abc import Mapping
-from copyreg import _slotnames  # type: ignore[attr-defined] # what pickle asks, too
 from enum import Enum
 from io import BytesIO
 from typing import Any, Final, NoReturn, TypeVar
@@ -30,7 +30,7 @@ def state_of(machine: object, begun: Mapping[str, object] = NOTHING) -> Any:
     if compiled is None:
         state = object.__getstate__(machine)
     else:
-        names = (*compiled, *_slotnames(type(machine)))
+        names = (*compiled, *copyreg._slotnames(type(machine)))  # type: ignore[attr-defined] # pickle asks it too
         own = {name: getattr(machine, name) for name in names if hasattr(machine, name)}
         state = own.pop("__dict__", None) or getattr(machine, "__dict__", None), own
     if not begun:
@@ -44,7 +44,7 @@ def restore(machine: object, state: Any) -> None:
     """Give a twin the state that `state_of` returned; for `__setstate__`."""
     attributes, others = state if isinstance(state, tuple) else (state, {})
     for name, value in {**(attributes or {}), **others}.items():
-        setattr(machine, name, value)
+        object.__setattr__(machine, name, value)  # also of what is frozen
 
 
 def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
@@ -89,9 +89,16 @@ class _Pickler(pickle.Pickler):
             self.shared.append(item)
         elif id(item) in self._known and item is not _shared:
             self.shared.append(self._known[id(item)])
+        elif _is_frozen_and_compiled(type(item)):  # `pickle` would assign to its fields
+            return copyreg.__newobj__, (type(item),), state_of(item), None, None, restore  # type: ignore[attr-defined]
         else:
             return NotImplemented
         return _shared, (len(self.shared) - 1,)
+
+
+def _is_frozen_and_compiled(kind: type) -> bool:
+    parameters = getattr(kind, "__dataclass_params__", None)
+    return parameters is not None and parameters.frozen and hasattr(kind, "__mypyc_attrs__")
 
 
 class _Unpickler(pickle.Unpickler):

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from tickrig.device.twin import Immutable
 from tickrig.device.urg.parameters import LAST_STEP
 from tickrig.device.urg.settings import Settings
 from tickrig.device.urg.texts import first_version
@@ -46,7 +47,7 @@ class Sensor(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Capture:
+class Capture(Immutable):
     """A G that waits for a scan.
 
     Attributes:

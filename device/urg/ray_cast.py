@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from math import asin, atan2, ceil, cos, floor, hypot, inf, sin, tau
 from typing import Final
 
+from tickrig.device.twin import Part
 from tickrig.device.urg.world import Post, Wall, World
 
 BLUR: Final = 1e-6
@@ -19,7 +20,7 @@ Span = tuple[int, int]
 """The first beam and the one behind the last."""
 
 
-class Beams:
+class Beams(Part):
     """Beams from a place, evenly spaced to the left.
 
     Args:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from tickrig.device.body.pose import Pose
+from tickrig.device.twin import Part
 from tickrig.device.urg import first_protocol
 from tickrig.device.urg.first_protocol import Capture
 from tickrig.device.urg.parameters import URG_04LX, UrgParameters
@@ -33,7 +34,7 @@ Answer = tuple[str, tuple[bytes, ...]]
 """Status and lines."""
 
 
-class ScipServer:
+class ScipServer(Part):
     """Obeys commands and gives scans out (SCIP 2.0, sensor commands).
 
     Until it is switched it obeys those of SCIP 1.1 (`first_protocol`).

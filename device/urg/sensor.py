@@ -85,7 +85,7 @@ class Urg(Copyable):
         """Begin as after power-up."""
         self._restarted = True
 
-    def read(self, name: str, /) -> float:
+    def read(self, name: str, /) -> int | float:
         """Look at an output, as it was left by the latest tick.
 
         Args:

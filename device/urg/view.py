@@ -11,6 +11,7 @@ from typing import Final
 
 from tickrig.device.body.pose import Pose
 from tickrig.device.chance import Chance
+from tickrig.device.twin import Immutable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.ray_cast import Beams
 from tickrig.device.urg.world import World
@@ -28,7 +29,7 @@ class NoDistance(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class View(Immutable):
     """A scan; rays are cast when somebody asks for their distances.
 
     Not emulated: the way that the sensor goes during a scan; angle of incidence, colour and

@@ -13,7 +13,7 @@ Rays = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class Wall(Immutable):
     """A straight wall between two places, in m."""
 
     x1_m: float
@@ -43,7 +43,7 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class Post:
+class Post(Immutable):
     """A round post; with a radius of 0 it is not there."""
 
     x_m: float

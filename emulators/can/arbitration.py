@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, Final
 
+from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def dominant(frames: Sequence[CanFrame]) -> CanFrame:
     return min(frames, key=lambda frame: (frame.dlc, frame.data))
 
 
-class CanArbiter:
+class CanArbiter(Part):
     """The first frames of all queues, sorted as the bits on the bus would sort them.
 
     All times are in the units of the segment.

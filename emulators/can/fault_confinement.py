@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final
 
+from tickrig.device.twin import Part
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER
 
@@ -18,7 +19,7 @@ BACK_FROM_PASSIVE: Final = 119
 """REC after a good frame in a passive receiver; 119 to 127 is allowed."""
 
 
-class ErrorCounters:
+class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
     Not emulated: the receiver's further 8 for a dominant bit after its error
@@ -88,7 +89,7 @@ class ErrorCounters:
             self.state = ErrorState.ACTIVE
 
 
-class FaultConfinement:
+class FaultConfinement(Part):
     """Counts what went well and what failed; a good frame costs nothing on a sound bus.
 
     Args:
@@ -155,7 +156,7 @@ SEQUENCE_BITS: Final = 11
 """A node returns after 128 times 11 recessive bits in a row (ISO 11898-1, bus-off recovery)."""
 
 
-class Recovery:
+class Recovery(Part):
     """Counts, for each node that was asked to return, the sequences it has seen.
 
     Args:

@@ -8,6 +8,7 @@ from enum import Enum, auto
 from typing import Final
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
+from tickrig.device.twin import Immutable, Part
 
 DELAY_US: Final = 10_000
 """How long a delayed node sends nothing."""
@@ -23,7 +24,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class CanFaultType:
+class CanFaultType(Immutable):
     """A fault that can be armed by name.
 
     Attributes:
@@ -55,7 +56,7 @@ CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
 }
 
 
-class CanFaults:
+class CanFaults(Part):
     """The faults of one bus; those with a rate have a chance of their own.
 
     Chance is drawn once for each frame on the bus, and once for each time a

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Cache
+from tickrig.device.twin import Cache, Part
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ EXTENDED: Final = 1 << 29
 CACHED_ROUTES: Final = 4_096
 
 
-class CanRoutes:
+class CanRoutes(Part):
     """The ends of a bus and their filters, looked up once for each CAN-ID.
 
     Attributes:

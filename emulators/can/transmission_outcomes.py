@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Listeners
+from tickrig.device.twin import Listeners, Part
 from tickrig.emulators.can.arbitration import CanArbiter, dominant
 from tickrig.emulators.can.busy_time import BusyTime
 from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
@@ -26,7 +26,7 @@ RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter t
 SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 
 
-class TransmissionOutcomes:
+class TransmissionOutcomes(Part):
     """What a transmission on the bus can end in, and what all nodes make of it.
 
     Times are in units of which a bit and a microsecond are whole multiples; only time

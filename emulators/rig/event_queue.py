@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from heapq import heappop, heappush
 from typing import Final
 
-from tickrig.device.twin import state_of
+from tickrig.device.twin import Part, state_of
 from tickrig.wire.instant import NEVER
 
 Action = Callable[[int], None]
@@ -19,7 +19,7 @@ _Entry = tuple[int, int, Hashable, Action]
 """When, the number of its entering, its key, and what."""
 
 
-class EventQueue:
+class EventQueue(Part):
     """Actions by time; those of the same time in the order they were entered."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, TypeVar, overload
 
 from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
-from tickrig.device.twin import Copyable, Listeners, restore, state_of, twin
+from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -32,7 +32,7 @@ T = TypeVar("T")
 U = TypeVar("U")
 
 
-class Station(Generic[W]):
+class Station(Part, Generic[W]):
     """A device on a port.
 
     Attributes:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
+from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.rig.rig import Station
 
 
-class Timetable:
+class Timetable(Part):
     """Ticks with work, soonest first, each with its stations.
 
     A station stands at one tick, `station.at_us`. Where it stood before it was

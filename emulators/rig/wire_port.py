@@ -6,12 +6,15 @@ from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 from tickrig.device.core import Device, W
-from tickrig.emulators.rig.port import Port, Wire
+from tickrig.emulators.rig.port import Wire
 
 
 @runtime_checkable
-class WirePort(Port[W], Protocol[W]):
-    """A port that says when traffic has arrived, so that nobody need look."""
+class WirePort(Protocol[W]):
+    """A `Port` that says when traffic has arrived, so that nobody need look.
+
+    It is not derived from it: a compiled base has more names than what is looked for.
+    """
 
     @property
     def wire(self) -> Wire:

@@ -6,6 +6,7 @@ __version__ = "0.1.0"
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from tickrig._compiled import compiled as compiled
     from tickrig.device.core import Device as Device
     from tickrig.device.physical import InputBank as InputBank
     from tickrig.device.physical import InputSignal as InputSignal
@@ -43,6 +44,7 @@ else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
+            "tickrig._compiled": ("compiled",),
             "tickrig.device.core": ("Device",),
             "tickrig.device.physical": ("InputBank", "InputSignal", "OutputSignal", "SignalType"),
             "tickrig.device.twin": ("Copyable",),

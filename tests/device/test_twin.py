@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
@@ -18,6 +19,8 @@ from tickrig.device.twin import (
     NonCopyable,
     itself,
     pickler,
+    restore,
+    state_of,
     twin,
 )
 
@@ -189,3 +192,77 @@ def test_attributes_of_a_compiled_machine_are_copied() -> None:
     other = twin(machine)
     other.event()
     assert (machine.part.count, other.part.count) == (5, 6)
+
+
+class AsCompiled:
+    """Names its attributes as a compiled class does; `level` may be missing."""
+
+    __slots__ = ("level", "name")
+    __mypyc_attrs__ = ("name", "level")
+    level: int
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __getstate__(self) -> object:
+        return state_of(self)
+
+
+class AsDerived(AsCompiled):
+    """A class of a user, derived from it: with a `__dict__` and a slot."""
+
+    __slots__ = ("__dict__", "extra")
+
+
+@dataclass(frozen=True, slots=True)
+class AsFrozen:
+    """A frozen value of a compiled class."""
+
+    __mypyc_attrs__ = ("size",)
+    size: int
+
+
+def test_the_state_of_a_compiled_class_is_copied() -> None:
+    copied = twin(AsCompiled("lamp"))
+    assert copied.name == "lamp"
+    assert not hasattr(copied, "level")
+
+
+def test_so_is_that_of_a_class_derived_from_it() -> None:
+    lamp = AsDerived("lamp")
+    lamp.extra, lamp.free = 5, 6  # type: ignore[attr-defined] # as users do
+    copied = twin(lamp)
+    assert (copied.name, copied.extra, vars(copied)) == ("lamp", 5, {"free": 6})  # type: ignore[attr-defined]
+
+
+def test_so_is_a_frozen_value_of_one() -> None:
+    value = AsFrozen(5)
+    copied = twin(value)
+    assert copied == value
+    assert copied is not value
+
+
+def test_a_state_is_restored_with_what_a_twin_begins_with() -> None:
+    lamp = AsCompiled("lamp")
+    restore(lamp, state_of(lamp, {"level": 3}))
+    assert lamp.level == 3
+    plain = Plain()
+    restore(plain, state_of(plain, {"level": 3}))
+    assert vars(plain) == {"level": 3}
+
+
+class Plain:
+    """Has nothing but a `__dict__`."""
+
+
+class Described(Immutable):
+    """A description with slots that is no dataclass."""
+
+    __slots__ = ("text",)
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+
+def test_a_pickle_has_a_description_by_value() -> None:
+    assert pickle.loads(pickle.dumps(Described("lamp"))).text == "lamp"

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.wire.errors import FramingError, WireError
 from tickrig.wire.scip.encoding import with_sum, without_sum
 from tickrig.wire.scip.scip1 import OK, SWITCH
@@ -58,6 +59,7 @@ class Reply:
         return cls(echo, status.decode(), tuple(rest[1:]))
 
 
+@mypyc_attr(serializable=True)
 class ReplySplitter:
     """Collects bytes and gives whole replies; chunking makes no difference.
 

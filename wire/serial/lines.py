@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from tickrig._compiled import mypyc_attr
 
+
+@mypyc_attr(serializable=True)
 class LineSplitter:
     r"""Collects bytes and gives whole lines; chunking makes no difference.
 

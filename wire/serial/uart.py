@@ -42,7 +42,7 @@ class UartSetting:
     baud: int = 115_200
     data_bits: int = 8
     parity: Parity = "N"
-    stop_bits: float = 1
+    stop_bits: int | float = 1
 
     def __post_init__(self) -> None:
         """Check the values."""

@@ -8,6 +8,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
+from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import (
     BIT_RATES,
@@ -43,7 +44,7 @@ IDENTIFY: Final[tuple[Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, le)
 """Identify remote slave: revision and serial number in a range, bounds included."""
 
 
-class MessageSequence:
+class MessageSequence(Part):
     """One request in several messages; a wrong one or a missing one ends it.
 
     Args:
@@ -65,7 +66,7 @@ class MessageSequence:
         return self._step == len(self._tests)
 
 
-class FastScanner:
+class FastScanner(Part):
     """Follows a fastscan: one part of the LSS address after the other."""
 
     def __init__(self) -> None:

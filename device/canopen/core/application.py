@@ -44,7 +44,7 @@ class Application(Service):
         """
         self.inputs = QuantityBank(table, groups, self.request)
 
-    def read(self, name: str) -> float | str:
+    def read(self, name: str) -> int | float | str:
         """Look at a physical output.
 
         Args:

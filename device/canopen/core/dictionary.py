@@ -9,7 +9,7 @@ from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.twin import Immutable
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
@@ -63,7 +63,7 @@ class DictionaryDescription(Immutable):
         return iter(self.entries)
 
 
-class Dictionary:
+class Dictionary(Part):
     """All entries of one slave: values of its own, and a description that it shares.
 
     Args:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -16,7 +17,7 @@ Guard = Callable[["Entry", Value], None]
 OnEntry = Callable[["Entry"], None]
 
 
-class Entry:
+class Entry(Part):
     """The value of a variable, or of one element of an array or record.
 
     Its bytes are kept as they go over the wire. The service that owns an object
@@ -168,7 +169,7 @@ class Entry:
         except SdoAbort:
             return
 
-    def _check_limits(self, value: float) -> None:
+    def _check_limits(self, value: int | float) -> None:
         low, high = self.description.low, self.description.high
         if high is not None and value > high:
             raise SdoAbort(AbortCode.VALUE_TOO_HIGH)

@@ -9,6 +9,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import AnalogueObjects, find_number
+from tickrig.device.twin import Part
 
 REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
 
@@ -39,7 +40,7 @@ def limits(entry: Entry) -> tuple[int, int]:
     return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
 
 
-class AnalogueChannel:
+class AnalogueChannel(Part):
     """One channel: its objects, its converter, its scaling.
 
     The widest integer object has the counts; narrower ones have their upper bits.

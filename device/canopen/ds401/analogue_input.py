@@ -19,9 +19,10 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.physical import InputSignal
+from tickrig.device.twin import Part
 
 
-class EventRule:
+class EventRule(Part):
     """The limits and deltas of one channel, as integers or as REAL32.
 
     Each bit of the interrupt trigger selection (6421h) is an event of its own:
@@ -81,7 +82,7 @@ class EventRule:
 BANK_CHANNELS: Final = 32
 
 
-class InterruptSource:
+class InterruptSource(Part):
     """Banks of 32 channels; reading a bank over the bus clears it.
 
     Attributes:
@@ -113,7 +114,7 @@ DEFAULT_TRIGGER: Final = 7
 """Limits and delta (6421h)."""
 
 
-class AnalogueInput:
+class AnalogueInput(Part):
     """Converts, scales and judges one channel.
 
     Integer limits and deltas are right-aligned: in the unit of the widest integer

@@ -16,9 +16,10 @@ from tickrig.device.canopen.ds401.families import (
     find_number,
 )
 from tickrig.device.physical import OutputSignal
+from tickrig.device.twin import Part
 
 
-class AnalogueOutput:
+class AnalogueOutput(Part):
     """Puts one channel out.
 
     Integer error values are right-aligned: in the unit of the object, and limited

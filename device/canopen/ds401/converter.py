@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import floor
 
+from tickrig.device.twin import Immutable
+
 
 @dataclass(frozen=True, slots=True)
-class Converter:
+class Converter(Immutable):
     """A linear converter between a physical quantity and the counts of an object.
 
     >>> adc = Converter("v", "V", low=0.0, high=5.0, high_raw=4095, shift=3)

@@ -9,6 +9,7 @@ from typing import Final
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.errors.error_behaviour import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
 from tickrig.device.physical import InputSignal, QuantityBank, SignalType
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 
 NO_BEHAVIOUR: Final = 0
@@ -16,7 +17,7 @@ NO_BEHAVIOUR: Final = 0
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceFault:
+class DeviceFault(Immutable):
     """A physical fault that the module detects.
 
     Attributes:
@@ -67,7 +68,7 @@ INTERNAL_FAILURE: Final = DeviceFault(
 )
 
 
-class FaultDetector:
+class FaultDetector(Part):
     """Sees faults come and go: EMCY, and what 1029h says.
 
     Args:

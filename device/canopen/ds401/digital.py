@@ -24,6 +24,7 @@ from tickrig.device.canopen.ds401.families import (
     DigitalObjects,
     elements,
 )
+from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 
 
@@ -49,7 +50,7 @@ class View(NamedTuple):
         return ((bits & self.lines) >> self.shift).to_bytes(self.entry.size, "little")
 
 
-class Bits:
+class Bits(Part):
     """What one family of objects says of all lines; line 1 is the lowest bit.
 
     If objects of several widths name a line, a change of one changes the others.
@@ -117,7 +118,7 @@ FILTER_US: Final = 10_000
 """How long a filtered line must be stable; the profile leaves it to the device."""
 
 
-class DigitalInputs:
+class DigitalInputs(Part):
     """All digital inputs of a module; line 1 is the lowest bit.
 
     Attributes:
@@ -183,7 +184,7 @@ def _ones(bits: int) -> Iterator[int]:
         bits ^= lowest
 
 
-class DigitalOutputs:
+class DigitalOutputs(Part):
     """All digital outputs of a module; line 1 is the lowest bit.
 
     The filter mask holds lines as they are.

@@ -164,7 +164,7 @@ class Ds401(Application):
         """Put error values out."""
         self._fail(failed=True)
 
-    def read(self, name: str) -> float:
+    def read(self, name: str) -> int | float:
         """Look at an output, as it was left by the latest tick.
 
         Args:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.parameters import clamped
 from tickrig.device.canopen.ds402.state.automaton import DriveState, Statusword
+from tickrig.device.twin import Part
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.dictionary import Dictionary
@@ -70,7 +71,7 @@ MEASURES: Final[Mapping[int, Measure]] = {
 """What the objects show, by index."""
 
 
-class ActualValues:
+class ActualValues(Part):
     """What those of the objects show that the device has, as the latest tick left it.
 
     They are worked out when somebody asks, those with watchers in each tick: a bus reads two

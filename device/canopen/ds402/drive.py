@@ -175,7 +175,7 @@ class Ds402(Application):
         """Whether it is in Operation enabled."""
         return self.automaton.state is DriveState.OPERATION_ENABLED
 
-    def read(self, name: str) -> float | str:
+    def read(self, name: str) -> int | float | str:
         """Look at an output, as it was left by the latest tick.
 
         Args:

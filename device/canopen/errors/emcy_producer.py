@@ -10,6 +10,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.twin import Part
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.datatypes import Value
@@ -122,7 +123,7 @@ class EmcyProducer(Service):
         self.schedule(self._free_us)
 
 
-class ErrorHistory:
+class ErrorHistory(Part):
     """Keeps the latest errors, the newest at sub-index 1.
 
     Sub-index 0 counts them; 0 written to it forgets them all, other values are

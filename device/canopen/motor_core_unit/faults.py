@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.twin import Immutable
 from tickrig.wire.canopen.emcy import ErrorRegister
 
 
 @dataclass(frozen=True, slots=True)
-class Measurements:
+class Measurements(Immutable):
     """What the unit measures of itself.
 
     Attributes:
@@ -44,7 +45,7 @@ class Measurements:
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(Immutable):
     """One row of the table.
 
     Attributes:

@@ -9,6 +9,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.motor_core_unit.objects import References
 from tickrig.device.canopen.motor_core_unit.shaft import Shaft
 from tickrig.device.canopen.motor_core_unit.trajectory import CONTROL_US, DEGREE, Trajectory
+from tickrig.device.twin import Part
 
 
 class Mode(IntEnum):
@@ -182,7 +183,7 @@ class Status(IntFlag):
     FAULT = 8
 
 
-class Display:
+class Display(Part):
     """Writes 2001h and 6401h, once a control tick.
 
     Args:

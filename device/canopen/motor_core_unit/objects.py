@@ -9,6 +9,7 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.motor_core_unit.trajectory import MAX_VELOCITY_UDEG_S
 from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
+from tickrig.device.twin import Part
 
 FULL_SCALE: Final = 0x2010
 ANGLE_OFFSET: Final = 0x2011
@@ -21,7 +22,7 @@ MAX_CURRENT_MA: Final = 10_000
 """Peak (NEDO report, Table 6)."""
 
 
-class References:
+class References(Part):
     """Reference, limits and full scales.
 
     Full scale is 32767. After a failure the error value of 6444h:01 is the reference, if

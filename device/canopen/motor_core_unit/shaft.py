@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import remainder
 
 from tickrig.device.servo.servo import Servo
+from tickrig.device.twin import Part
 
 
-class Shaft:
+class Shaft(Part):
     """Counts of the motor encoder as an angle of the shaft; the gear encoder says where 0 is.
 
     Args:

@@ -106,7 +106,7 @@ class MotorCoreUnit(Application):
         self.watch([self._mode, *self._references.entries])
         self._begin_us, self._mode_was_written = 0, False
 
-    def read(self, name: str) -> float | str:
+    def read(self, name: str) -> int | float | str:
         """Return the present value of a physical output."""
         if name in READINGS:
             return READINGS[name](self.servo)

@@ -10,6 +10,7 @@ from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
@@ -30,7 +31,7 @@ class Watch(Enum):
     LOST = auto()
 
 
-class Monitor:
+class Monitor(Part):
     """Watches the heartbeat of one node.
 
     Args:

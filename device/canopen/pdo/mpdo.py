@@ -10,6 +10,7 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.pdo.pdo_packing import make_write, present
 from tickrig.device.canopen.pdo.tpdo_modes import PdoSender, TpdoMode
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.pdo import MPDO_DATA_BYTES, Dispatched, Mpdo, Scanned
@@ -111,7 +112,7 @@ class SamProducer(MpdoQueue):
             self.put(entry.key, entry)
 
 
-class DamConsumer:
+class DamConsumer(Part):
     """Writes the object that an MPDO in destination address mode names.
 
     One for another node is ignored, one for a missing object is answered with
@@ -139,7 +140,7 @@ class DamConsumer:
         make_write(entry)(mpdo.data[: entry.size])
 
 
-class SamConsumer:
+class SamConsumer(Part):
     """Writes the object that the dispatching list has for an object of a producer.
 
     What is not in the list is ignored.

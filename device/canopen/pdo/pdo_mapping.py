@@ -10,6 +10,7 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.pdo.mpdo import DISPATCHING_LISTS, SCANNER_LISTS
 from tickrig.device.canopen.pdo.pdo_packing import Slot, total_bits
 from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import (
@@ -36,7 +37,7 @@ SAM_LISTS: Final = {Access.RPDO: DISPATCHING_LISTS, Access.TPDO: SCANNER_LISTS}
 _NOTHING: Final = MappedObject(0, 0, 0)
 
 
-class PdoMapping:
+class PdoMapping(Part):
     """What a PDO carries, and the order in which it may be changed.
 
     An object is mapped while the PDO is invalid and sub-index 0 is 0; it is

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.pdo import pack_bits, unpack_bits
 
 Pack = Callable[[], bytes]
@@ -97,7 +98,7 @@ def _split(steps: list[tuple[Unpack, int, int]], data: bytes) -> None:
         write(data[start:end])
 
 
-class _Bits:
+class _Bits(Part):
     """Objects that do not fill whole bytes, behind each other."""
 
     __slots__ = ("_slots",)

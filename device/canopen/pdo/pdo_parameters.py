@@ -7,6 +7,7 @@ from typing import Final
 from tickrig.device.canopen.core.abort import SdoAbort, whole_number
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry, OnEntry
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -29,7 +30,7 @@ MAX_SYNC_START: Final = 240
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 
 
-class PdoParameters:
+class PdoParameters(Part):
     """When and under which CAN-ID a PDO goes over the bus.
 
     The CAN-ID, the inhibit time and the SYNC start value change only while the

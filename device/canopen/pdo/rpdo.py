@@ -16,6 +16,7 @@ from tickrig.device.canopen.pdo.pdo_parameters import (
     SYNCHRONOUS,
     PdoParameters,
 )
+from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
@@ -32,7 +33,7 @@ _Target = tuple[Unpack, int]
 """What takes the bytes, and how many it needs."""
 
 
-class Rpdo:
+class Rpdo(Part):
     """Gives what it receives to the mapped objects, at once or with the next SYNC.
 
     A frame with too few bytes is not used: EMCY 8210h. One with too many is used

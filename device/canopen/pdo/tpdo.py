@@ -26,6 +26,7 @@ from tickrig.device.canopen.pdo.tpdo_modes import (
     SynchronousCyclic,
     TpdoMode,
 )
+from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import DAM_MPDO, SAM_MPDO
@@ -42,7 +43,7 @@ RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
 }
 
 
-class Tpdo:
+class Tpdo(Part):
     """Sends the mapped objects when its transmission type says so.
 
     For its mode it is the sender: parameters, `pack`, `send`, `wake`.

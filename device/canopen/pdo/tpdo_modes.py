@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
+from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ class PdoSender(Protocol):
         """Have the mode run at this time, unless it is run earlier anyway."""
 
 
-class TpdoMode:
+class TpdoMode(Part):
     """A TPDO that does nothing by itself; a remote frame fetches it.
 
     Attributes:

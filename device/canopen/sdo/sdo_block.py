@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.sdo.sdo_segmented import DownloadSize
+from tickrig.device.twin import Part
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_block import crc16
 from tickrig.wire.canopen.sdo.sdo_command import (
@@ -32,7 +33,7 @@ _END_MASK: Final = 0xE1
 """Command specifier and subcommand of the end; n is between them."""
 
 
-class BlockDownload:
+class BlockDownload(Part):
     """Collects a value in blocks; the object changes when the client has ended the transfer.
 
     A segment out of sequence is dropped, and the block acknowledged at its end
@@ -103,7 +104,7 @@ class BlockDownload:
         self._server.end()
 
 
-class BlockUpload:
+class BlockUpload(Part):
     """Gives a value as it was when the client asked for it, a block in one tick.
 
     A value no longer than the client's protocol switch threshold is given by

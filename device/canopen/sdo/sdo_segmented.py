@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.twin import Part
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import (
@@ -35,7 +36,7 @@ TAKEN: Final = {
 """Response to a downloaded segment, by its toggle bit."""
 
 
-class DownloadSize:
+class DownloadSize(Part):
     """Judges the size that a client announces, and that of what comes.
 
     Args:
@@ -70,7 +71,7 @@ class DownloadSize:
             raise SdoAbort(AbortCode.OUT_OF_MEMORY)
 
 
-class SegmentedUpload:
+class SegmentedUpload(Part):
     """Gives a value as it was when the client asked for it."""
 
     def __init__(self, server: SdoServer, data: bytes) -> None:
@@ -99,7 +100,7 @@ class SegmentedUpload:
         self._server.end()
 
 
-class SegmentedDownload:
+class SegmentedDownload(Part):
     """Collects a value; the object changes when the last segment has come."""
 
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.sdo.sdo_block import BlockDownload, BlockUpload
 from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload, SegmentedUpload
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import (
@@ -35,7 +36,7 @@ MEMORY_BYTES: Final = 64 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class SdoLimits:
+class SdoLimits(Immutable):
     """What CiA 301 leaves to the device.
 
     Attributes:
@@ -77,7 +78,7 @@ _EXPEDITED: Final = tuple(
 _FILL: Final = tuple(bytes(EXPEDITED_BYTES - size) for size in range(EXPEDITED_BYTES + 1))
 
 
-class SdoServer:
+class SdoServer(Part):
     """Serves one client: one transfer at a time, every kind of CiA 301.
 
     Where CiA 301 leaves it open: requests that do not have 8 bytes are ignored.

@@ -157,7 +157,9 @@ def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> byte
     return data
 
 
-def _limits(file: EdsFile, section: str, kind: DataType) -> tuple[float | None, float | None]:
+def _limits(
+    file: EdsFile, section: str, kind: DataType
+) -> tuple[int | float | None, int | float | None]:
     """Return the limits of a number; other types have none."""
     low, high = _limit(file, section, "LowLimit", kind), _limit(file, section, "HighLimit", kind)
     if low is not None and high is not None and low > high:
@@ -166,7 +168,7 @@ def _limits(file: EdsFile, section: str, kind: DataType) -> tuple[float | None, 
     return low, high
 
 
-def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> float | None:
+def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float | None:
     text = file.numeric(section, key) if kind.is_integer else file.value(section, key)
     try:
         return parse_limit(kind, text) if text else None

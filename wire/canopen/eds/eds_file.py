@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
+from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 
 LONGEST: Final = 40
@@ -64,6 +65,7 @@ _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 _COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
+@mypyc_attr(serializable=True)
 class EdsFile:
     """The sections of an EDS or DCF, in the spelling of CiA 306 whatever that of the file.
 

@@ -75,7 +75,7 @@ def plain_numbers(text: str) -> str:
     return _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
 
 
-def parse_limit(kind: DataType, text: str) -> float | None:
+def parse_limit(kind: DataType, text: str) -> int | float | None:
     """Read a limit; None if the type has none or it is that of every value of the type."""
     if kind not in FLOATS and (not kind.is_integer or NODE_ID in text.upper()):
         return None
@@ -83,7 +83,7 @@ def parse_limit(kind: DataType, text: str) -> float | None:
     return value if isinstance(value, int | float) else None
 
 
-def format_limit(kind: DataType, limit: float) -> str:
+def format_limit(kind: DataType, limit: int | float) -> str:
     """Write a limit, of a float as its bytes where they hold it."""
     with suppress(ValueError):
         if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:

@@ -8,6 +8,7 @@ from enum import Flag, IntEnum
 from operator import attrgetter
 from typing import Final, NamedTuple
 
+from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.datatypes import DataType, Value
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
@@ -129,12 +130,12 @@ class EntryDescription:
         access: Access,
         *,
         default: Value | None = None,
-        low: float | None = None,
-        high: float | None = None,
+        low: int | float | None = None,
+        high: int | float | None = None,
         relative: bool = False,
         max_bytes: int = MAX_VARIABLE_BYTES,
         unit: str = "",
-        factor: float = 1,
+        factor: int | float = 1,
     ) -> None:
         self.index, self.sub, self.key, self.name = index, sub, index << 8 | sub, name
         self.data_type, self.access = data_type, access
@@ -183,6 +184,7 @@ class Element(NamedTuple):
     relative: bool = False
 
 
+@mypyc_attr(serializable=True)
 class ObjectTable:
     """Collects objects, sorted by index and sub-index when they are given out.
 
@@ -217,8 +219,8 @@ class ObjectTable:
         access: Access,
         default: Value | None = None,
         *,
-        low: float | None = None,
-        high: float | None = None,
+        low: int | float | None = None,
+        high: int | float | None = None,
         relative: bool = False,
     ) -> None:
         """Add a variable."""

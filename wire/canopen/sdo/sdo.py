@@ -114,18 +114,18 @@ class _Initiate:
         return cls(*at, frame[4 : 4 + size], size if indicated else None)
 
 
-@dataclass(frozen=True, slots=True)
 class DownloadInitiateRequest(_Initiate):
     """Initiate SDO download."""
 
-    COMMAND: ClassVar[int] = ClientCommand.DOWNLOAD
+    __slots__ = ()
+    COMMAND = ClientCommand.DOWNLOAD
 
 
-@dataclass(frozen=True, slots=True)
 class UploadInitiateResponse(_Initiate):
     """Answer to `UploadInitiateRequest`."""
 
-    COMMAND: ClassVar[int] = ServerCommand.UPLOAD
+    __slots__ = ()
+    COMMAND = ServerCommand.UPLOAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +147,18 @@ class _Named:
         return cls(*index_sub(frame))
 
 
-@dataclass(frozen=True, slots=True)
 class UploadInitiateRequest(_Named):
     """Initiate SDO upload."""
 
-    COMMAND: ClassVar[int] = ClientCommand.UPLOAD
+    __slots__ = ()
+    COMMAND = ClientCommand.UPLOAD
 
 
-@dataclass(frozen=True, slots=True)
 class DownloadInitiateResponse(_Named):
     """Answer to `DownloadInitiateRequest`: expedited data is written, or segments may come."""
 
-    COMMAND: ClassVar[int] = ServerCommand.DOWNLOAD
+    __slots__ = ()
+    COMMAND = ServerCommand.DOWNLOAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,18 +208,18 @@ class _Toggled:
         return cls(bool(frame[0] & TOGGLE))
 
 
-@dataclass(frozen=True, slots=True)
 class UploadSegmentRequest(_Toggled):
     """Ask for the next segment."""
 
-    COMMAND: ClassVar[int] = ClientCommand.UPLOAD_SEGMENT
+    __slots__ = ()
+    COMMAND = ClientCommand.UPLOAD_SEGMENT
 
 
-@dataclass(frozen=True, slots=True)
 class DownloadSegmentResponse(_Toggled):
     """Answer to a `Segment` of a download."""
 
-    COMMAND: ClassVar[int] = ServerCommand.DOWNLOAD_SEGMENT
+    __slots__ = ()
+    COMMAND = ServerCommand.DOWNLOAD_SEGMENT
 
 
 Request = (

@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum, IntFlag, auto
 from typing import Final, NamedTuple
 
+from tickrig.device.twin import Part
+
 
 class Switch(IntFlag):
     """The switches of an axis, by their bits in 60FDh."""
@@ -83,7 +85,7 @@ class Phase(Enum):
     FAILED = auto()
 
 
-class HomingSearch:
+class HomingSearch(Part):
     """Looks for the home of a method.
 
     The edge that counts is crossed slowly in every case: an axis that hits the

@@ -14,6 +14,7 @@ from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
 from tickrig.device.canopen.ds402.objects.settings import Settings
 from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
+from tickrig.device.twin import Part
 
 
 @dataclass(slots=True, kw_only=True)
@@ -39,7 +40,7 @@ class DriveView:
     fresh: bool = False
 
 
-class Mode:
+class Mode(Part):
     """No mode: the motor comes to a standstill and is held there.
 
     A mode moves the reference of the axis, which is that of the mode before when it
@@ -137,7 +138,7 @@ class Mode:
         return self.take(self.drive.limits.current(wanted_a))
 
 
-class Window:
+class Window(Part):
     """Finds out whether something has been inside for long enough: windows and thresholds.
 
     Attributes:

@@ -17,6 +17,7 @@ from tickrig.device.canopen.ds402.motion.trapezoid import (
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.settings import Settings
 from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
+from tickrig.device.twin import Immutable
 
 SLOWEST: Final = 1.0
 """Counts per second: a profile has to end some time."""
@@ -26,7 +27,7 @@ STEEPEST: Final = 1e12
 
 
 @dataclass(frozen=True, slots=True)
-class SetPoint:
+class SetPoint(Immutable):
     """A target and how to get there, as it was when the set-point was given.
 
     Attributes:

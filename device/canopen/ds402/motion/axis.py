@@ -7,12 +7,13 @@ from typing import Final
 from tickrig.device.canopen.ds402.motion.motor import Motor
 from tickrig.device.canopen.ds402.motion.reference import Control, Reference
 from tickrig.device.canopen.ds402.objects.settings import Settings
+from tickrig.device.twin import Part
 
 STANDSTILL_TURNS_S: Final = 0.5
 """A motor that turns more slowly stands: its encoder resolves no better within a tick."""
 
 
-class Axis:
+class Axis(Part):
     """Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
 
     Attributes:

@@ -8,6 +8,7 @@ from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
 from tickrig.device.canopen.ds402.motion.switches import Switches
 from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
+from tickrig.device.twin import Part
 
 
 class Clamped(NamedTuple):
@@ -22,7 +23,7 @@ class Clamped(NamedTuple):
     clamped: bool
 
 
-class Limits:
+class Limits(Part):
     """What an axis may do.
 
     Args:

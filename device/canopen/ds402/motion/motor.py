@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
+from tickrig.device.twin import Part
+
 
 class Motor(Protocol):
     """A motor with power stage, encoder and control loops; see `device.servo.servo.Servo`.
@@ -75,7 +77,7 @@ class Motor(Protocol):
 COUNTS_S2_PER_A: Final = 1_000.0
 
 
-class IdealMotor:
+class IdealMotor(Part):
     """A motor that is at once where it shall be, and as fast as it shall be.
 
     It stands still at once when it is released. A current turns it as a mass without

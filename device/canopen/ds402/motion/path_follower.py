@@ -5,9 +5,10 @@ from __future__ import annotations
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.ds402.motion.reference import Reference
 from tickrig.device.canopen.ds402.motion.trapezoid import Motion, Path
+from tickrig.device.twin import Part
 
 
-class PathFollower:
+class PathFollower(Part):
     """Keeps the reference on a path, as long as nobody else moves it.
 
     The reference that a mode finds is that of the tick before: there a path begins.

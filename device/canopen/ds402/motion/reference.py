@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum, auto
 from typing import Final
 
+from tickrig.device.twin import Part
+
 STEP_S: Final = 0.001
 """Period of the control, in seconds: one tick."""
 
@@ -17,7 +19,7 @@ class Control(Enum):
     CURRENT = auto()
 
 
-class Reference:
+class Reference(Part):
     """The demanded motion; it belongs to the drive and outlives a change of the mode.
 
     What a mode does not control follows the motor: the position in velocity modes,

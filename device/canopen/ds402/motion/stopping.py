@@ -10,6 +10,7 @@ from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
+from tickrig.device.twin import Part
 
 
 class Ramp(IntEnum):
@@ -25,7 +26,7 @@ STAYING: Final = 4
 """Added to a quick stop option: the drive stays in Quick stop active."""
 
 
-class Stopping:
+class Stopping(Part):
     """Slows the reference of an axis down.
 
     Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.

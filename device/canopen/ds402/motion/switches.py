@@ -6,6 +6,7 @@ from math import inf
 from typing import Final
 
 from tickrig.device.physical import InputSignal, QuantityBank
+from tickrig.device.twin import Part
 
 FAR_DEG: Final = 1e9
 """An angle that no shaft ever reaches."""
@@ -31,7 +32,7 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 )
 
 
-class Switches:
+class Switches(Part):
     """The switches as the drive sees them: pressed by hand, or by the shaft at an angle.
 
     Negative and positive are directions of the user, as 607Eh makes them.

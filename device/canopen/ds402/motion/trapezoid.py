@@ -15,6 +15,8 @@ from enum import IntEnum
 from math import copysign, cos, pi, sin, sqrt
 from typing import Final, NamedTuple
 
+from tickrig.device.twin import Immutable, Part
+
 US_PER_S: Final = 1_000_000
 
 
@@ -34,7 +36,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class PathLimits:
+class PathLimits(Immutable):
     """What a path may use, all greater than 0.
 
     Attributes:
@@ -58,7 +60,7 @@ class Leg(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class RampLeg:
+class RampLeg(Immutable):
     """A leg at its place in time and way."""
 
     end_s: float
@@ -85,7 +87,7 @@ class RampLeg:
         )
 
 
-class Path:
+class Path(Part):
     """A planned way; after its end it goes on with its last velocity.
 
     Attributes:

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import OnEntry
 from tickrig.device.canopen.ds402.objects.indices import DEFAULTS
+from tickrig.device.twin import Part
 
 
-class Parameters:
+class Parameters(Part):
     """Reads objects, and writes those that are there.
 
     Args:

@@ -9,6 +9,7 @@ from typing import Final
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.indices import NO_LIMIT
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
+from tickrig.device.twin import Immutable, Part
 
 NO_TORQUE_LIMIT: Final = 0xFFFF
 
@@ -39,7 +40,7 @@ CONFIGURATION: Final = (
 """Objects whose change makes the settings anew."""
 
 
-class Units:
+class Units(Part):
     """Converts between objects and the counts of the motor's encoder.
 
     A position unit is one count, or what 6091h and 6092h make of a revolution of
@@ -71,7 +72,7 @@ class Units:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Immutable):
     """A snapshot of the configuration.
 
     Positions are in counts from where the encoder was switched on less the home

@@ -9,6 +9,7 @@ from typing import Final
 from tickrig.device.canopen.ds402.motion.stopping import Stopping
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.error_codes import is_controllable
+from tickrig.device.twin import Part
 
 
 class Controlword(IntFlag):
@@ -118,7 +119,7 @@ def command_of(controlword: int) -> Command | None:
     return None
 
 
-class Automaton:
+class Automaton(Part):
     """Transitions 5 and 8 are made when the motor stands, if their option says so.
 
     Args:

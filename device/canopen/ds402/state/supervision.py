@@ -8,13 +8,14 @@ from typing import Final
 from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
 from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
+from tickrig.device.twin import Immutable, Part
 
 OPEN_PHASE_SHARE: Final = 0.05
 """Below this share of the current limit no current flows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
+class Bounds(Immutable):
     """What a drive takes for sound.
 
     Attributes:
@@ -30,7 +31,7 @@ class Bounds:
     stall_us: int = 1_000_000
 
 
-class Supervision:
+class Supervision(Part):
     """Finds faults by what the drive measures.
 
     Args:
