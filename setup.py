@@ -5,6 +5,7 @@ All else about the build stands in pyproject.toml.
 """
 
 import os
+import re
 import sys
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
@@ -54,6 +55,24 @@ class ParallelBuildExt(build_ext):
         super().build_extensions()
 
 
+INIT = re.compile(
+    r"(\w+)_init\(PyObject \*self, PyObject \*args, PyObject \*kwds\)\n\{\n    return 0;\n\}"
+)
+
+
+def call_init(source: Path) -> None:
+    """Mend what mypyc 2.4 writes: nobody calls the `__init__` of a class with `serializable`."""
+    text = source.read_text()
+
+    def mended(found: re.Match[str]) -> str:
+        init = f"CPyPy_{found[1]}_____init__"
+        if f"PyObject *ret = {init}(self, args, kwds)" in text:  # its `__new__` calls it
+            return found[0]
+        return found[0].replace("return 0;", f"return {init}(self, args, kwds) == NULL ? -1 : 0;")
+
+    source.write_text(INIT.sub(mended, text))
+
+
 def compiled_modules() -> list[str]:
     """Return the paths of the modules that are compiled, as pyproject.toml lists them."""
     table = tomllib.loads(Path("pyproject.toml").read_text())["tool"]["tickrig"]["compiled"]
@@ -75,6 +94,8 @@ def extensions() -> list[Extension]:
         opt_level=os.environ.get("MYPYC_OPT_LEVEL", "2"),
         debug_level="0",
     )
+    for source in Path("build").glob("__native_*.c"):
+        call_init(source)
     for extension in made:  # a product is rounded before it is added, whatever the processor can
         extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]
     return made

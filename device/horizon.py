@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from tickrig.device.twin import Part
 
-class Horizon:
+
+class Horizon(Part):
     """What a rig knows of time, told to those devices on it that have an attribute `horizon`.
 
     Attributes:

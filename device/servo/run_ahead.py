@@ -9,13 +9,14 @@ from math import copysign, floor
 from tickrig.device.servo.discretisation import STEP_S
 from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.plant import BREAKAWAY, Plant
+from tickrig.device.twin import Immutable
 
 Demands = Sequence[tuple[float, float]]
 """Position in counts and velocity in counts/s, for each step."""
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class Bounds(Immutable):
     """Where a run ends: before a step that would lead out of these bounds.
 
     Attributes:

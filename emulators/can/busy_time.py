@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
+from tickrig.device.twin import Part
+
 KEPT_SPANS: Final = 32_768
 
 
-class BusyTime:
+class BusyTime(Part):
     """The latest spans of time in which a bus was busy; frames behind each other are one span.
 
     Times are whole numbers of any unit.

@@ -7,13 +7,14 @@ from functools import partial
 from heapq import heapify, heapreplace
 from typing import Final
 
+from tickrig.device.twin import Part
 from tickrig.emulators.rig.port import Host, Wire
 from tickrig.wire.instant import NEVER
 
 _NOBODY: Final[tuple[Host, ...]] = ()
 
 
-class Wires:
+class Wires(Part):
     """Wires that are moved on together, each by itself for as long as nobody can notice.
 
     What ends on one wire may let a station send on another, but not before its next tick.

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.servo.run_ahead import RunAhead
+from tickrig.device.twin import Part
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.drive import Ds402
@@ -16,7 +17,7 @@ FEWEST: Final = 2
 """Ticks that are worth it."""
 
 
-class Stretch:
+class Stretch(Part):
     """The ticks ahead of a drive in which nothing but plain motion happens.
 
     Between two SYNCs a drive in csp does the same each millisecond. Where its rig says that
