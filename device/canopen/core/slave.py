@@ -23,6 +23,7 @@ UNCONFIGURED: Final = 0xFF
 """Node-ID of a slave that waits for LSS (CiA 305)."""
 
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
+REMOTE: Final = 1 << 29
 
 _priority = itemgetter(0)
 """Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as out of the
@@ -99,10 +100,10 @@ class CanopenSlave(Copyable):
         self.time_of_day: TimeOfDay | None = None
         self.silent_until_us, self.model = 0, ""
         self.horizon: Horizon | None = None
+        # Not one attribute more: beyond 28 CPython keeps a table of names for each slave, 1.3 KB.
         self._powered = False
         self._out: list[CanFrame] = []
-        self._handlers: dict[int, Handler]
-        self._remote_handlers: dict[int, Handler]
+        self._handlers: dict[int, Handler]  # by CAN-ID, those of remote frames by REMOTE | CAN-ID
         self.accepts: frozenset[int] | None = None
         self.reconfigured_by: frozenset[int] = frozenset()
         self.on_accepts: list[Callable[[], None]] = []
@@ -228,7 +229,7 @@ class CanopenSlave(Copyable):
 
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
-        self._handlers, self._remote_handlers = {}, {}
+        self._handlers = {}
         reconfigured_by: list[int] = []
         for service in self.services:
             reconfigured_by += service.reconfigured_by(self.state)
@@ -236,9 +237,9 @@ class CanopenSlave(Copyable):
                 first = self._handlers.get(can_id)
                 self._handlers[can_id] = _Both(first, handler).handle if first else handler
             for can_id, handler in service.remote_handlers(self.state):
-                self._remote_handlers[can_id] = handler
+                self._handlers[REMOTE | can_id] = handler
         self.reconfigured_by = frozenset(reconfigured_by)
-        self._listen_to(frozenset((*self._handlers, *self._remote_handlers)))
+        self._listen_to(frozenset(key & ~REMOTE for key in self._handlers))
 
     def _listen_to(self, accepts: frozenset[int] | None) -> None:
         self.accepts = accepts
@@ -305,7 +306,7 @@ class CanopenSlave(Copyable):
 
     def _receive_special(self, frame: CanFrame) -> None:
         """Handle a remote frame; 29-bit frames are for nobody here."""
-        handler = self._remote_handlers.get(frame.can_id)
+        handler = self._handlers.get(REMOTE | frame.can_id)
         if frame.remote and not frame.extended and handler is not None:
             handler(frame)
 
