@@ -10,6 +10,9 @@ from tickrig.emulators.testing.bench.errors import BenchError
 REFUSALS: Final = (ValueError, TypeError, LookupError, BenchError)
 """What our calls raise where a caller is wrong; all else is shown whole."""
 
+OURS: Final = ("tickrig", "contextlib")
+"""Packages of our frames, and of what calls them."""
+
 
 def end_at_caller(error: BaseException) -> None:
     """Cut our frames from the end of a traceback, if a call of ours refused something.
@@ -19,7 +22,7 @@ def end_at_caller(error: BaseException) -> None:
     """
     entry, last = error.__traceback__, None
     while entry is not None:
-        if _package_of(entry) != "tickrig":
+        if _package_of(entry) not in OURS:
             last = entry
         entry = entry.tb_next
     if isinstance(error, REFUSALS) and last and _package_of(last) not in ("_pytest", "pluggy"):

@@ -30,8 +30,8 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
     if report.when == "call":
         report.when = "setup"  # pytest and JUnit call it an error then
     report.sections.append(("bench: blocked", reason))
-    _cut(report)
     crash = getattr(report.longrepr, "reprcrash", None)
+    _cut(report, told=crash is not None and reason in crash.message)
     if crash is None:
         report.longrepr = f"blocked: {reason}\n{report.longreprtext}".rstrip()
     elif reason in crash.message:
@@ -40,15 +40,23 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
         crash.message = f"blocked: {reason}: {crash.message}"
 
 
-def _cut(report: pytest.TestReport) -> None:
-    """Leave those parts of a traceback away that are ours: they tell nothing of the reason."""
+def _cut(report: pytest.TestReport, *, told: bool) -> None:
+    """Leave those parts of a traceback away that are ours: they tell nothing of the reason.
+
+    Args:
+        report: of the test.
+        told: whether the reason is all there is to tell, so that nothing else need be left.
+    """
     traceback = getattr(report.longrepr, "reprtraceback", None)
     entries = getattr(traceback, "reprentries", [])
     theirs = [entry for entry in entries if not _is_ours(entry)]
-    if traceback is not None and theirs:
+    if traceback is not None and (theirs or told):
         traceback.reprentries = theirs
 
 
 def _is_ours(entry: object) -> bool:
     place = getattr(entry, "reprfileloc", None)
-    return place is not None and Path(place.path).absolute().is_relative_to(PACKAGE)
+    if place is None:
+        return False
+    path = Path(place.path).absolute()
+    return path.is_relative_to(PACKAGE) or path.name == "contextlib.py"

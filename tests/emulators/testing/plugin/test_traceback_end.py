@@ -49,3 +49,28 @@ def test_what_is_no_refusal_is_shown_whole(pytester: pytest.Pytester, run: Run) 
         """
     )
     run().stdout.fnmatch_lines(["E *AttributeError: *", "*bench_device.py:*: AttributeError"])
+
+
+def test_a_bench_that_is_not_there_needs_no_traceback(pytester: pytest.Pytester, run: Run) -> None:
+    pytester.makefile(
+        ".toml",
+        rig="""
+        [device.rrc]
+        type = "rrc"
+        [hardware]
+        control = "none.ctl"
+        [hardware.rrc]
+        port = "/dev/none"
+        """,
+    )
+    pytester.makepyfile("def test_one(bench): pass")
+    result = run("--bench", "rig.toml", "--bench-mode", "hardware")
+    result.stdout.fnmatch_lines(
+        [
+            "_* ERROR at setup of test_one _*",
+            "-* bench: blocked -*",
+            "rrc: no emulator at *none.ctl*",
+        ],
+        consecutive=True,
+    )
+    result.stdout.fnmatch_lines(["ERROR *::test_one - *blocked: rrc: no emulator at *"])
