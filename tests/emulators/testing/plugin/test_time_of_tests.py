@@ -109,7 +109,7 @@ def test_a_thread_of_a_fixture_that_sleeps_fails_its_test(
     )
     result = run()
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*test_a_*.py:11: time.sleep is called, but in virtual time *"])
+    result.stdout.fnmatch_lines(["*test_a_*.py:11: time.sleep is called in a thread, *"])
 
 
 @pytest.mark.parametrize(("mode", "outcome"), [("virtual", "skipped"), ("real", "passed")])
