@@ -76,16 +76,19 @@ class Journal(WireLog):
 
 
 def text_of(lines: Sequence[WireLine]) -> str:
-    """Write lines for people: time in seconds, which wire or device, direction, text.
+    """Write what is kept for people, a line each.
 
     How many lines came before these, and are kept no more, stands above them.
     """
-    written = [
-        f"{format_time(line.at_us)} {line.source} {line.mark} {escape(line.data)}" for line in lines
-    ]
+    written = [line_text(line) for line in lines]
     if missing := missing_of(lines):
         written.insert(0, f"({missing})")
     return "\n".join(written)
+
+
+def line_text(line: WireLine) -> str:
+    """Write a line for people: time in seconds, which wire or device, direction, text."""
+    return f"{format_time(line.at_us)} {line.source} {line.mark} {escape(line.data)}"
 
 
 def missing_of(lines: Sequence[WireLine]) -> str:

@@ -19,7 +19,7 @@ from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.journal import text_of
+from tickrig.emulators.testing.bench.journal import line_text
 from tickrig.emulators.testing.bench.modes.real.outside import Outside
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of
@@ -171,7 +171,7 @@ def _setting_shown(mount: LineMount) -> Callable[[str], None]:
 def _show(line: WireLine, *, everything: bool) -> None:
     """Show what was done, and what passed if that is wanted too."""
     if everything or line.mark is Mark.PHYSICAL:
-        click.echo(text_of([line]))
+        click.echo(line_text(line))
 
 
 class _StateWatch:

@@ -31,7 +31,7 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
         report.when = "setup"  # pytest and JUnit call it an error then
     report.sections.append(("bench: blocked", reason))
     crash = getattr(report.longrepr, "reprcrash", None)
-    _cut(report, told=crash is not None and reason in crash.message)
+    _cut(report, shown=crash is not None and reason in crash.message)
     if crash is None:
         report.longrepr = f"blocked: {reason}\n{report.longreprtext}".rstrip()
     elif reason in crash.message:
@@ -40,17 +40,17 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
         crash.message = f"blocked: {reason}: {crash.message}"
 
 
-def _cut(report: pytest.TestReport, *, told: bool) -> None:
+def _cut(report: pytest.TestReport, *, shown: bool) -> None:
     """Leave those parts of a traceback away that are ours: they tell nothing of the reason.
 
     Args:
         report: of the test.
-        told: whether the reason is all there is to tell, so that nothing else need be left.
+        shown: whether the reason is all there is to tell, so that nothing else need be left.
     """
     traceback = getattr(report.longrepr, "reprtraceback", None)
     entries = getattr(traceback, "reprentries", [])
     theirs = [entry for entry in entries if not _is_ours(entry)]
-    if traceback is not None and (theirs or told):
+    if traceback is not None and (theirs or shown):
         traceback.reprentries = theirs
 
 
