@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.twin import Immutable
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.emcy import ErrorRegister
 
 
@@ -148,7 +148,7 @@ FAULTS: Final = (
 """In this order; what is seen first is reported first."""
 
 
-class Supervision:
+class Supervision(Part):
     """The faults that there are: each is reported by EMCY, and again when it is cleared.
 
     Args:

@@ -47,7 +47,7 @@ LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
 """The velocity is planned."""
 
 
-class Motion:
+class Motion(Part):
     """Plans one control tick after the other, and gives it to the motor ms by ms.
 
     Whatever begins goes on from the motion that is: the planned velocity if there

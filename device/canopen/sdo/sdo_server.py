@@ -108,7 +108,7 @@ class SdoServer(Part):
         self.block_size = MAX_BLOCK_SIZE
         self._entries = node.dictionary.by_multiplexer
         self._multiplexer: bytes
-        self._idle: Final[State] = self._without_transfer
+        self._idle: State = self._without_transfer
         self._state: State
         self.due_us: int
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Flag, IntEnum
 from operator import attrgetter
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -83,6 +83,7 @@ class ObjectDescription(NamedTuple):
     code: ObjectCode = ObjectCode.VAR
 
 
+@mypyc_attr(serializable=True)
 class EntryDescription:
     """What never changes of a variable, or of one element of an array or record (CiA 306).
 
@@ -119,7 +120,7 @@ class EntryDescription:
         *("low", "max_bytes", "name", "readable", "relative", "signed", "size", "sub"),
         *("unit", "writable"),
     )
-    shared_by_twins = True
+    shared_by_twins: ClassVar[bool] = True
 
     def __init__(  # noqa: PLR0913 - a description, by keyword
         self,
