@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tomllib
@@ -81,7 +82,10 @@ def test_installed_it_is_there_and_can_be_left_out(pytester: pytest.Pytester) ->
 
 
 @pytest.mark.usefixtures("installed")
-def test_in_the_tree_it_is_registered_once_installed_or_not(pytester: pytest.Pytester) -> None:
+def test_in_the_tree_it_is_registered_once_installed_or_not(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)  # it imports tests.soak
     pytester.makeconftest((ROOT / "conftest.py").read_text())
     pytester.makepyfile(
         "def test_one(pytestconfig):\n    assert pytestconfig.pluginmanager.has_plugin('tickrig')\n"
