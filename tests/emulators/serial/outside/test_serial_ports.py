@@ -57,7 +57,7 @@ def test_an_unknown_name_tells_the_known_ones(url: str, side: SerialSide) -> Non
         serial.serial_for_url("tickrig://nix")
     with (
         SERIAL_PORTS.offer("left", side),
-        pytest.raises(serial.SerialException, match="'.*://left'"),
+        pytest.raises(serial.SerialException, match=r"'.*://left'"),
     ):
         serial.serial_for_url("tickrig://Left")
 
