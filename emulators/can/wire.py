@@ -20,6 +20,7 @@ WINDOW_US: Final = 1_000_000
 BABBLER: Final = -1  # number of the node that the fault `babble` adds
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CanWire(Copyable):
     r"""A classic CAN bus (ISO 11898-1); each node has a `CanEnd`.
 
