@@ -17,7 +17,7 @@ from benchmarks.table import BUSY, Row, turn_ns
 PAGE = ROOT / "docs" / "performance.md"
 MARKED = re.compile(r"(?<=<!-- tools/bench --page -->\n).*?(?=<!-- end -->)", re.DOTALL)
 SUITES = ("can", "canopen", "drives", "servo", "urg", "rh3", "rtc", "rtc-canopen", "rrc")
-ROUNDS = 3
+ROUNDS = 2
 OURS = "tickrig: "
 PEERS = ("python-canopen LocalNode: ", "durand: ")
 LIMIT = "limit: "
@@ -25,12 +25,16 @@ LIMIT = "limit: "
 HEAD = "| work | pure | compiled | best peer | ratio | limit |\n|---|---|---|---|---|---|\n"
 
 
-def write() -> None:
-    """Measure this tree, pure and compiled, and write the table into the page."""
+def write(wheel: str) -> None:
+    """Measure this tree, pure and compiled, and write the table into the page.
+
+    Args:
+        wheel: the compiled one; it is built if there is none.
+    """
     with tempfile.TemporaryDirectory() as folder:
         tell = lambda text: print(text, file=sys.stderr, flush=True)  # noqa: E731 - one line says it
-        tell("building the compiled wheel")
-        sides = HERE, compiled(Path(folder))
+        tell("installing the compiled wheel" if wheel else "building the compiled wheel")
+        sides = HERE, compiled(Path(folder), wheel)
         pure, fast = (merged(each) for each in in_turn(sides, SUITES, ROUNDS, tell))
     text = PAGE.read_text("utf-8")
     if not MARKED.search(text):

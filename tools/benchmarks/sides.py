@@ -42,10 +42,12 @@ def revision(name: str, folder: Path) -> Side:
     return Side(name, folder / "src")
 
 
-def compiled(folder: Path) -> Side:
-    """Return this tree as a compiled wheel has it, unpacked into a folder."""
+def compiled(folder: Path, wheel: str) -> Side:
+    """Return this tree as a compiled wheel has it, unpacked into a folder; built if not given."""
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder)]
-    subprocess.run([*pip, str(ROOT)], env=os.environ | {"TICKRIG_COMPILE": "1"}, check=True)
+    subprocess.run(
+        [*pip, wheel or str(ROOT)], env=os.environ | {"TICKRIG_COMPILE": "1"}, check=True
+    )
     return Side("compiled", folder)
 
 
