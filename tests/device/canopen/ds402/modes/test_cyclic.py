@@ -244,3 +244,31 @@ def test_outputs_show_what_an_observer_sees(wheel: Wheel) -> None:
     assert (shown["position"], shown["mode"]) == (wheel.read(0x6064), 3)
     assert shown["drive_state"] == "Operation enabled"
     assert shown["current_a"] == wheel.read(0x6078) / 1_000
+
+
+def test_a_line_is_ahead_as_it_is_then_run(wheel: Wheel) -> None:
+    wheel.step("000#0101")
+    wheel.enable(8)
+    wheel.write(0x607A, 200)
+    wheel.step("080#")
+    ahead = wheel.drive.mode.ahead(20)
+    run = []
+    for _ in range(20):
+        wheel.step()
+        run.append((wheel.drive.axis.reference.position, wheel.drive.axis.reference.velocity))
+    assert ahead == run
+    assert ahead[-1] == (pytest.approx(200), 0.0)
+
+
+def test_a_line_is_ahead_up_to_where_a_limit_cuts_it(wheel: Wheel) -> None:
+    wheel.step("000#0101")
+    wheel.enable(8)
+    wheel.write(0x607A, 10_000_000)
+    wheel.step("080#")
+    assert wheel.drive.mode.ahead(20) == []
+
+
+@pytest.mark.parametrize("mode", [1, 7])
+def test_other_modes_are_known_step_by_step_alone(wheel: Wheel, mode: int) -> None:
+    wheel.enable(mode)
+    assert wheel.drive.mode.ahead(20) == []
