@@ -257,7 +257,7 @@ def test_a_line_is_ahead_as_it_is_then_run(wheel: Wheel) -> None:
         wheel.step()
         run.append((wheel.drive.axis.reference.position, wheel.drive.axis.reference.velocity))
     assert ahead == run
-    assert ahead[-1] == (pytest.approx(200), 0.0)
+    assert ahead[-1] == pytest.approx((200, 0))
 
 
 def test_a_line_is_ahead_up_to_where_a_limit_cuts_it(wheel: Wheel) -> None:
