@@ -16,7 +16,7 @@ from benchmarks.table import BUSY, Row, turn_ns
 
 PAGE = ROOT / "docs" / "performance.md"
 MARKED = re.compile(r"(?<=<!-- tools/bench --page -->\n).*?(?=<!-- end -->)", re.DOTALL)
-SUITES = ("can", "canopen", "drives", "servo", "urg", "rh3", "rtc", "rtc-canopen", "rrc")
+SUITES = ("can", "canopen", "drives", "servo", "urg", "rtc", "rtc-canopen", "rrc")
 ROUNDS = 2
 OURS = "tickrig: "
 PEERS = ("python-canopen LocalNode: ", "durand: ")
