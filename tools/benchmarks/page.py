@@ -20,9 +20,7 @@ SUITES = ("can", "canopen", "drives", "servo", "urg", "rtc", "rtc-canopen", "rrc
 ROUNDS = 2
 OURS = "tickrig: "
 PEERS = ("python-canopen LocalNode: ", "durand: ")
-LIMIT = "limit: "
-"""Begins a row of what no such work can be faster than; its text goes on as that of the work."""
-HEAD = "| work | pure | compiled | best peer | ratio | limit |\n|---|---|---|---|---|---|\n"
+HEAD = "| work | pure | compiled | best peer | ratio |\n|---|---|---|---|---|\n"
 
 
 def write(wheel: str) -> None:
@@ -61,15 +59,14 @@ def merged(rounds: list[Found]) -> Found:
 def lines(pure: Found, fast: Found) -> Iterator[str]:
     """Yield a line for each work."""
     for what, row in pure.items():
-        if what.startswith((*PEERS, LIMIT)):
+        if what.startswith(PEERS):
             continue
         work = what.removeprefix(OURS)
         peers = [pure[peer + work] for peer in PEERS if peer + work in pure]
         best = max(peers, key=lambda peer: peer.median, default=None)
         ratio = f"{fast[what].median / best.median:.2f}" if best else ""
         named = f"{best.what.partition(': ')[0]} {told(best)}" if best else ""
-        limit = told(pure[LIMIT + work]) if LIMIT + work in pure else ""
-        yield f"| {work} | {told(row)} | {told(fast[what])} | {named} | {ratio} | {limit} |\n"
+        yield f"| {work} | {told(row)} | {told(fast[what])} | {named} | {ratio} |\n"
 
 
 def told(row: Row) -> str:
