@@ -104,6 +104,6 @@ def extensions() -> list[Extension]:
 COMPILE = os.environ.get("TICKRIG_COMPILE") == "1"
 setup(
     cmdclass={"sdist": LinkingSdist, "build_ext": ParallelBuildExt},
-    setup_requires=["mypy[mypyc]>=2.4"] if COMPILE else [],
+    setup_requires=["mypy[mypyc]>=2.4,<2.5"] if COMPILE else [],
     ext_modules=extensions() if COMPILE else [],
 )

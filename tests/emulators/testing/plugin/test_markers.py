@@ -134,6 +134,19 @@ def test_markers_are_told(run: Run) -> None:
     )
 
 
+def write_test_that_needs(need: str, pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        f"""
+        import pytest
+
+        @pytest.mark.needs({need!r})
+        def test_one(bench):
+            pass
+        """
+    )
+
+
 @pytest.mark.parametrize(
     ("need", "told"),
     [
@@ -150,16 +163,7 @@ def test_markers_are_told(run: Run) -> None:
 def test_what_is_misspelt_is_an_error_and_no_skip(
     pytester: pytest.Pytester, run: Run, need: str, told: str
 ) -> None:
-    pytester.makeconftest(RRC)
-    pytester.makepyfile(
-        f"""
-        import pytest
-
-        @pytest.mark.needs({need!r})
-        def test_one(bench):
-            pass
-        """
-    )
+    write_test_that_needs(need, pytester)
     result = run()
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines([f"no bench: {told}"])
@@ -169,16 +173,7 @@ def test_what_is_misspelt_is_an_error_and_no_skip(
 def test_what_other_devices_could_have_is_no_misspelling(
     pytester: pytest.Pytester, run: Run, need: str
 ) -> None:
-    pytester.makeconftest(RRC)
-    pytester.makepyfile(
-        f"""
-        import pytest
-
-        @pytest.mark.needs({need!r})
-        def test_one(bench):
-            pass
-        """
-    )
+    write_test_that_needs(need, pytester)
     run().assert_outcomes(skipped=1)
 
 
