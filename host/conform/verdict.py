@@ -1,0 +1,126 @@
+"""What came of a check, and of a run of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final, NamedTuple
+
+from tickrig.host.conform.check import Check, Level
+
+
+class Verdict(StrEnum):
+    """What a check gave."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    NOT_APPLICABLE = "not applicable"
+    IMPLEMENTATION_DEFINED = "implementation-defined"
+    INCONCLUSIVE = "inconclusive"
+    """The bus or this host was too slow, lost frames, or another node disturbed it."""
+    BLOCKED = "blocked"
+    """The node did not come back."""
+
+
+class Direction(StrEnum):
+    """Which way a line of the evidence went."""
+
+    SENT = ">"
+    RECEIVED = "<"
+    REMARK = "#"
+
+
+class Line(NamedTuple):
+    """A line of the evidence.
+
+    Attributes:
+        at_us: bus time since the start of the run.
+        direction: to the node, from the bus, or a remark of the tester.
+        text: the frame in candump's notation, or the remark.
+    """
+
+    at_us: int
+    direction: Direction
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One go at a check.
+
+    Attributes:
+        verdict: what it gave.
+        reason: why, in one line: what came and what was allowed; empty where it passed.
+        evidence: what was on the bus.
+        start_us: bus time since the start of the run.
+        end_us: the same, of its end.
+    """
+
+    verdict: Verdict
+    reason: str = ""
+    evidence: tuple[Line, ...] = ()
+    start_us: int = 0
+    end_us: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A check with what came of it.
+
+    Attributes:
+        check: the check.
+        outcome: what counts.
+        first: the go before it, where a failure was tried again.
+    """
+
+    check: Check
+    outcome: Outcome
+    first: Outcome | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole run.
+
+    Attributes:
+        source: the bus, as the user named it.
+        node_id: of the node, 1..127.
+        level: what was allowed.
+        results: in the order in which they were judged.
+        node: what it says of itself (1000h, 1008h to 100Ah, 1018h), by name, for people.
+        settings: adapter, bit rate, tolerances, seed, versions and such, by name, for people.
+        findings: of the EDS, and contradictions between it and the node, one a line.
+        unrestored: what could not be written back, one a line.
+        duration_us: of the run, in bus time.
+        aborted: why it ended before its end; empty if it did not.
+    """
+
+    source: str
+    node_id: int
+    level: Level
+    results: tuple[Result, ...]
+    node: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[str, ...] = ()
+    unrestored: tuple[str, ...] = ()
+    duration_us: int = 0
+    aborted: str = ""
+
+    def count(self, verdict: Verdict) -> int:
+        """Return how many checks gave this verdict."""
+        return sum(result.outcome.verdict is verdict for result in self.results)
+
+    @property
+    def exit_status(self) -> int:
+        """0 all pass, 1 a failure, 4 inconclusive or blocked, 5 nothing judged (conform.md 5)."""
+        if self.count(Verdict.FAIL):
+            return FAILED
+        if self.count(Verdict.INCONCLUSIVE) or self.count(Verdict.BLOCKED) or self.aborted:
+            return UNDECIDED
+        return 0 if self.count(Verdict.PASS) else NOTHING_JUDGED
+
+
+FAILED: Final = 1
+UNDECIDED: Final = 4
+NOTHING_JUDGED: Final = 5
