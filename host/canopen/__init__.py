@@ -1,1 +1,1 @@
-"""What masters and monitors say to a CANopen node: SDO transfers that never wait."""
+"""What is said to a CANopen node from outside: SDO scripts that never wait, the conformance tester."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final, NamedTuple
 
-from tickrig.host.conform.check import Check, Level
+from tickrig.host.canopen.conform.check import Check, Level
 
 
 class Verdict(StrEnum):
