@@ -1,1 +1,1 @@
-"""What is said to a CANopen node from outside: SDO scripts that never wait, the conformance tester."""
+"""What is said to a CANopen node from outside: SDO scripts, and the conformance tester."""
