@@ -1,0 +1,205 @@
+"""What the names in checks mean on this node: an object or PDO of the kind that each asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.object_reader import ObjectReader, Upload
+from tickrig.host.canopen.conform.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
+from tickrig.host.canopen.conform.probing import probe_device
+from tickrig.host.canopen.conform.wanted import (
+    COMMUNICATION_AREA,
+    HARMLESS,
+    PROFILE_AREA,
+    WANTED,
+    Use,
+    Wanted,
+)
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+
+ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
+ABSENT_SUBS: Final = (0x1018, 0x1016, 0x1010, 0x1200)
+LAST_SUB: Final = 0xFE
+
+
+@dataclass(frozen=True, slots=True)
+class BoundObject:
+    """An object of the node that a name stands for.
+
+    Attributes:
+        entry: its description.
+        value: what was read of it, None where it cannot be read.
+    """
+
+    entry: EntryDescription
+    value: bytes | None = None
+
+    @property
+    def index(self) -> int:
+        """Index of the object."""
+        return self.entry.index
+
+    @property
+    def sub(self) -> int:
+        """Sub-index."""
+        return self.entry.sub
+
+    @property
+    def level(self) -> Level:
+        """The least level at which it may be written with a value that the node accepts."""
+        inside = self.index in COMMUNICATION_AREA
+        return Level.COMMUNICATION if inside else Level.INTRUSIVE
+
+
+@dataclass(frozen=True, slots=True)
+class BoundPlace:
+    """A place in the dictionary at which the node has nothing."""
+
+    index: int
+    sub: int
+
+
+Bound = BoundObject | BoundPdo | BoundPlace
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """What each name of `NAMES` stands for, or why it stands for nothing.
+
+    Attributes:
+        device: the objects: of the EDS, or those that answered.
+        bound: by name.
+        reasons: for people, by the names that are not bound.
+        findings: where EDS and node contradict each other, one a line.
+    """
+
+    device: EdsDevice
+    bound: Mapping[str, Bound]
+    reasons: Mapping[str, str]
+    findings: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Search:
+    """The search for what the names stand for."""
+
+    device: EdsDevice
+    reader: ObjectReader
+    allow: Collection[int]
+    unsafe: Collection[int]
+    known: bool
+    bound: dict[str, Bound] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+    findings: list[str] = field(default_factory=list)
+
+
+def bind(
+    device: EdsDevice | None,
+    upload: Upload,
+    *,
+    allow: Collection[int] = (),
+    unsafe: Collection[int] = (),
+) -> Binding:
+    """Find an object or PDO for each name; the node is only read.
+
+    What is written later is of the communication area or of the manufacturer; without an
+    EDS only of the former, as nobody knows what else may be written.
+
+    Args:
+        device: what its EDS says; None to ask the node which objects of CiA 301 it has.
+        upload: reads an object of the node.
+        allow: indices of the profile area, 6000h to 9FFFh, that may be written all the same.
+        unsafe: indices that are never written.
+
+    Returns:
+        What was found.
+
+    Raises:
+        SdoTimeout: the node does not answer.
+    """
+    reader = ObjectReader(upload)
+    found = device or probe_device(reader)
+    search = _Search(found, reader, allow, unsafe, device is not None)
+    for wanted in WANTED:
+        _bind_object(search, wanted)
+    _bind_absent(search)
+    pdos, missing = bind_pdos(found, reader, lambda index: _may_write(search, index))
+    search.bound.update(pdos)
+    search.reasons.update(missing)
+    findings = (*reader.findings, *search.findings)
+    return Binding(found, search.bound, search.reasons, findings)
+
+
+def _bind_object(search: _Search, wanted: Wanted) -> None:
+    """Take the best object that fits, may be used so and can be read."""
+    fitting = [entry for entry in search.device.entries if wanted.fits(entry)]
+    if not fitting:
+        where = "the EDS has no" if search.known else "without an EDS nobody knows of a"
+        search.reasons[wanted.name] = f"{where} {wanted.what}"
+        return
+    safe = [entry for entry in fitting if wanted.use is Use.READ or _may_write(search, entry.index)]
+    if not safe:
+        search.reasons[wanted.name] = _unsafe(wanted, fitting[0])
+        return
+    for entry in sorted(safe, key=lambda entry: _order(wanted, entry)):
+        value = search.reader.read(entry) if entry.readable else None
+        if (value is not None or not entry.readable) and wanted.suits(value or b""):
+            search.bound[wanted.name] = BoundObject(entry, value)
+            return
+    first = f"{safe[0].index:04X}h:{safe[0].sub:02X}"
+    search.reasons[wanted.name] = f"no {wanted.what}: what {first} and its like hold is none"
+
+
+def _unsafe(wanted: Wanted, entry: EntryDescription) -> str:
+    where = f"{entry.index:04X}h"
+    if entry.index in PROFILE_AREA:
+        return f"{where} is the only {wanted.what}; writing it may move something (--allow {where})"
+    return f"{where} is the only {wanted.what}, and it must not be written"
+
+
+def _may_write(search: _Search, index: int) -> bool:
+    """Say whether an object may be written, with a value or to be refused."""
+    if index in search.unsafe:
+        return False
+    return index not in PROFILE_AREA or index in search.allow
+
+
+def _order(wanted: Wanted, entry: EntryDescription) -> tuple[bool | int, ...]:
+    """Sort: what does least harm, then what is simplest."""
+    narrow = entry.low is not None or entry.high is not None
+    if wanted.use is Use.WRITE and entry.index in HARMLESS:
+        return (0, HARMLESS.index(entry.index))
+    area = 1 if entry.index in COMMUNICATION_AREA else 3 if entry.index in PROFILE_AREA else 2
+    return (area, narrow, entry.signed, entry.key)
+
+
+def _bind_absent(search: _Search) -> None:
+    """Find places at which there is nothing; where the node has something, that is a finding."""
+    subs: dict[int, int] = {}
+    for entry in search.device.entries:
+        subs[entry.index] = max(entry.sub, subs.get(entry.index, 0))
+    indices = ((index, 0) for index in ABSENT_OBJECTS if index not in subs)
+    _first(search, "absent_object", "index free", indices)
+    records = [*(index for index in ABSENT_SUBS if index in subs), *subs]
+    gaps = ((i, subs[i] + 1) for i in records if 0 < subs[i] < LAST_SUB)
+    _first(search, "absent_sub", "record with a sub-index free", gaps)
+    variables = ((index, 1) for index, last in subs.items() if not last)
+    _first(search, "sub_of_variable", "variable", variables)
+
+
+def _first(search: _Search, name: str, what: str, places: Iterable[tuple[int, int]]) -> None:
+    for index, sub in (place for place in places if _may_write(search, place[0])):
+        if search.reader.has_nothing(index, sub):
+            search.bound[name] = BoundPlace(index, sub)
+            return
+        search.findings.append(f"{index:04X}h:{sub:02X} is not described, and the node has it")
+    search.reasons[name] = f"the node has no {what}"
+
+
+ABSENT_NAMES: Final = ("absent_object", "absent_sub", "sub_of_variable")
+NAMES: Final = frozenset({*(wanted.name for wanted in WANTED), *ABSENT_NAMES, *PDO_NAMES})
+"""All names that `bind` tells about."""

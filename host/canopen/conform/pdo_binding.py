@@ -1,0 +1,190 @@
+"""The PDOs of a node by their kinds: enabled or not, event-driven or synchronous, remappable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from tickrig.host.canopen.conform.object_reader import ObjectReader
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+
+RPDOS: Final = range(0x1400, 0x1600)
+TPDOS: Final = range(0x1800, 0x1A00)
+MAPPING: Final = 0x200
+"""A mapping parameter is so far behind its communication parameter."""
+
+LOOKED_AT: Final = 16
+"""PDOs of each direction that are read; a node may have 512."""
+
+MOST_MAPPED: Final = 64
+"""More is said of multiplexed PDOs."""
+
+COB_ID: Final = 1
+TYPE: Final = 2
+INHIBIT: Final = 3
+EVENT_TIMER: Final = 5
+SYNC_START: Final = 6
+
+EVENT_DRIVEN: Final = (254, 255)
+CYCLIC: Final = range(1, 241)
+
+
+@dataclass(frozen=True, slots=True)
+class BoundPdo:
+    """A PDO as it was found.
+
+    Attributes:
+        index: of its communication parameter, 1400h.. or 1800h...
+        cob_id: sub-index 1, with its flags.
+        transmission_type: sub-index 2.
+        mapping: mapped objects as 6040 0010h.
+        subs: sub-indices that its communication parameter has.
+        remappable: its mapping and its COB-ID may be written.
+        places: how many objects can be mapped.
+    """
+
+    index: int
+    cob_id: int
+    transmission_type: int
+    mapping: tuple[int, ...]
+    subs: frozenset[int]
+    remappable: bool
+    places: int
+
+    @property
+    def mapping_index(self) -> int:
+        """Index of its mapping parameter."""
+        return self.index + MAPPING
+
+    @property
+    def can_id(self) -> int:
+        """Its CAN-ID, 0 if it has none."""
+        return self.cob_id & CAN_ID_MASK
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it exists: bit 31 is 0."""
+        return not self.cob_id & INVALID
+
+    @property
+    def size(self) -> int:
+        """Its length in bytes."""
+        return (sum(mapped & 0xFF for mapped in self.mapping) + 7) // 8
+
+
+class _Kind(NamedTuple):
+    name: str
+    what: str
+    fits: Callable[[BoundPdo], bool]
+
+
+def _kinds(way: str) -> Iterator[_Kind]:
+    """Give the kinds that both directions have."""
+    pdo = way.upper()
+    yield _Kind(way, pdo, lambda pdo: True)
+    yield _Kind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
+    yield _Kind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
+    yield _Kind(
+        f"{way}_async",
+        f"{pdo} that is enabled, event-driven and has a mapping",
+        lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in EVENT_DRIVEN,
+    )
+    yield _Kind(
+        f"{way}_sync",
+        f"{pdo} that is enabled, synchronous and has a mapping",
+        lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in CYCLIC,
+    )
+    yield _Kind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
+    yield _Kind(
+        f"{way}_event_timer",
+        f"{pdo} with an event timer",
+        lambda pdo: pdo.remappable and EVENT_TIMER in pdo.subs,
+    )
+
+
+def _is_remappable(pdo: BoundPdo) -> bool:
+    return pdo.remappable
+
+
+TPDO_KINDS: Final = (
+    *_kinds("tpdo"),
+    _Kind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: INHIBIT in pdo.subs),
+    _Kind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: SYNC_START in pdo.subs),
+    _Kind(
+        "tpdo_rtr",
+        "TPDO that may be fetched with a remote frame",
+        lambda pdo: pdo.enabled and bool(pdo.mapping) and not pdo.cob_id & FLAG_30,
+    ),
+)
+RPDO_KINDS: Final = tuple(_kinds("rpdo"))
+MAPPED_RPDO: Final = "mapped_rpdo"
+PDO_NAMES: Final = (*(kind.name for kind in (*TPDO_KINDS, *RPDO_KINDS)), MAPPED_RPDO)
+
+
+def bind_pdos(
+    device: EdsDevice, reader: ObjectReader, may_write: Callable[[int], bool]
+) -> tuple[dict[str, BoundPdo], dict[str, str]]:
+    """Find a PDO of each kind.
+
+    `mapped_rpdo` is one whose objects may all be written; to the others nothing is sent as
+    long as they are mapped as they are.
+
+    Args:
+        device: what its EDS says.
+        reader: reads the node.
+        may_write: whether an object may be written.
+
+    Returns:
+        What was found, and the reasons why the rest was not, by name.
+    """
+    bound: dict[str, BoundPdo] = {}
+    reasons: dict[str, str] = {}
+    tpdos, rpdos = list(_read(device, reader, TPDOS)), list(_read(device, reader, RPDOS))
+    for name, what, fits in (*TPDO_KINDS, *RPDO_KINDS, _harmless(may_write)):
+        pdo = next(filter(fits, tpdos if name.startswith("t") else rpdos), None)
+        if pdo is None:
+            reasons[name] = f"the node has no {what}"
+        else:
+            bound[name] = pdo
+    return bound, reasons
+
+
+def _harmless(may_write: Callable[[int], bool]) -> _Kind:
+    return _Kind(
+        MAPPED_RPDO,
+        "RPDO that is enabled and whose objects may be written without moving anything",
+        lambda pdo: (
+            pdo.enabled
+            and bool(pdo.mapping)
+            and all(may_write(mapped >> 16) for mapped in pdo.mapping)
+        ),
+    )
+
+
+def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[BoundPdo]:
+    """Read the first PDOs of a direction; those that are incomplete or 29-bit are passed over."""
+    subs: dict[int, dict[int, bool]] = {}
+    for entry in device.entries:
+        subs.setdefault(entry.index, {})[entry.sub] = entry.writable
+    for index in [index for index in subs if index in area][:LOOKED_AT]:
+        cob_id, kind = reader.number(index, COB_ID), reader.number(index, TYPE)
+        mapping = _mapping(reader, index + MAPPING)
+        if cob_id is None or kind is None or mapping is None or cob_id & EXTENDED:
+            continue
+        head, body = subs[index], dict(subs.get(index + MAPPING, {}))
+        changeable = body.pop(0, False) and any(body.values()) and head.get(COB_ID, False)
+        yield BoundPdo(
+            *(index, cob_id, kind, mapping, frozenset(head)),
+            remappable=changeable,
+            places=len(body),
+        )
+
+
+def _mapping(reader: ObjectReader, index: int) -> tuple[int, ...] | None:
+    count = reader.number(index, 0)
+    if count is None or count > MOST_MAPPED:
+        return None
+    mapped = (reader.number(index, sub) for sub in range(1, count + 1))
+    return tuple(number for number in mapped if number is not None)
