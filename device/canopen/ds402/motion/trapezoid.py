@@ -202,7 +202,7 @@ def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> l
 def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
     """Return the legs of a way straight ahead: to the top velocity, along, to the end velocity."""
     up, down = limits.acceleration, limits.deceleration
-    slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance))
+    slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance)) if end > 0.0 else 0.0
     end = max(slowest, min(end, sqrt(velocity**2 + 2 * up * distance)))
     peak = sqrt((2 * up * down * distance + down * velocity**2 + up * end**2) / (up + down))
     top = max(end, min(limits.velocity, peak))

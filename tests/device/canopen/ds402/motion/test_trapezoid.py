@@ -169,6 +169,15 @@ def test_what_cannot_stop_at_the_target_comes_back(
     assert path.end == Motion(target)
 
 
+@pytest.mark.parametrize(("velocity", "deceleration"), [(1.0, 49.0), (5.0, 97.0), (-7.0, 11.0)])
+def test_what_can_just_stop_at_the_target_stands_there(
+    velocity: float, deceleration: float
+) -> None:
+    target = velocity * abs(velocity) / (2 * deceleration)  # rounded: times 2 a it is below v^2
+    limits = PathLimits(100.0, 100.0, deceleration)
+    assert to_position(0, Motion(0.0, velocity), target, limits).end == Motion(target)
+
+
 def test_what_is_too_fast_brakes_to_the_limit_first() -> None:
     path = to_position(0, Motion(0.0, 100.0), 1_000.0, PathLimits(50.0, 100.0, 100.0))
     assert path.at(500_000)[:2] == pytest.approx((37.5, 50.0))
