@@ -74,30 +74,30 @@ class BoundPdo:
         return (sum(mapped & 0xFF for mapped in self.mapping) + 7) // 8
 
 
-class _Kind(NamedTuple):
+class PdoKind(NamedTuple):
     name: str
     what: str
     fits: Callable[[BoundPdo], bool]
 
 
-def _kinds(way: str) -> Iterator[_Kind]:
+def _kinds(way: str) -> Iterator[PdoKind]:
     """Give the kinds that both directions have."""
     pdo = way.upper()
-    yield _Kind(way, pdo, lambda pdo: True)
-    yield _Kind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
-    yield _Kind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
-    yield _Kind(
+    yield PdoKind(way, pdo, lambda pdo: True)
+    yield PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
+    yield PdoKind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
+    yield PdoKind(
         f"{way}_async",
         f"{pdo} that is enabled, event-driven and has a mapping",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in EVENT_DRIVEN,
     )
-    yield _Kind(
+    yield PdoKind(
         f"{way}_sync",
         f"{pdo} that is enabled, synchronous and has a mapping",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in CYCLIC,
     )
-    yield _Kind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
-    yield _Kind(
+    yield PdoKind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
+    yield PdoKind(
         f"{way}_event_timer",
         f"{pdo} with an event timer",
         lambda pdo: pdo.remappable and EVENT_TIMER in pdo.subs,
@@ -110,9 +110,9 @@ def _is_remappable(pdo: BoundPdo) -> bool:
 
 TPDO_KINDS: Final = (
     *_kinds("tpdo"),
-    _Kind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: INHIBIT in pdo.subs),
-    _Kind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: SYNC_START in pdo.subs),
-    _Kind(
+    PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: INHIBIT in pdo.subs),
+    PdoKind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: SYNC_START in pdo.subs),
+    PdoKind(
         "tpdo_rtr",
         "TPDO that may be fetched with a remote frame",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and not pdo.cob_id & FLAG_30,
@@ -151,8 +151,8 @@ def bind_pdos(
     return bound, reasons
 
 
-def _harmless(may_write: Callable[[int], bool]) -> _Kind:
-    return _Kind(
+def _harmless(may_write: Callable[[int], bool]) -> PdoKind:
+    return PdoKind(
         MAPPED_RPDO,
         "RPDO that is enabled and whose objects may be written without moving anything",
         lambda pdo: (
