@@ -1,0 +1,1 @@
+"""How checks are written down: lines of text, and names in place of numbers."""
