@@ -6,11 +6,10 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.object_reader import ObjectReader, Upload
-from tickrig.host.canopen.conform.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
-from tickrig.host.canopen.conform.probing import probe_device
-from tickrig.host.canopen.conform.wanted import (
+from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload
+from tickrig.host.canopen.conform.binding.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
+from tickrig.host.canopen.conform.binding.probing import probe_device
+from tickrig.host.canopen.conform.binding.wanted import (
     COMMUNICATION_AREA,
     HARMLESS,
     PROFILE_AREA,
@@ -18,6 +17,7 @@ from tickrig.host.canopen.conform.wanted import (
     Use,
     Wanted,
 )
+from tickrig.host.canopen.conform.check import Level
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 

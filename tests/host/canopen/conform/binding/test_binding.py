@@ -9,22 +9,22 @@ from tests.device.canopen.reference import make_dictionary
 from tests.host.canopen.conform.bench import Bench, make_bench
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.host.canopen.conform.binding import (
+from tickrig.host.canopen.conform.binding.binding import (
     NAMES,
     Binding,
     BoundObject,
     BoundPlace,
     bind,
 )
+from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
 from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.pdo_binding import BoundPdo
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import RW, WO, DeviceInfo, EntryDescription
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[5]
 R1 = ROOT / "tests/golden/canopen/r1.eds"
 EXAMPLES = sorted((ROOT / "examples").rglob("*.eds"))
 

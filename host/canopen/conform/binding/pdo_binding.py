@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.conform.object_reader import ObjectReader
+from tickrig.host.canopen.conform.binding.object_reader import ObjectReader
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
@@ -75,6 +75,8 @@ class BoundPdo:
 
 
 class PdoKind(NamedTuple):
+    """A name in checks, what it stands for in words, and which PDOs are of that kind."""
+
     name: str
     what: str
     fits: Callable[[BoundPdo], bool]
