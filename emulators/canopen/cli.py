@@ -90,7 +90,7 @@ def main(
     write_eds: Path | None,
     **options: Any,
 ) -> None:
-    """Emulate CANopen slaves, made of their EDS or DCF or out of the box, on a CAN bus.
+    """Emulate CANopen slaves, made of their EDS, DCF or XDD or out of the box, on a CAN bus.
 
     The bus is one of python-can's, named by -i and -c, by its environment
     variables or its configuration files. It runs in real time until Ctrl-C. A

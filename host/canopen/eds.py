@@ -1,4 +1,4 @@
-"""EDS and DCF files of any project, read as far as they are sound."""
+"""EDS, DCF, XDD and XDC files of any project, read as far as they are sound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def open_eds(path: Path) -> EdsFile:
 
 
 def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
-    """Read what is sound in an EDS or DCF, for a host that looks at a device or manages it.
+    """Read what is sound in such a file, for a host that looks at a device or manages it.
 
     Returns:
         The device without the objects that cannot be used, and all that is wrong in the file.

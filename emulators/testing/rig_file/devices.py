@@ -24,7 +24,7 @@ BUS: Final = "can"
 RESERVED: Final = ("control", "tolerance", "body", BUS)
 """Names that mean something else beside those of devices."""
 
-EDS_SUFFIXES: Final = (".eds", ".dcf")
+EDS_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 EVERYTHING: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
 READ_LATER: Final = "start"
 

@@ -28,7 +28,7 @@ eds_option: Final = click.option(
     "--eds",
     multiple=True,
     metavar="NODE=FILE",
-    help="An EDS or DCF of a node, as 3=drive.eds; once for each node.",
+    help="An EDS, DCF or XDD of a node, as 3=drive.eds; once for each node.",
 )
 dbc_option: Final = click.option(
     "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."

@@ -15,6 +15,7 @@ from tickrig.wire.canopen.eds.eds_file import EdsError, Finding
 IDENTITY: Final = ((0x1000, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3))
 """Device type, vendor-ID, product code, revision number; the serial number is of one device."""
 
+ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 RPDOS: Final = range(0x1400, 0x1600)
 TPDOS: Final = range(0x1800, 0x1A00)
 
@@ -39,7 +40,7 @@ class DeviceFile:
 
 
 def read_device_file(path: Path) -> DeviceFile:
-    """Read an EDS or DCF.
+    """Read an EDS, DCF, XDD or XDC.
 
     Raises:
         DefinitionError: it cannot be read.
@@ -60,8 +61,8 @@ def read_device_file(path: Path) -> DeviceFile:
 
 
 def _read(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
-    if path.suffix.lower() not in (".eds", ".dcf"):
-        raise DefinitionError(f"{path}: the name does not end in .eds or .dcf")
+    if path.suffix.lower() not in ENDINGS:
+        raise DefinitionError(f"{path}: the name does not end in {', '.join(ENDINGS)}")
     try:
         return read_sound(path)
     except OSError as error:

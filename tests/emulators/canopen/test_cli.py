@@ -118,18 +118,21 @@ def test_an_eds_that_is_not_by_the_standard_is_used_and_said_so_once(tmp_path: P
         "1ms send 605#4000200000000000\n9ms end\n", "--node", f"5={eds}", "--node", f"6={eds}"
     )
     assert "585#4F00200007000000" in frames(result)
-    line = f"{eds}: [2000] DefaultValue=7U is no number of CiA 306: 7 is taken"
+    line = f"{eds}:5: [2000] DefaultValue=7U is no number of CiA 306: 7 is taken (number-form)"
     assert result.stderr.splitlines().count(line) == 1
 
 
 def test_an_eds_that_cannot_be_used_says_all_that_is_wrong(tmp_path: Path) -> None:
     eds = tmp_path / "bad.eds"
-    eds.write_text("[2000]\nParameterName=x\nDataType=5\n[2001]\nDataType=5\nAccessType=rw\n")
+    eds.write_text(
+        "[2000]\nParameterName=x\nDataType=5\nDefaultValue=300\n"
+        "[2001]\nParameterName=y\nDataType=5\nAccessType=rw\nDefaultValue=six\n"
+    )
     result = run("--eds", eds, "--node-id", "5")
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [
-        f"Error: {eds}: [2000] AccessType is missing",
-        f"{eds}: [2001] ParameterName is missing",
+        f"Error: {eds}:4: [2000] DefaultValue=300 is no UNSIGNED8 (default-value)",
+        f"{eds}:9: [2001] DefaultValue=six is no UNSIGNED8 (default-value)",
     ]
 
 

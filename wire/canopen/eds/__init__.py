@@ -1,1 +1,1 @@
-"""EDS and DCF files (CiA 306) and the objects they describe; no dictionary that lives."""
+"""EDS, DCF and XDD files (CiA 306, CiA 311) and the objects they describe; no living dictionary."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
@@ -25,7 +26,8 @@ COMMISSIONING: Final = "DeviceComissioning"
 UNSET_NODE_IDS: Final = (0, 0xFF)
 HIGHEST_NODE_ID: Final = 127
 HIGHEST_SUB: Final = 254
-NULL_OBJECT: Final = 0
+NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
+"""Kinds of objects that hold nothing: NULL, and definitions of data types."""
 DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
 ERROR_FIELD: Final = 0x1003
 COUNTS: Final = (ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
@@ -57,14 +59,15 @@ def read_device(file: EdsFile) -> EdsDevice:
     """Read what is sound in a file; the rest becomes its errors.
 
     What is not by the standard and has one meaning all the same becomes a
-    warning: C suffixes, empty keywords, CompactSubObj in a RECORD, texts beyond
-    ASCII. A ParameterValue (DCF) counts as power-on value. ObjFlags concern
-    configuration tools, not the device, and are not kept.
+    warning that says what is taken: C suffixes, empty and missing keywords,
+    CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) counts
+    as power-on value. ObjFlags concern configuration tools, not the device, and
+    are not kept.
     """
     kinds = _kinds(file)
     entries = tuple(_entries(file, kinds))
     if not (entries or file.errors):
-        file.refuse("", "has no objects")
+        file.refuse("", "has no objects", "no-objects")
     return EdsDevice(
         _device_info(file),
         entries,
@@ -94,7 +97,8 @@ def _node_id(file: EdsFile) -> int | None:
     if node_id in UNSET_NODE_IDS:
         return None
     if node_id > HIGHEST_NODE_ID:
-        file.refuse(COMMISSIONING, f"NodeID={node_id} is not in 1..127")
+        reason = f"NodeID={node_id} is not in 1..127: none is taken"
+        file.warn(COMMISSIONING, reason, "node-id", "NodeID")
         return None
     return node_id
 
@@ -104,14 +108,25 @@ def _kinds(file: EdsFile) -> Kinds:
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
     for section, index, sub in file.objects():
-        if sub is None:
-            default = ObjectCode.RECORD if index in with_subs else ObjectCode.VAR
-            number = file.number(section, "ObjectType", default)
-            if number in DESCRIBED:
-                kinds[index] = ObjectCode(number)
-            elif number not in (NULL_OBJECT, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT):
-                file.refuse(section, f"ObjectType={number} is no kind of object")
+        if sub is None and (kind := _kind(file, section, index in with_subs)):
+            kinds[index] = kind
     return kinds
+
+
+def _kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
+    """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
+    usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
+    number = file.number(section, "ObjectType", usual)
+    if number in NO_DATA:
+        return None
+    if number not in DESCRIBED:
+        reason = f"ObjectType={number} is no kind of object: {usual.name} is taken"
+    elif with_subs and number in VARIABLES:
+        reason = f"ObjectType={number} has no sub-indices, and there are: RECORD is taken"
+    else:
+        return ObjectCode(number)
+    file.warn(section, reason, "object-type", "ObjectType")
+    return usual
 
 
 def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
@@ -119,32 +134,34 @@ def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
     for section, index, sub in file.objects():
         if sub is not None:
             subs.setdefault(index, []).append((section, sub))
-    for index, kind in kinds.items():
-        yield from filter(None, _object(file, index, kind, subs.pop(index, [])))
-    for index, orphans in subs.items():
+    for index in subs:
         if f"{index:04X}" not in file.sections:
-            for section, _ in orphans:
-                file.refuse(section, f"has no object [{index:04X}]")
+            reason = f"has no object [{index:04X}]: a RECORD is taken"
+            file.warn(subs[index][0][0], reason, "sub-orphan")
+            kinds[index] = ObjectCode.RECORD
+    for index, kind in kinds.items():
+        yield from _object(file, index, kind, subs.get(index, []))
 
 
 def _object(
     file: EdsFile, index: int, kind: ObjectCode, subs: list[tuple[str, int]]
-) -> Iterator[EntryDescription | None]:
-    """Read the entries of one object; None for one that cannot be made."""
+) -> Iterator[EntryDescription]:
+    """Read the entries of one object; those that are described beside a compact one replace its."""
     head = f"{index:04X}"
     if kind in VARIABLES:
-        for section, _ in subs:
-            file.refuse(section, f"is part of a {kind.name}, which has none")
         yield read_entry(file, head, index, 0)
         return
-    required(file, head, "ParameterName")
+    if head in file.sections:
+        required(file, head, "ParameterName", "")
+    described = [read_entry(file, section, index, sub) for section, sub in subs]
     count = min(file.number(head, "CompactSubObj"), HIGHEST_SUB)
-    if not count:
-        yield from (read_entry(file, section, index, sub) for section, sub in subs)
-        return
-    if kind is ObjectCode.RECORD:
-        file.warn(head, "CompactSubObj in a RECORD: its entries are taken to be alike")
-    yield from _compact(file, index, count)
+    if count:
+        if kind is ObjectCode.RECORD:
+            reason = "CompactSubObj in a RECORD: its entries are taken to be alike"
+            file.warn(head, reason, "compact-record", "CompactSubObj")
+        known = {row.sub for row in described}
+        described += [row for row in _compact(file, index, count) if row.sub not in known]
+    yield from sorted(described, key=attrgetter("sub"))
 
 
 def _compact(file: EdsFile, index: int, count: int) -> Iterator[EntryDescription]:
@@ -154,8 +171,7 @@ def _compact(file: EdsFile, index: int, count: int) -> Iterator[EntryDescription
     elements = []
     for sub in range(1, count + 1):
         name = file.value(f"{head}Name", str(sub)) or f"{title}{sub}"
-        if element := read_entry(file, head, index, sub, name):
-            elements.append(element)
+        elements.append(read_entry(file, head, index, sub, name))
     yield _count(index, elements)
     yield from elements
 

@@ -18,13 +18,20 @@ from tickrig.wire.canopen.eds.object_table import (
 SIMPLE_TYPES: Final = range(0x1C)
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
 TRUTH: Final = (0, 1)
+TRUE_WORDS: Final = ("yes", "true")
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
+MISSING: Final = {
+    "ParameterName": "name-missing",
+    "DataType": "data-type-missing",
+    "AccessType": "access-missing",
+}
+"""The rule that a keyword left out breaks."""
 
 
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
-) -> EntryDescription | None:
-    """Read an entry; None if it has no name, type or access, which the file notes.
+) -> EntryDescription:
+    """Read an entry; what it lacks is noted, and what stands for it.
 
     Args:
         file: takes what is wrong.
@@ -34,10 +41,8 @@ def read_entry(
         name: that of the file's `ParameterName` if left out.
     """
     if name is None:
-        name = required(file, section, "ParameterName")
+        name = required(file, section, "ParameterName", "")
     kind, access = _data_type(file, section), _access(file, section)
-    if name is None or kind is None or access is None:
-        return None
     default, relative = _default(file, section, index, sub, kind)
     low, high = _limits(file, section, kind)
     return EntryDescription(
@@ -52,12 +57,13 @@ def read_entry(
     )
 
 
-def required(file: EdsFile, section: str, key: str) -> str | None:
-    """Return the text of a keyword that every entry has; None, and an error, without it."""
+def required(file: EdsFile, section: str, key: str, instead: str) -> str:
+    """Return the text of a keyword that every entry has; `instead`, and a warning, without it."""
     if file.has(section, key):
         return file.value(section, key)
-    file.refuse(section, f"{key} is missing")
-    return None
+    taken = f"{instead} is taken" if instead else "none is taken"
+    file.warn(section, f"{key} is missing: {taken}", MISSING[key])
+    return instead
 
 
 def is_visible_char(file: EdsFile, number: int) -> bool:
@@ -65,19 +71,18 @@ def is_visible_char(file: EdsFile, number: int) -> bool:
     return number == DataType.VISIBLE_CHAR and f"{number:X}sub1" not in file.sections
 
 
-def _data_type(file: EdsFile, section: str) -> DataType | None:
+def _data_type(file: EdsFile, section: str) -> DataType:
     if file.number(section, "ObjectType", ObjectCode.VAR) == ObjectCode.DOMAIN:
         return DataType.DOMAIN
-    if required(file, section, "DataType") is None:
-        return None
-    number = file.number(section, "DataType", DataType.DOMAIN)
+    usual = DataType.UNSIGNED8 if section.endswith("sub0") else DataType.DOMAIN
+    required(file, section, "DataType", usual.name)
+    number = file.number(section, "DataType", usual)
     if number not in SIMPLE_TYPES and not is_visible_char(file, number):
         number = _derived(file, section, number)
     try:
         return DataType(number)
     except ValueError:
-        file.refuse(section, f"DataType=0x{number:04X} is unknown")
-        return None
+        return DataType(_unknown(file, section, number))
 
 
 def _derived(file: EdsFile, section: str, number: int) -> int:
@@ -85,23 +90,36 @@ def _derived(file: EdsFile, section: str, number: int) -> int:
     own = f"{number:X}sub1"
     if own in file.sections:
         return file.number(own, "DefaultValue", DataType.DOMAIN)
-    file.warn(section, f"DataType=0x{number:04X} is unknown: DOMAIN is taken")
+    return _unknown(file, section, number)
+
+
+def _unknown(file: EdsFile, section: str, number: int) -> int:
+    reason = f"DataType=0x{number:04X} is unknown: DOMAIN is taken"
+    file.warn(section, reason, "data-type-unknown", "DataType")
     return DataType.DOMAIN
 
 
-def _access(file: EdsFile, section: str) -> Access | None:
-    text = required(file, section, "AccessType")
-    if text is None:
-        return None
+def _access(file: EdsFile, section: str) -> Access:
+    text = required(file, section, "AccessType", "rw")
     known = LONE_LETTERS.get(text.lower(), text or "rw")
-    if known != text:
-        what = f"AccessType={text} is none of CiA 306" if text else "AccessType is empty"
-        file.warn(section, f"{what}: {known} is taken")
+    mappable = _mappable(file, section)
     try:
-        return Access.from_eds(known, mappable=bool(file.number(section, "PDOMapping")))
-    except ValueError as error:
-        file.refuse(section, str(error))
-        return None
+        access = Access.from_eds(known, mappable=mappable)
+    except ValueError:
+        known, access = "rw", Access.from_eds("rw", mappable=mappable)
+    if known != text:
+        what = f"AccessType={shorten(text)} is none of CiA 306" if text else "AccessType is empty"
+        file.warn(section, f"{what}: {known} is taken", "access-form", "AccessType")
+    return access
+
+
+def _mappable(file: EdsFile, section: str) -> bool:
+    words = file.value(section, "PDOMapping").lower()
+    if words not in TRUE_WORDS:
+        return bool(file.number(section, "PDOMapping"))
+    reason = f"PDOMapping={words} is not a number: 1 is taken"
+    file.warn(section, reason, "no-number", "PDOMapping")
+    return True
 
 
 def _default(
@@ -127,7 +145,8 @@ def _exact(file: EdsFile, section: str, kind: DataType) -> bytes | None:
         kind.decode(data)
     except ValueError:
         what = f"{kind.size} hexadecimal bytes" if kind.size else "hexadecimal bytes"
-        file.refuse(section, f"DefaultBytes={shorten(text)} is no {what}")
+        reason = f"DefaultBytes={shorten(text)} is no {what}"
+        file.refuse(section, reason, "default-value", "DefaultBytes")
         return None
     return data
 
@@ -139,10 +158,11 @@ def _value(file: EdsFile, section: str, key: str, kind: DataType) -> tuple[bytes
             return _foreign_text(file, section, key, kind), False
         value, relative = parse_value(kind, text)
         if kind is DataType.BOOLEAN and value not in TRUTH:
-            file.warn(section, f"{key}={shorten(text)} is no BOOLEAN: 1 is taken")
+            reason = f"{key}={shorten(text)} is no BOOLEAN: 1 is taken"
+            file.warn(section, reason, "boolean-value", key)
         return kind.encode(value), relative
     except (ValueError, OverflowError):
-        file.refuse(section, f"{key}={shorten(text)} is no {kind.name}")
+        file.refuse(section, f"{key}={shorten(text)} is no {kind.name}", "default-value", key)
         return None, False
 
 
@@ -153,7 +173,8 @@ def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> byte
         data, coding = kind.encode(text), "ISO 8859-1"
     except ValueError:
         data, coding = kind.encode(text.encode()), "UTF-8"
-    file.warn(section, f"{key}={shorten(text)} is not ASCII: its bytes in {coding} are taken")
+    reason = f"{key}={shorten(text)} is not ASCII: its bytes in {coding} are taken"
+    file.warn(section, reason, "text-value", key)
     return data
 
 
@@ -163,7 +184,8 @@ def _limits(
     """Return the limits of a number; other types have none."""
     low, high = _limit(file, section, "LowLimit", kind), _limit(file, section, "HighLimit", kind)
     if low is not None and high is not None and low > high:
-        file.refuse(section, f"LowLimit {low} is above HighLimit {high}")
+        reason = f"LowLimit {low} is above HighLimit {high}: neither is taken"
+        file.warn(section, reason, "limit-order", "LowLimit")
         return None, None
     return low, high
 
@@ -173,7 +195,8 @@ def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float
     try:
         return parse_limit(kind, text) if text else None
     except (ValueError, OverflowError):
-        file.refuse(section, f"{key}={shorten(text)} is no {kind.name}")
+        reason = f"{key}={shorten(text)} is no {kind.name}: no limit is taken"
+        file.warn(section, reason, "limit-value", key)
         return None
 
 
@@ -186,5 +209,6 @@ def _factor(file: EdsFile, section: str) -> float:
         factor = 0.0
     if factor and math.isfinite(factor):
         return factor
-    file.warn(section, f"Factor={shorten(text)} is no factor: 1 is taken")
+    reason = f"Factor={shorten(text)} is no factor: 1 is taken"
+    file.warn(section, reason, "factor", "Factor")
     return 1

@@ -1,4 +1,4 @@
-"""An electronic data sheet as sections of keywords (CiA 306)."""
+"""An electronic data sheet as sections of keywords (CiA 306, CiA 311)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
+from tickrig.wire.canopen.eds.eds_lines import (
+    EdsLine,
+    describes_device,
+    object_section,
+    read_lines,
+)
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 LONGEST: Final = 40
 
@@ -19,16 +26,21 @@ class Finding(NamedTuple):
         file: what the file is called.
         section: without brackets, empty for the file as a whole.
         reason: which key or line, what it says, and what was allowed or is taken instead.
+        line: where it is, 0 where the file as a whole is meant.
+        rule: name of the rule of `canmon eds check` that it breaks, empty if there is none.
     """
 
     file: str
     section: str
     reason: str
+    line: int = 0
+    rule: str = ""
 
     def __str__(self) -> str:
         """Say it in one line."""
+        place = f"{self.file}:{self.line}" if self.line else self.file
         where = f"[{self.section}] " if self.section else ""
-        return f"{self.file}: {where}{self.reason}"
+        return f"{place}: {where}{self.reason}" + (f" ({self.rule})" if self.rule else "")
 
 
 class EdsError(ValueError):
@@ -40,37 +52,28 @@ class EdsError(ValueError):
 
 
 def shorten(text: str) -> str:
-    """Return a text of a file so that it fits into a line.
+    r"""Return a text of a file so that it fits into a line, and can be printed.
 
-    >>> shorten("a" * 99) == "a" * 37 + "..."
-    True
+    >>> shorten("a" * 99) == "a" * 37 + "...", shorten("a\x00b")
+    (True, 'a?b')
     """
+    if not text.isprintable():
+        text = "".join(letter if letter.isprintable() else "?" for letter in text)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
 Section = dict[str, str]
 
-SECTIONS: Final = ("DeviceInfo", "DeviceComissioning")
-"""Those that describe the device, beside its objects."""
-
-_OBJECT: Final = re.compile(r"([0-9A-F]{4})(?:(SUB)([0-9A-F]{1,2})|(NAME|VALUE))?")
-_DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB1")
-_KNOWN_SECTIONS: Final = {
-    **{name.lower(): name for name in SECTIONS},
-    "devicecommissioning": "DeviceComissioning",
-    "comments": "Comments",
-}
-_TITLE: Final = re.compile(r"\[([^\]]+)\]")
 _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
-_COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
 @mypyc_attr(serializable=True)
 class EdsFile:
-    """The sections of an EDS or DCF, in the spelling of CiA 306 whatever that of the file.
+    """The sections of an EDS, DCF, XDD or XDC, as CiA 306 spells them.
 
     It collects what is wrong: first its own lines, then what its readers find.
     A line that cannot be read matters only in a section that describes the device.
+    Of a section or keyword that is there twice the first counts, as for most readers.
 
     Args:
         name: what findings call it.
@@ -78,6 +81,8 @@ class EdsFile:
 
     Attributes:
         sections: texts by lower-case keyword, by section: `1017`, `1018sub1`, `DeviceInfo`.
+        lines: all lines; of XML those that an EDS would have, with the numbers of their elements.
+        is_xml: whether it is XML.
         errors: what makes it another device than its author meant.
         warnings: what is not by the standard, and still has one meaning.
     """
@@ -85,9 +90,16 @@ class EdsFile:
     def __init__(self, name: str, text: str) -> None:
         self.name = name
         self.sections: dict[str, Section] = {}
+        self.is_xml = is_xml(text)
+        self.lines: list[EdsLine] = []
+        self._places: dict[tuple[str, str], int] = {}
         self._errors: dict[Finding, None] = {}
         self._warnings: dict[Finding, None] = {}
-        self._parse(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
+        try:
+            self.lines = xdd_lines(text) if self.is_xml else read_lines(text)
+        except XddError as error:
+            self._errors[Finding(name, "", str(error), error.line, "xml")] = None
+        self._parse()
 
     @property
     def errors(self) -> tuple[Finding, ...]:
@@ -99,13 +111,20 @@ class EdsFile:
         """All of them, likewise."""
         return tuple(self._warnings)
 
-    def refuse(self, section: str, reason: str) -> None:
-        """Note an error."""
-        self._errors[Finding(self.name, section, reason)] = None
+    def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
+        """Note an error, at the line of a keyword or a section."""
+        line = self.line(section, key)
+        self._errors[Finding(self.name, section, reason, line, rule)] = None
 
-    def warn(self, section: str, reason: str) -> None:
-        """Note what is odd."""
-        self._warnings[Finding(self.name, section, reason)] = None
+    def warn(self, section: str, reason: str, rule: str, key: str = "") -> None:
+        """Note what is odd, likewise."""
+        line = self.line(section, key)
+        self._warnings[Finding(self.name, section, reason, line, rule)] = None
+
+    def line(self, section: str, key: str = "") -> int:
+        """Return the number of the line of a keyword, else of its section, else 0."""
+        place = self._places.get((section, key.lower()))
+        return place or self._places.get((section, ""), 0)
 
     def value(self, section: str, key: str) -> str:
         """Return the text of a keyword, empty if it is not there."""
@@ -120,7 +139,8 @@ class EdsFile:
         text = self.value(section, key)
         plain = plain_numbers(text)
         if plain != text:
-            self.warn(section, f"{key}={shorten(text)} is no number of CiA 306: {plain} is taken")
+            what = f"{key}={shorten(text)} is no number of CiA 306: {shorten(plain)} is taken"
+            self.warn(section, what, "number-form", key)
         return plain
 
     def number(
@@ -128,44 +148,42 @@ class EdsFile:
     ) -> int:
         """Return the number of a keyword.
 
-        Where there is none the default counts: with a warning if the keyword is
-        empty, with an error if it is no number from `low` to `high`.
+        Where there is none the default counts, with a warning if the keyword is
+        empty, is no number, or not one from `low` to `high`.
         """
         text = self.numeric(section, key)
         if not text:
             if self.has(section, key):
-                self.warn(section, f"{key} is empty: {default} is taken")
+                self.warn(section, f"{key} is empty: {default} is taken", "empty-value", key)
             return default
+        said = f"{key}={shorten(text)}"
         try:
             number = parse_number(text)
         except ValueError:
-            self.refuse(section, f"{key}={shorten(text)} is not a number")
+            reason = f"{said} is not a number: {default} is taken"
+            self.warn(section, reason, "no-number", key)
             return default
         if low <= number <= high:
             return number
-        self.refuse(section, f"{key}={shorten(text)} is not in {low}..{high}")
+        reason = f"{said} is not in {low}..{high}: {default} is taken"
+        self.warn(section, reason, "no-number", key)
         return default
 
     def objects(self) -> Iterator[tuple[str, int, int | None]]:
         """Give the sections of objects, with index and sub-index; None for the object itself."""
         for section in self.sections:
-            match = _OBJECT.fullmatch(section.upper())
-            if match is not None and match[4] is None:
-                yield section, int(match[1], 16), int(match[3], 16) if match[2] else None
+            if place := object_section(section):
+                yield section, *place
 
-    def _parse(self, lines: list[str]) -> None:
-        title, section = "", Section()
-        for number, raw in enumerate(lines, 1):
-            line = _COMMENT.sub("", raw).strip()
-            key, equals, text = line.partition("=")
-            if match := _TITLE.match(line):
-                title = canonical_section(match[1])
-                section = self._begin(title, number)
-            elif equals:
-                self._add(section, title, (key.strip(), text.strip()), number)
-            elif line and _matters(title) and (title or not self._errors):
-                reason = f"line {number} is no keyword with a value: {shorten(line)!r}"
-                self.refuse(title, reason)
+    def _parse(self) -> None:
+        section: Section = {}
+        for line in self.lines:
+            if line.title:
+                section = self._begin(line)
+            elif line.is_keyword:
+                self._add(section, line)
+            elif line.content and describes_device(line.section):
+                self._skip(line)
         self._take_comments()
 
     def _take_comments(self) -> None:
@@ -175,49 +193,66 @@ class EdsFile:
                 key, section, value = match.groups()
                 self.sections.get(section, {}).setdefault(key.lower(), value)
 
-    def _begin(self, title: str, line: int) -> Section:
-        """Begin a section; one that is there already is not read again."""
-        if title not in self.sections:
-            return self.sections.setdefault(title, {})
-        if _matters(title):
-            self.refuse(title, f"is there twice, line {line}")
-        return {}
+    def _begin(self, line: EdsLine) -> Section:
+        """Begin a section, or go on with one that is there already."""
+        title = line.section
+        if title in self.sections and describes_device(title):
+            reason = "is there twice: of each keyword the first is taken"
+            self._warn_at(line, reason, "doubled-section")
+        self._places.setdefault((title, ""), line.number)
+        return self.sections.setdefault(title, {})
 
-    def _add(self, section: Section, title: str, item: tuple[str, str], line: int) -> None:
-        key, text = item
-        if key.lower() not in section:
-            section[key.lower()] = text
-        elif title and _matters(title):
-            self.refuse(title, f"{key} is there twice, line {line}")
+    def _add(self, section: Section, line: EdsLine) -> None:
+        key = line.key.lower()
+        if not key:
+            if describes_device(line.section):
+                self._skip(line)
+        elif key not in section:
+            section[key] = line.value
+            self._places[line.section, key] = line.number
+        elif line.section and describes_device(line.section):
+            reason = f"{line.key} is there twice: {shorten(section[key])} is taken"
+            self._warn_at(line, reason, "doubled-key")
+
+    def _skip(self, line: EdsLine) -> None:
+        """Note the first such line before the sections, and each one in them."""
+        if line.section or not self._warnings:
+            reason = f"{shorten(line.content)!r} is no keyword with a value: it is skipped"
+            self._warn_at(line, reason, "no-keyword")
+
+    def _warn_at(self, line: EdsLine, reason: str, rule: str) -> None:
+        self._warnings[Finding(self.name, line.section, reason, line.number, rule)] = None
+
+
+_UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
+
+
+def encoding_of(data: bytes) -> str:
+    r"""Return the encoding of a file, by its name in Python.
+
+    UTF-16 where its mark is there or every other byte of its beginning is zero; UTF-8 where it is
+    that; Windows-1252 otherwise, as older editors write it.
+
+    >>> encoding_of(b"[\0F\0"), encoding_of("µ".encode()), encoding_of(b"\xb5")
+    ('utf-16-le', 'utf-8', 'cp1252')
+    """
+    if data[:2] in _UTF_16:
+        return "utf-16-le" if data[:1] == b"\xff" else "utf-16-be"
+    if data[1:4:2] == b"\0\0":
+        return "utf-16-le"
+    if data[:3:2] == b"\0\0":
+        return "utf-16-be"
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
 
 
 def decode_text(data: bytes) -> str:
-    r"""Return the text of a file: UTF-8, or Windows-1252 as older editors write it.
+    r"""Return the text of a file, in whatever encoding, without a byte order mark.
 
     >>> decode_text("\ufeffµ".encode()), decode_text("µ".encode("cp1252"))
     ('µ', 'µ')
     """
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
-
-
-def canonical_section(title: str) -> str:
-    """Return the name of a section as CiA 306 spells it.
-
-    >>> canonical_section("1a00SUB0A"), canonical_section("deviceinfo"), canonical_section("a0")
-    ('1A00subA', 'DeviceInfo', 'a0')
-    """
-    if derived := _DERIVED_TYPE.fullmatch(title.upper()):
-        return f"{derived[1]}sub1"
-    match = _OBJECT.fullmatch(title.upper())
-    if match is None:
-        return _KNOWN_SECTIONS.get(title.lower(), title)
-    index, sub, number, other = match.groups()
-    return f"{index}sub{int(number, 16):X}" if sub else f"{index}{(other or '').capitalize()}"
-
-
-def _matters(title: str) -> bool:
-    """Return whether a section, or what stands before the first one, describes the device."""
-    return not title or title in SECTIONS or _OBJECT.fullmatch(title.upper()) is not None
+    return data.decode(encoding_of(data), "replace").removeprefix("\ufeff")

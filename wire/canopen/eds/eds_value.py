@@ -10,13 +10,21 @@ from typing import Final
 from tickrig.wire.canopen.datatypes import DataType, Value
 
 NODE_ID: Final = "$NODEID"
+NODE_IDS: Final = (NODE_ID, "NODEID")
+"""What stands for the node-ID, also where its sign was forgotten."""
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
 FLOATS: Final = {DataType.REAL32: "f", DataType.REAL64: "d"}
 TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 
+WIDEST: Final = 64
+"""Bits of the widest number."""
+
 _C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECASE | re.ASCII)
+_SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
+_ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f]*)h", re.IGNORECASE | re.ASCII)
+_UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
 _NO_OCTAL: Final = re.compile(r"\b0+([0-9]*[89][0-9]*)\b", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
 
@@ -63,23 +71,42 @@ def parse_number(text: str) -> int:
     >>> parse_number("0x1F"), parse_number("31"), parse_number("037"), parse_number("-1")
     (31, 31, 31, -1)
     """
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{text!r} is no number")
     return int(text, 8) if re.fullmatch(r"0[0-7]+", text) else int(text, 0)
 
 
 def plain_numbers(text: str) -> str:
-    """Return numbers without what C adds to them, and no octal number that is none.
+    """Return numbers as CiA 306 writes them.
+
+    What C adds to them goes, blanks and underscores within them, and zeros that make no octal
+    number; hexadecimal ones of assemblers begin with 0x. Node-IDs are not touched.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
+    >>> plain_numbers("0x 12 34"), plain_numbers("1Ah"), plain_numbers("1_000")
+    ('0x1234', '0x1A', '1000')
     """
-    return _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
+    if text.isdigit() and text.isascii() and (text[0] != "0" or text == "0"):
+        return text  # most are such
+    plain = _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
+    if assembler := _ASSEMBLER_HEX.fullmatch(plain):
+        return f"0x{assembler[1]}"
+    plain = _UNDERSCORE.sub("", plain)
+    return _SPLIT_HEX.sub(lambda match: "0x" + match[1].replace(" ", ""), plain)
 
 
 def parse_limit(kind: DataType, text: str) -> int | float | None:
-    """Read a limit; None if the type has none or it is that of every value of the type."""
-    if kind not in FLOATS and (not kind.is_integer or NODE_ID in text.upper()):
+    """Read a limit; None if the type has none or it is that of every value of the type.
+
+    Raises:
+        ValueError: it is no number of at most 64 bits.
+    """
+    if kind not in FLOATS and (not kind.is_integer or "NODEID" in text.upper()):
         return None
     value = parse_value(kind, text)[0]
+    if isinstance(value, int) and value.bit_length() > WIDEST:
+        raise ValueError("no data type is that wide")
     return value if isinstance(value, int | float) else None
 
 
@@ -115,8 +142,8 @@ def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
 
 def _parse_sum(text: str) -> tuple[int, bool]:
     terms = text.replace(" ", "").upper().split("+")
-    numbers = [parse_number(term) for term in terms if term != NODE_ID]
-    return sum(numbers), NODE_ID in terms
+    numbers = [parse_number(term) for term in terms if term not in NODE_IDS]
+    return sum(numbers), len(numbers) < len(terms)
 
 
 def _parse_float(layout: str, text: str) -> float:

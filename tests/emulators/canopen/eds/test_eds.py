@@ -33,12 +33,12 @@ def test_an_eds_without_commissioning_leaves_the_node_id_open() -> None:
 
 
 def test_an_eds_that_cannot_be_used_says_all_that_is_wrong() -> None:
-    text = "[1000]\nParameterName=a\nDataType=7\n[1001]\nParameterName=b\nAccessType=ro\n"
+    text = f"{TYPE}DefaultValue=x\n[1001]\nParameterName=b\nDataType=5\nDefaultValue=256\n"
     with pytest.raises(EdsError) as error:
         describe(EdsFile("a.eds", text))
     assert str(error.value).splitlines() == [
-        "a.eds: [1000] AccessType is missing",
-        "a.eds: [1001] DataType is missing",
+        "a.eds:5: [1000] DefaultValue=x is no UNSIGNED32 (default-value)",
+        "a.eds:9: [1001] DefaultValue=256 is no UNSIGNED8 (default-value)",
     ]
     assert [one.section for one in error.value.findings] == ["1000", "1001"]
 

@@ -55,4 +55,4 @@ def test_a_damaged_eds_is_a_device_or_says_what_is_wrong(seed: int) -> None:
     chance = random.Random(seed)
     found = [run(damaged(chance)) for _ in range(SAMPLES)]
     assert {bool(lines) for lines in found} == {True, False}
-    assert all(line.startswith("a.eds: ") for lines in found for line in lines)
+    assert all(line.startswith("a.eds:") for lines in found for line in lines)

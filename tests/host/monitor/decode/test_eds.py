@@ -69,8 +69,8 @@ def test_what_a_file_says_wrongly_of_an_object_is_not_used(tmp_path: Path) -> No
     eds = read_eds_objects(path, 5)
     assert eds.values == {}
     assert [str(one) for one in eds.findings] == [
-        f"{path}: [2002] DefaultValue=300 is no UNSIGNED8",
-        f"{path}: [2001] DataType=0x7777 is unknown: DOMAIN is taken",
+        f"{path}:17: [2002] DefaultValue=300 is no UNSIGNED8 (default-value)",
+        f"{path}:10: [2001] DataType=0x7777 is unknown: DOMAIN is taken (data-type-unknown)",
     ]
     assert last("585#4F01200007000000", {5: eds}).text.startswith("upload 2001h:00 type = 07")
 
@@ -78,12 +78,9 @@ def test_what_a_file_says_wrongly_of_an_object_is_not_used(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("text", "findings"),
     [
-        ("no EDS at all", [": line 1 is no keyword with a value: 'no EDS at all'"]),
-        ("[DeviceInfo]\n", [": has no objects"]),
-        (
-            "[DeviceInfo]\n[2001]\nObjectType=0x7\nDataType=5\n",
-            [": [2001] ParameterName is missing", ": [2001] AccessType is missing"],
-        ),
+        ("no EDS at all", [": has no objects (no-objects)"]),
+        ("[DeviceInfo]\n", [": has no objects (no-objects)"]),
+        ("<a><b></a>", [":1: is no XML: mismatched tag (xml)"]),
     ],
 )
 def test_a_file_that_is_no_eds_is_refused(tmp_path: Path, text: str, findings: list[str]) -> None:

@@ -178,10 +178,10 @@ def test_on_the_servers_stop_its_nodes_are_reset_and_stopped_if_it_says_so() -> 
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
-        ("a.txt", "", "the name does not end in .eds or .dcf"),
+        ("a.txt", "", "the name does not end in .eds, .dcf, .xdd, .xdc"),
         ("none.eds", None, "No such file or directory"),
-        ("a.eds", "x", "line 1 is no keyword with a value: 'x'"),
-        ("b.eds", "[1000]\nDataType=5\nAccessType=ro\n", "[1000] ParameterName is missing"),
+        ("a.eds", "x", "has no objects"),
+        ("b.xdd", "<a>", "b.xdd:1: is no XML: no element found (xml)"),
         ("c.eds", "", "has no objects"),
     ],
 )

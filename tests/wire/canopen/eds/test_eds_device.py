@@ -26,139 +26,229 @@ def entries(text: str) -> list[EntryDescription]:
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("", "a.eds: has no objects"),
-        ("[DeviceInfo]\nVendorName=x\n", "a.eds: has no objects"),
-        ("hello\nyou\n", "a.eds: line 1 is no keyword with a value: 'hello'"),
+        ("", "a.eds: has no objects (no-objects)"),
+        ("[DeviceInfo]\nVendorName=x\n", "a.eds: has no objects (no-objects)"),
         (
-            f"{SOUND}\nrubbish\n",
-            "a.eds: [1000] line 6 is no keyword with a value: 'rubbish'",
-        ),
-        (f"{SOUND}[1000]\nx=1\n", "a.eds: [1000] is there twice, line 5"),
-        (f"[1a00]\n{U8}[1A00]\n", "a.eds: [1A00] is there twice, line 5"),
-        (f"{SOUND}datatype=2\n", "a.eds: [1000] datatype is there twice, line 5"),
-        ("[1017]\nParameterName=x\nDataType=6\n", "a.eds: [1017] AccessType is missing"),
-        ("[1017]\nDataType=6\nAccessType=rw\n", "a.eds: [1017] ParameterName is missing"),
-        ("[1017]\nParameterName=x\nAccessType=rw\n", "a.eds: [1017] DataType is missing"),
-        (f"[1017]\n{U8}PDOMapping=yes\n", "a.eds: [1017] PDOMapping=yes is not a number"),
-        (f"[1017]\n{U8}ObjectType=3\n", "a.eds: [1017] ObjectType=3 is no kind of object"),
-        (
-            "[1017]\nParameterName=x\nDataType=0x17\nAccessType=rw\n",
-            "a.eds: [1017] DataType=0x0017 is unknown",
+            f"[2000]\n{U8}DefaultValue=0x1FF\n",
+            "a.eds:5: [2000] DefaultValue=0x1FF is no UNSIGNED8 (default-value)",
         ),
         (
-            "[1017]\nParameterName=x\nDataType=5\nAccessType=rx\n",
-            "a.eds: [1017] access type 'rx' is none of ro, wo, rw, rwr, rww, const",
+            f"[2000]\n{U8}DefaultValue=three\n",
+            "a.eds:5: [2000] DefaultValue=three is no UNSIGNED8 (default-value)",
         ),
-        (f"[2000]\n{U8}DefaultValue=0x1FF\n", "a.eds: [2000] DefaultValue=0x1FF is no UNSIGNED8"),
-        (f"[2000]\n{U8}DefaultValue=three\n", "a.eds: [2000] DefaultValue=three is no UNSIGNED8"),
-        (f"[2000]\n{U8}ParameterValue=-1\n", "a.eds: [2000] ParameterValue=-1 is no UNSIGNED8"),
-        (f"[2000]\n{U8}LowLimit=low\n", "a.eds: [2000] LowLimit=low is no UNSIGNED8"),
-        (f"[2000]\n{U8}LowLimit=9\nHighLimit=8\n", "a.eds: [2000] LowLimit 9 is above HighLimit 8"),
+        (
+            f"[2000]\n{U8}ParameterValue=-1\n",
+            "a.eds:5: [2000] ParameterValue=-1 is no UNSIGNED8 (default-value)",
+        ),
         (
             f"[2000]\n{U8}DefaultBytes=0g\n",
-            "a.eds: [2000] DefaultBytes=0g is no 1 hexadecimal bytes",
+            "a.eds:5: [2000] DefaultBytes=0g is no 1 hexadecimal bytes (default-value)",
         ),
         (
             f"[2000]\n{U8}DefaultBytes=0102\n",
-            "a.eds: [2000] DefaultBytes=0102 is no 1 hexadecimal bytes",
+            "a.eds:5: [2000] DefaultBytes=0102 is no 1 hexadecimal bytes (default-value)",
         ),
         (
             "[2000]\nParameterName=x\nDataType=0xA\nAccessType=rw\nDefaultBytes=0g\n",
-            "a.eds: [2000] DefaultBytes=0g is no hexadecimal bytes",
-        ),
-        (f"[2000]\n{U8}MaxBytes=few\n", "a.eds: [2000] MaxBytes=few is not a number"),
-        (f"[2000]\n{U8}MaxBytes=-1\n", "a.eds: [2000] MaxBytes=-1 is not in 0..4294967295"),
-        (f"[2000sub1]\n{U8}", "a.eds: [2000sub1] has no object [2000]"),
-        (
-            f"[2000]\n{U8}ObjectType=7\n[2000sub1]\n{U8}",
-            "a.eds: [2000sub1] is part of a VAR, which has none",
-        ),
-        (
-            "[2000]\nParameterName=x\nObjectType=8\nCompactSubObj=2\nAccessType=rw\n",
-            "a.eds: [2000] DataType is missing",
-        ),
-        (
-            f"{SOUND}[DeviceComissioning]\nNodeID=200\n",
-            "a.eds: [DeviceComissioning] NodeID=200 is not in 1..127",
-        ),
-        (
-            f"{SOUND}[DeviceCommissioning]\nNodeID=x\n",
-            "a.eds: [DeviceComissioning] NodeID=x is not a number",
+            "a.eds:5: [2000] DefaultBytes=0g is no hexadecimal bytes (default-value)",
         ),
     ],
 )
-def test_what_has_no_meaning_is_an_error_with_section_and_key(text: str, error: str) -> None:
+def test_what_has_no_meaning_is_an_error_with_line_section_key_and_rule(
+    text: str, error: str
+) -> None:
     assert read(text)[1:] == ([error], [])
 
 
 def test_all_errors_of_a_file_are_told_at_once() -> None:
     text = (
         f"[1000]\nrubbish\n[2000]\n{U8}DefaultValue=300\nPDOMapping=maybe\n"
-        f"[2001]\nParameterName=y\n[2002]\n{U8}[2002]\n{U8}"
+        f"[2001]\nParameterName=y\n[2002]\n{U8}DefaultBytes=x\n[2002]\n{U8}"
     )
-    device, errors, _ = read(text)
+    device, errors, warnings = read(text)
     assert errors == [
-        "a.eds: [1000] line 2 is no keyword with a value: 'rubbish'",
-        "a.eds: [2002] is there twice, line 15",
-        "a.eds: [1000] ParameterName is missing",
-        "a.eds: [1000] DataType is missing",
-        "a.eds: [1000] AccessType is missing",
-        "a.eds: [2000] PDOMapping=maybe is not a number",
-        "a.eds: [2000] DefaultValue=300 is no UNSIGNED8",
-        "a.eds: [2001] DataType is missing",
-        "a.eds: [2001] AccessType is missing",
+        "a.eds:7: [2000] DefaultValue=300 is no UNSIGNED8 (default-value)",
+        "a.eds:15: [2002] DefaultBytes=x is no 1 hexadecimal bytes (default-value)",
     ]
-    assert [row.index for row in device.entries] == [0x2000, 0x2002]
+    assert len(warnings) == 11
+    assert [row.index for row in device.entries] == [0x1000, 0x2000, 0x2001, 0x2002]
 
 
 @pytest.mark.parametrize(
     ("text", "warning"),
     [
-        (f"{U8}PDOMapping=\n", "PDOMapping is empty: 0 is taken"),
         (
-            "ParameterName=x\nDataType=\nAccessType=rw\n",
-            "DataType is empty: 15 is taken",
+            f"[1000]\n{U8}\nrubbish\n",
+            "a.eds:6: [1000] 'rubbish' is no keyword with a value: it is skipped (no-keyword)",
         ),
         (
-            "ParameterName=x\nDataType=5\nAccessType=\n",
-            "AccessType is empty: rw is taken",
+            f"[1000]\n{U8}[1000]\nx=1\n",
+            "a.eds:5: [1000] is there twice: of each keyword the first is taken (doubled-section)",
         ),
         (
-            "ParameterName=x\nDataType=5\nAccessType=R\n",
-            "AccessType=R is none of CiA 306: ro is taken",
+            f"[1a00]\n{U8}[1A00]\n",
+            "a.eds:5: [1A00] is there twice: of each keyword the first is taken (doubled-section)",
         ),
         (
-            "ParameterName=x\nDataType=0x40\nAccessType=ro\n",
-            "DataType=0x0040 is unknown: DOMAIN is taken",
+            f"[1000]\n{U8}datatype=2\n",
+            "a.eds:5: [1000] datatype is there twice: 5 is taken (doubled-key)",
         ),
         (
-            f"{U8}DefaultValue=0x12ul\n",
-            "DefaultValue=0x12ul is no number of CiA 306: 0x12 is taken",
-        ),
-        (f"{U8}HighLimit=0099\n", "HighLimit=0099 is no number of CiA 306: 99 is taken"),
-        (
-            "ParameterName=x\nDataType=1\nAccessType=rw\nDefaultValue=0xFF\n",
-            "DefaultValue=0xFF is no BOOLEAN: 1 is taken",
-        ),
-        (f"{U8}Factor=0\n", "Factor=0 is no factor: 1 is taken"),
-        (f"{U8}Factor=big\n", "Factor=big is no factor: 1 is taken"),
-        (
-            "ParameterName=x\nDataType=9\nAccessType=ro\nDefaultValue=5 €\n",
-            "DefaultValue=5 € is not ASCII: its bytes in UTF-8 are taken",
+            "[1017]\nParameterName=x\nDataType=6\n",
+            "a.eds:1: [1017] AccessType is missing: rw is taken (access-missing)",
         ),
         (
-            "ParameterName=x\nDataType=9\nAccessType=ro\nDefaultValue=5 °C\n",
-            "DefaultValue=5 °C is not ASCII: its bytes in ISO 8859-1 are taken",
+            "[1017]\nDataType=6\nAccessType=rw\n",
+            "a.eds:1: [1017] ParameterName is missing: none is taken (name-missing)",
         ),
         (
-            f"{U8}ObjectType=9\nCompactSubObj=1\n",
-            "CompactSubObj in a RECORD: its entries are taken to be alike",
+            "[1017]\nParameterName=x\nAccessType=rw\n",
+            "a.eds:1: [1017] DataType is missing: DOMAIN is taken (data-type-missing)",
+        ),
+        (
+            f"[1017]\n{U8}PDOMapping=yes\n",
+            "a.eds:5: [1017] PDOMapping=yes is not a number: 1 is taken (no-number)",
+        ),
+        (
+            f"[1017]\n{U8}ObjectType=3\n",
+            "a.eds:5: [1017] ObjectType=3 is no kind of object: VAR is taken (object-type)",
+        ),
+        (
+            "[1017]\nParameterName=x\nDataType=0x17\nAccessType=rw\n",
+            "a.eds:3: [1017] DataType=0x0017 is unknown: DOMAIN is taken (data-type-unknown)",
+        ),
+        (
+            "[1017]\nParameterName=x\nDataType=5\nAccessType=rx\n",
+            "a.eds:4: [1017] AccessType=rx is none of CiA 306: rw is taken (access-form)",
+        ),
+        (
+            f"[2000]\n{U8}LowLimit=low\n",
+            "a.eds:5: [2000] LowLimit=low is no UNSIGNED8: no limit is taken (limit-value)",
+        ),
+        (
+            f"[2000]\n{U8}LowLimit=9\nHighLimit=8\n",
+            "a.eds:5: [2000] LowLimit 9 is above HighLimit 8: neither is taken (limit-order)",
+        ),
+        (
+            f"[2000]\n{U8}MaxBytes=few\n",
+            "a.eds:5: [2000] MaxBytes=few is not a number: 4294967295 is taken (no-number)",
+        ),
+        (
+            f"[2000]\n{U8}MaxBytes=-1\n",
+            "a.eds:5: [2000] MaxBytes=-1 is not in 0..4294967295: 4294967295 is taken (no-number)",
+        ),
+        (
+            f"[2000sub1]\n{U8}",
+            "a.eds:1: [2000sub1] has no object [2000]: a RECORD is taken (sub-orphan)",
+        ),
+        (
+            f"[2000]\n{U8}ObjectType=7\n[2000sub1]\n{U8}",
+            "a.eds:5: [2000] ObjectType=7 has no sub-indices, and there are: RECORD is "
+            "taken (object-type)",
+        ),
+        (
+            "[2000]\nParameterName=x\nObjectType=8\nCompactSubObj=2\nAccessType=rw\n",
+            "a.eds:1: [2000] DataType is missing: DOMAIN is taken (data-type-missing)",
+        ),
+        (
+            f"[1000]\n{U8}[DeviceComissioning]\nNodeID=200\n",
+            "a.eds:6: [DeviceComissioning] NodeID=200 is not in 1..127: none is taken (node-id)",
+        ),
+        (
+            f"[1000]\n{U8}[DeviceCommissioning]\nNodeID=x\n",
+            "a.eds:6: [DeviceComissioning] NodeID=x is not a number: 0 is taken (no-number)",
+        ),
+        (
+            f"[2000]\n{U8}PDOMapping=\n",
+            "a.eds:5: [2000] PDOMapping is empty: 0 is taken (empty-value)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=\nAccessType=rw\n",
+            "a.eds:3: [2000] DataType is empty: 15 is taken (empty-value)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=5\nAccessType=\n",
+            "a.eds:4: [2000] AccessType is empty: rw is taken (access-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=5\nAccessType=R\n",
+            "a.eds:4: [2000] AccessType=R is none of CiA 306: ro is taken (access-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0x40\nAccessType=ro\n",
+            "a.eds:3: [2000] DataType=0x0040 is unknown: DOMAIN is taken (data-type-unknown)",
+        ),
+        (
+            f"[2000]\n{U8}DefaultValue=0x12ul\n",
+            "a.eds:5: [2000] DefaultValue=0x12ul is no number of CiA 306: 0x12 is taken "
+            "(number-form)",
+        ),
+        (
+            f"[2000]\n{U8}HighLimit=0099\n",
+            "a.eds:5: [2000] HighLimit=0099 is no number of CiA 306: 99 is taken (number-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=1\nAccessType=rw\nDefaultValue=0xFF\n",
+            "a.eds:5: [2000] DefaultValue=0xFF is no BOOLEAN: 1 is taken (boolean-value)",
+        ),
+        (f"[2000]\n{U8}Factor=0\n", "a.eds:5: [2000] Factor=0 is no factor: 1 is taken (factor)"),
+        (
+            f"[2000]\n{U8}Factor=big\n",
+            "a.eds:5: [2000] Factor=big is no factor: 1 is taken (factor)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=9\nAccessType=ro\nDefaultValue=5 €\n",
+            "a.eds:5: [2000] DefaultValue=5 € is not ASCII: its bytes in UTF-8 are taken "
+            "(text-value)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=9\nAccessType=ro\nDefaultValue=5 °C\n",
+            "a.eds:5: [2000] DefaultValue=5 °C is not ASCII: its bytes in ISO 8859-1 are "
+            "taken (text-value)",
+        ),
+        (
+            f"[2000]\n{U8}ObjectType=9\nCompactSubObj=1\n",
+            "a.eds:6: [2000] CompactSubObj in a RECORD: its entries are taken to be alike "
+            "(compact-record)",
+        ),
+        (
+            "[1017]\nParameterName=x\nDataType=6\nAccessType=rw\n=5\n",
+            "a.eds:5: [1017] '=5' is no keyword with a value: it is skipped (no-keyword)",
+        ),
+        (
+            "[1000]\nParameterName=x\nObjectType=9\n[1000sub0]\nParameterName=x\nAccessType=ro\n",
+            "a.eds:4: [1000sub0] DataType is missing: UNSIGNED8 is taken (data-type-missing)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0x40\nAccessType=ro\n[40sub1]\nDefaultValue=0x40\n",
+            "a.eds:3: [2000] DataType=0x0040 is unknown: DOMAIN is taken (data-type-unknown)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=ro\nDefaultValue=NODEID+0x 1 80\n",
+            "a.eds:5: [2000] DefaultValue=NODEID+0x 1 80 is no number of CiA 306: "
+            "NODEID+0x180 is taken (number-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=ro\nDefaultValue=1Ah\n",
+            "a.eds:5: [2000] DefaultValue=1Ah is no number of CiA 306: 0x1A is taken (number-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=ro\nHighLimit=0x1FFFFFFFFFFFFFFFF\n",
+            "a.eds:5: [2000] HighLimit=0x1FFFFFFFFFFFFFFFF is no UNSIGNED32: no limit is "
+            "taken (limit-value)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=ro\nDefaultValue=1_000\n",
+            "a.eds:5: [2000] DefaultValue=1_000 is no number of CiA 306: 1000 is taken "
+            "(number-form)",
         ),
     ],
 )
-def test_what_has_one_meaning_is_a_warning_with_section_and_key(text: str, warning: str) -> None:
-    device, errors, warnings = read(f"[2000]\n{text}")
-    assert (errors, warnings) == ([], [f"a.eds: [2000] {warning}"])
+def test_what_has_one_meaning_is_a_warning_with_line_section_key_and_rule(
+    text: str, warning: str
+) -> None:
+    device, errors, warnings = read(text)
+    assert (errors, warnings) == ([], [warning])
     assert device.entries
 
 
@@ -166,7 +256,7 @@ def test_texts_beyond_ascii_have_the_bytes_of_their_coding() -> None:
     text = "[2000]\nParameterName=x\nDataType=9\nAccessType=ro\nDefaultValue="
     assert [entries(text + word)[0].default for word in ("°", "€")] == [b"\xb0", b"\xe2\x82\xac"]
     _, errors, _ = read("[2000]\nParameterName=x\nDataType=0xA0\nAccessType=ro\nDefaultValue=€")
-    assert errors == ["a.eds: [2000] DefaultValue=€ is no VISIBLE_CHAR"]
+    assert errors == ["a.eds:5: [2000] DefaultValue=€ is no VISIBLE_CHAR (default-value)"]
 
 
 def test_letters_of_c_and_lone_letters_mean_what_they_meant() -> None:
@@ -208,14 +298,20 @@ def test_a_compact_array_counts_its_elements() -> None:
 def test_a_data_type_of_the_file_is_what_its_section_says() -> None:
     own = "[2000]\nParameterName=x\nDataType=0xA0\nAccessType=rw\n[a0SUB1]\nDefaultValue={}\n"
     assert entries(own.format("0x06"))[0].data_type is DataType.UNSIGNED16
-    assert read(own.format("six"))[1] == ["a.eds: [A0sub1] DefaultValue=six is not a number"]
+    assert read(own.format("six"))[2] == [
+        "a.eds:6: [A0sub1] DefaultValue=six is not a number: 15 is taken (no-number)"
+    ]
 
 
 def test_what_describes_no_device_may_say_what_it_wants() -> None:
-    text = (
-        f"{SOUND}[Comments]\nLines=1\nLines=2\nfree text\n[Comments]\nmore\n[1000Denotation]\nx\n"
-    )
+    text = f"{SOUND}[Comments]\nLines=1\nLines=2\nfree text\n[Comments]\nmore\n"
     assert read(text)[1:] == ([], [])
+
+
+def test_of_what_stands_before_the_first_section_one_line_is_told() -> None:
+    _, errors, warnings = read("hello\nyou\n=\n[Tools]\n=\n")
+    assert errors == ["a.eds: has no objects (no-objects)"]
+    assert warnings == ["a.eds:1: 'hello' is no keyword with a value: it is skipped (no-keyword)"]
 
 
 def test_comments_and_blanks_are_skipped() -> None:
@@ -230,4 +326,4 @@ def test_objects_that_only_define_a_type_are_none() -> None:
 
 def test_long_texts_are_shortened() -> None:
     _, (error,), _ = read(f"[2000]\n{U8}DefaultValue={'x' * 1_000}\n")
-    assert error == f"a.eds: [2000] DefaultValue={'x' * 37}... is no UNSIGNED8"
+    assert error == f"a.eds:5: [2000] DefaultValue={'x' * 37}... is no UNSIGNED8 (default-value)"
