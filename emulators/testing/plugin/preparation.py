@@ -28,7 +28,7 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
     if settings.artifacts:
-        from tickrig.emulators.testing.report.report_file import check_writable  # noqa: PLC0415
+        from tickrig.host.text.whole_file import check_writable  # noqa: PLC0415 - asked for
 
         try:
             check_writable(settings.artifacts)

@@ -17,7 +17,6 @@ from typing import Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tickrig.emulators.testing.report import page_text
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     JournalLine,
@@ -43,6 +42,7 @@ from tickrig.emulators.testing.report.page_room import (
     cut,
 )
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
+from tickrig.host.text import page_text
 from tickrig.host.text.values import counted, format_time
 
 PACKAGE: Final = __package__

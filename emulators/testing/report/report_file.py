@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.testing.report.bench_report import BenchReport
 from tickrig.emulators.testing.report.report_json import from_json, to_json
+from tickrig.host.text.whole_file import check_file, is_special, write_whole
 
 PAGES: Final = (".html", ".htm", "")
 JSON: Final = ".json"
@@ -27,36 +26,7 @@ def check_report(path: Path) -> None:
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
     if path.suffix.lower() != JSON and find_spec("jinja2") is None:
         raise ValueError("a report needs Jinja2: pip install 'tickrig[report]'")
-    if not path.parent.is_dir():
-        raise ValueError(f"report {path}: no directory {path.parent}")
-    if path.is_dir():
-        raise ValueError(f"report {path}: it is a directory")
-    if not is_special(path):
-        try:
-            check_writable(path.resolve().parent)
-        except OSError as error:
-            raise ValueError(f"report {path}: {error.strerror}") from None
-
-
-def is_special(path: Path) -> bool:
-    """Return whether it is something else than a file or folder, such as a pipe."""
-    return path.exists() and not (path.is_file() or path.is_dir())
-
-
-def check_writable(folder: Path) -> None:
-    """See whether files can be made in a folder, by making one; it may be a folder to be made.
-
-    Raises:
-        OSError: none can.
-    """
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent
-    beside = folder / f".tickrig.{os.getpid()}"
-    try:
-        beside.write_bytes(b"")
-    finally:
-        with suppress(OSError):
-            beside.unlink(missing_ok=True)
+    check_file(path, "report")
 
 
 def write_report(report: BenchReport, path: Path) -> None:
@@ -99,33 +69,3 @@ def read_run(path: Path) -> BenchReport:
     if not text:
         raise ValueError("not JSON: it is empty")
     return from_json(text)
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Replace a file when its text is on the disk; what is no file, as a pipe, is written to.
-
-    Raises:
-        OSError: the file cannot be written; its `filename` is `path`.
-    """
-    data = text.encode("utf-8", "backslashreplace")
-    try:
-        place = path.resolve()
-        if place.exists() and not place.is_file():
-            place.write_bytes(data)
-        else:
-            _replace(place, data)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def _replace(path: Path, data: bytes) -> None:
-    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}")
-    try:
-        beside.unlink(missing_ok=True)  # of a run that was killed
-        with beside.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

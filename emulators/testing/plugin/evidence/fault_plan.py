@@ -10,7 +10,7 @@ from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.plugin.evidence.signal_names import fault_names
 from tickrig.emulators.testing.report.bench_report import PlannedFault
-from tickrig.emulators.testing.report.page_text import seconds
+from tickrig.host.text.page_text import seconds
 from tickrig.host.text.trace import Mark
 
 

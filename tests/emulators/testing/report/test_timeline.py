@@ -16,8 +16,8 @@ from tickrig.emulators.testing.report.bench_report import (
     Value,
 )
 from tickrig.emulators.testing.report.lane import CURVE_PX, SWITCH_PX, Lane
-from tickrig.emulators.testing.report.page_text import DASH
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
+from tickrig.host.text.page_text import DASH
 
 
 def line_of(
