@@ -29,6 +29,17 @@ def harmless(value: Any) -> Any:  # a template prints values of any type
     return _UNSEEN.sub(_shown, value.replace("\r\n", "\n"))
 
 
+def one_line(value: str) -> str:
+    r"""Return such a text in one line.
+
+    >>> one_line("a\nFAIL b")
+    'a␊FAIL b'
+    """
+    if value.isascii() and value.isprintable():
+        return value
+    return str(harmless(value)).replace("\n", "␊").replace("\t", "␉")
+
+
 def _shown(match: re.Match[str]) -> str:
     code = ord(match[0])
     return chr(0x2400 + code) if code < 0x20 else "␡" if code == 0x7F else f"<U+{code:04X}>"

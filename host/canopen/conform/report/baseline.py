@@ -1,0 +1,97 @@
+"""Failures that are known, so that those which are new stand out.
+
+A baseline is a text file: the id of a check a line, what follows a `#` is for people.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canopen.conform.verdict import (
+    FAILED,
+    NOTHING_JUDGED,
+    UNDECIDED,
+    Report,
+    Result,
+    Verdict,
+)
+from tickrig.host.text.page_text import one_line
+
+HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
+MOST_BYTES: Final = 10_000_000
+LONGEST: Final = 80
+"""Characters of an id; those of the suite have at most half of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """What is known to fail.
+
+    Attributes:
+        known: ids of checks.
+    """
+
+    known: frozenset[str] = frozenset()
+
+    @classmethod
+    def read(cls, path: Path) -> Baseline:
+        """Read a file.
+
+        Raises:
+            OSError: it cannot be read.
+            ValueError: it is no baseline; the text says which line and why.
+        """
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise ValueError(f"{path} has more than {MOST_BYTES} bytes: it is no baseline")
+        try:
+            lines = data.decode("utf-8-sig").splitlines()
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{path} is no text: byte {error.start} is no UTF-8") from None
+        return cls(frozenset(filter(None, (_id(path, *each) for each in enumerate(lines, 1)))))
+
+    def knows(self, result: Result) -> bool:
+        """Say whether it is a failure that is known."""
+        return result.outcome.verdict is Verdict.FAIL and result.check.id in self.known
+
+    def new(self, report: Report) -> list[Result]:
+        """Return the failures that are not known."""
+        failed = (result for result in report.results if result.outcome.verdict is Verdict.FAIL)
+        return [result for result in failed if not self.knows(result)]
+
+    def mended(self, report: Report) -> list[str]:
+        """Return the ids that were known to fail and pass now."""
+        passed = {one.check.id for one in report.results if one.outcome.verdict is Verdict.PASS}
+        return sorted(self.known & passed)
+
+    def exit_status(self, report: Report) -> int:
+        """Return the exit status of a run: that of the report, where known failures are none."""
+        if self.new(report):
+            return FAILED
+        if report.aborted or report.count(Verdict.INCONCLUSIVE) or report.count(Verdict.BLOCKED):
+            return UNDECIDED
+        return 0 if report.count(Verdict.PASS) or report.count(Verdict.FAIL) else NOTHING_JUDGED
+
+
+NONE_KNOWN: Final = Baseline()
+
+
+def baseline_text(report: Report) -> str:
+    """Write the failures of a report as a baseline, in the order of their ids."""
+    failed = {
+        result.check.id: f"{result.check.id}  # {one_line(result.check.title)}"
+        for result in report.results
+        if result.outcome.verdict is Verdict.FAIL
+    }
+    return "\n".join([HEAD, *(failed[name] for name in sorted(failed)), ""])
+
+
+def _id(path: Path, number: int, line: str) -> str:
+    name = line.partition("#")[0].strip()
+    if len(name) > LONGEST or len(name.split()) > 1 or not name.isascii():
+        shown = one_line(name)
+        raise ValueError(f"{path}, line {number}: {shown[:LONGEST]!r} is no id of a check")
+    return name

@@ -1,0 +1,65 @@
+"""A report as JSON, for programs (docs/conform.md has what each field means)."""
+
+from __future__ import annotations
+
+import json
+from typing import Final
+
+from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
+
+VERSION: Final = 1
+"""It changes when a field changes its meaning or goes."""
+
+Object = dict[str, object]
+
+
+def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
+    """Return the report; the same run gives the same bytes.
+
+    Args:
+        report: the run.
+        baseline: failures that are known.
+    """
+    said: Object = {
+        "v": VERSION,
+        "source": report.source,
+        "node": report.node_id,
+        "level": report.level.word,
+        "exit_status": baseline.exit_status(report),
+        "aborted": report.aborted,
+        "duration_us": report.duration_us,
+        "counts": {str(verdict): report.count(verdict) for verdict in Verdict},
+        "device": dict(report.node),
+        "settings": dict(report.settings),
+        "findings": list(report.findings),
+        "unrestored": list(report.unrestored),
+        "checks": [_check(result, baseline) for result in report.results],
+    }
+    return json.dumps(said, indent=1) + "\n"
+
+
+def _check(result: Result, baseline: Baseline) -> Object:
+    check = result.check
+    return {
+        "id": check.id,
+        "group": check.group,
+        "title": check.title,
+        "clause": check.source,
+        "level": check.level.word,
+        "needs": sorted(check.needs),
+        "choice": check.choice,
+        "known": baseline.knows(result),
+        **_outcome(result.outcome),
+        "first": None if result.first is None else _outcome(result.first),
+    }
+
+
+def _outcome(outcome: Outcome) -> Object:
+    return {
+        "verdict": str(outcome.verdict),
+        "reason": outcome.reason,
+        "start_us": outcome.start_us,
+        "end_us": outcome.end_us,
+        "frames": [[line.at_us, str(line.direction), line.text] for line in outcome.evidence],
+    }

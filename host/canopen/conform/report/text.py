@@ -1,0 +1,116 @@
+"""A report for a terminal: a line a group, and the failures with their frames."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.report.evidence import (
+    ShowFrames,
+    all_goes,
+    cut,
+    plain_frames,
+)
+from tickrig.host.canopen.conform.report.hints import hint
+from tickrig.host.canopen.conform.report.overview import (
+    by_group,
+    counts_text,
+    unwell,
+    verdict_counts,
+)
+from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.text.page_text import duration, one_line
+from tickrig.host.text.values import counted
+
+MOST_SHOWN: Final = 20
+"""So many failures are shown with their frames; the others have a line each."""
+MOST_LINES: Final = 40
+"""Of frames of one failure."""
+MOST_REASONS: Final = 12
+
+
+def text_report(
+    report: Report,
+    baseline: Baseline = NONE_KNOWN,
+    show: ShowFrames = plain_frames,
+    again: str = "",
+) -> str:
+    """Return the text.
+
+    Args:
+        report: the run.
+        baseline: failures that are known; they are named and not shown.
+        show: writes frames.
+        again: the command that judges one check alone, without its id; empty if there is none.
+    """
+    parts = [_head(report), _groups(report), _not_applicable(report)]
+    found = [result for result in unwell(report) if not baseline.knows(result)]
+    parts += [_failure(result, show, again) for result in found[:MOST_SHOWN]]
+    parts.append([_title(result) for result in found[MOST_SHOWN:]])
+    parts += [_told("EDS and node", report.findings), _told("not restored", report.unrestored)]
+    parts.append(list(_ending(report, baseline)))
+    return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
+
+
+def _head(report: Report) -> list[str]:
+    what = counted(len(report.results), "check")
+    head = f"node {report.node_id} on {one_line(report.source)}, {report.level.word}: {what}"
+    told = {**report.node, **report.settings}
+    wide = max(map(len, told), default=0)
+    rows = [f"  {one_line(name):<{wide}}  {one_line(value)}" for name, value in told.items()]
+    return [f"{head} in {duration(report.duration_us)}", *rows]
+
+
+def _groups(report: Report) -> list[str]:
+    rows = by_group(report)
+    wide = max((len(row.name) for row in rows), default=0)
+    return [
+        f"{one_line(row.name):<{wide}}  {len(row.results):5}: {counts_text(row.counts)}"
+        for row in rows
+    ]
+
+
+def _not_applicable(report: Report) -> list[str]:
+    """Say why checks were not applicable, the most frequent reason first."""
+    reasons = Counter(
+        one_line(result.outcome.reason)
+        for result in report.results
+        if result.outcome.verdict is Verdict.NOT_APPLICABLE
+    )
+    if not reasons:
+        return []
+    ranked = sorted(reasons.items(), key=lambda each: (-each[1], each[0]))
+    rows = [f"{number:5}  {reason}" for reason, number in ranked[:MOST_REASONS]]
+    more = len(ranked) - MOST_REASONS
+    return ["not applicable:", *rows, *([f"       and {more} reasons more"] if more > 0 else [])]
+
+
+def _failure(result: Result, show: ShowFrames, again: str) -> list[str]:
+    frames = cut(all_goes(result.outcome, result.first, show), MOST_LINES)
+    clause = f"  {one_line(result.check.source)}"
+    reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
+    next_to = [f"  look at {text}"] if (text := hint(result)) else []
+    alone = [f"  alone: {again} --only {result.check.id}"] if again else []
+    return [_title(result), clause, *reason, *frames, *next_to, *alone]
+
+
+def _title(result: Result) -> str:
+    check, verdict = result.check, str(result.outcome.verdict).upper()
+    return f"{verdict} {one_line(check.id)}: {one_line(check.title)}"
+
+
+def _told(what: str, lines: tuple[str, ...]) -> list[str]:
+    return [f"{what}:", *(f"  {one_line(line)}" for line in lines)] if lines else []
+
+
+def _ending(report: Report, baseline: Baseline) -> Iterator[str]:
+    yield f"{counted(len(report.results), 'check')}: {counts_text(verdict_counts(report.results))}"
+    if baseline.known:
+        known, new = sum(map(baseline.knows, report.results)), len(baseline.new(report))
+        yield f"{counted(known, 'failure')} known, {new} new"
+    if mended := baseline.mended(report):
+        yield f"known to fail, and passed: {', '.join(mended)}"
+    if report.aborted:
+        yield f"not all was judged: {one_line(report.aborted)}"

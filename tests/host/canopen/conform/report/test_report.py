@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+from tests.emulators.testing.report.html_tree import parse_page
+from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
+from tickrig.host.canopen.conform.report.badge import badge
+from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
+from tickrig.host.canopen.conform.report.page import html_page
+from tickrig.host.canopen.conform.report.report_json import report_json
+from tickrig.host.canopen.conform.report.report_junit import report_junit
+from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+
+KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
+MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))
+
+
+def test_the_text_has_a_line_a_group_and_failures_with_frames_and_what_to_look_at() -> None:
+    text = text_report(SAMPLE, again="canmon conform can0 --node 5")
+    assert re.search(r"^NMT +2: 1 pass, 1 fail$", text, re.MULTILINE)
+    assert re.search(r"^HB +3: 2 not applicable, 1 inconclusive$", text, re.MULTILINE)
+    failure = text[text.index("FAIL NMT-11") :].split("\n\n")[0]
+    assert failure.splitlines() == [
+        "FAIL NMT-11: what NMT-11 wants",
+        "  CiA 301 v4.2, 7.2.3.1",
+        "  got 585#4B01200034120000, want 585#4B0120000000....",
+        " (001.000000)  >  605   [8]  40 01 20 00 00 00 00 00",
+        " (001.001250)  <  585   [8]  4B 01 20 00 34 12 00 00",
+        " (001.001300)  #  power cycle",
+        " (001.002000)  >  705   [1]  remote request",
+        " (001.003000)  <  0000017F   [0]",
+        "  look at the table of NMT states: which command leads where, and what it resets",
+        "  alone: canmon conform can0 --node 5 --only NMT-11",
+    ]
+    assert "    2  1016h is not there" in text
+    assert "not restored:\n  1017h: 100 was written" in text
+    assert "EDS and node:\n  1800h" in text
+
+
+def test_the_worst_is_told_last_where_a_terminal_ends() -> None:
+    assert text_report(SAMPLE).splitlines()[-1] == (
+        "8 checks: 2 pass, 1 fail, 2 not applicable, 1 implementation-defined,"
+        " 1 inconclusive, 1 blocked"
+    )
+
+
+def test_many_failures_have_a_line_each_behind_the_first_ones() -> None:
+    text = text_report(MANY)
+    assert text.count("FAIL UE-") == 30
+    assert text.count("look at") == 20
+
+
+def test_a_known_failure_is_not_shown_again_and_one_that_is_mended_is_told() -> None:
+    text = text_report(SAMPLE, KNOWN)
+    assert "FAIL NMT-11" not in text
+    assert "1 failure known, 0 new" in text
+    assert "known to fail, and passed: LS-02" in text
+
+
+def test_text_of_a_device_stays_in_its_line_and_commands_no_terminal() -> None:
+    text = text_report(SAMPLE)
+    assert all(line.isprintable() for line in text.splitlines())
+    assert not any(line.startswith("FAIL all") for line in text.splitlines())
+
+
+def test_json_holds_all_that_was_seen() -> None:
+    said = json.loads(report_json(SAMPLE, KNOWN))
+    assert (said["v"], said["node"], said["level"]) == (1, 5, "communication")
+    assert said["counts"]["fail"] == 1
+    failed = said["checks"][1]
+    assert failed["frames"][1] == [1_001_250, "<", "585#4B01200034120000"]
+    assert (failed["verdict"], failed["known"], failed["needs"]) == (
+        "fail",
+        True,
+        ["hbcons", "store"],
+    )
+    assert said["checks"][6]["first"]["reason"] == "?"
+    assert said["device"]["1008h device name"] == HOSTILE
+
+
+def test_junit_has_a_suite_a_group_and_a_case_a_check_for_a_foreign_reader(tmp_path: Path) -> None:
+    junitparser = pytest.importorskip("junitparser", reason="of the group dev")
+    path = tmp_path / "report.xml"
+    path.write_text(report_junit(SAMPLE), "utf-8")
+    suites = list(junitparser.JUnitXml.fromfile(str(path)))
+    assert [(one.name, one.tests, one.failures, one.errors, one.skipped) for one in suites] == [
+        ("NMT", 2, 1, 0, 0),
+        ("HB", 3, 0, 1, 2),
+        ("US", 1, 0, 0, 0),
+        ("PR", 1, 0, 1, 0),
+        ("LS", 1, 0, 0, 0),
+    ]
+    passed, failed = suites[0]
+    assert (passed.is_passed, failed.is_failure) == (True, True)
+    assert failed.name == "NMT-11 what NMT-11 wants"
+    assert failed.time == pytest.approx(0.004)
+    assert "585   [8]  4B 01 20 00 34 12 00 00" in failed.result[0].text
+    assert {one.name: one.value for one in suites[0].properties()}["bit rate"] == "500000 bit/s"
+    assert [case.is_skipped for case in suites[1]] == [False, True, True]
+
+
+def test_junit_of_a_known_failure_is_skipped_and_a_run_that_was_cut_is_no_success() -> None:
+    root = fromstring(report_junit(replace(SAMPLE, aborted="Ctrl-C"), KNOWN).encode())
+    case = root.findall("testsuite")[0].findall("testcase")[1]
+    skipped = case.find("skipped")
+    assert skipped is not None
+    assert skipped.get("message", "").startswith("known failure: got 585#")
+    ended = root.find("testsuite[@name='run']/testcase/error")
+    assert ended is not None
+    assert ended.get("message") == "Ctrl-C"
+
+
+def test_the_page_has_summary_clauses_and_each_check_with_its_frames() -> None:
+    page = parse_page(html_page(SAMPLE))
+    assert "1 fail" in page.by_class("verdict")[0].words
+    clauses = page.all("section", id="clauses")[0].all("tbody")[0].all("tr")
+    assert [row.all("th")[0].text for row in clauses] == sorted(
+        {one.check.source for one in SAMPLE.results}
+    )
+    checks = page.all("details")
+    assert [one.attributes["id"] for one in checks] == [
+        f"c-{one.check.id}" for one in SAMPLE.results
+    ]
+    assert "605   [8]  40 01 20 00" in checks[0].all("pre")[0].text
+    assert ["open" in one.attributes for one in checks] == [
+        *(False, True, True, False),
+        *(False, False, True, False),
+    ]
+    assert "First: fail" in checks[6].words
+    assert "1800h" in page.all("section", id="findings")[0].text
+    assert "500000 bit/s" in page.all("section", id="run")[0].text
+    links = [one.attributes["href"][1:] for one in page.all("a")]
+    assert set(links) <= {one.attributes.get("id") for one in page.below()}
+
+
+def test_only_our_style_is_let_in_and_nothing_is_fetched() -> None:
+    text = html_page(SAMPLE)
+    page = parse_page(text)
+    policy = page.all("meta")[1].attributes["content"]
+    assert policy.startswith("default-src 'none'; style-src 'sha256-")
+    assert not page.all("script")
+    assert not re.search(r"(?:src|href)=\"(?!#)|url\(|@import", text)
+
+
+def test_nothing_from_the_wire_is_markup() -> None:
+    evil = replace(result(HOSTILE, Verdict.FAIL, HOSTILE), first=SAMPLE.results[6].first)
+    report = replace(SAMPLE, source=HOSTILE, results=(evil,), findings=(HOSTILE,), aborted=HOSTILE)
+    tame = [
+        (one.tag, sorted(one.attributes)) for one in parse_page(html_page(_tame(report))).below()
+    ]
+    wild = [(one.tag, sorted(one.attributes)) for one in parse_page(html_page(report)).below()]
+    assert wild == tame
+    assert "alert" in fromstring(report_junit(report).encode())[0].get("name", "")
+
+
+def _elements(report: Report) -> list[tuple[str, list[str]]]:
+    page = parse_page(html_page(report))
+    return [(one.tag, sorted(one.attributes)) for one in page.below()]
+
+
+def _tame(report: Report) -> Report:
+    evil = report.results[0]
+    check = replace(evil.check, id="A", group="A", title="A", source="A")
+    tame = replace(evil, check=check, outcome=replace(evil.outcome, reason="A"))
+    return replace(report, source="A", results=(tame,), findings=("A",), aborted="A")
+
+
+def test_a_long_domain_is_cut_on_the_page_and_whole_in_json() -> None:
+    long = replace(SAMPLE, results=(result("BD-01", evidence=EVIDENCE * 1_000),))
+    assert "... 4801 more lines ..." in html_page(long)
+    assert len(json.loads(report_json(long))["checks"][0]["frames"]) == 5_000
+
+
+def test_a_badge_is_red_for_a_new_failure_alone() -> None:
+    assert "2 of 3 pass" in badge(SAMPLE)
+    assert "#c62828" in badge(SAMPLE)
+    healthy = replace(SAMPLE, results=SAMPLE.results[:2])
+    assert "#2e7d32" in badge(healthy, KNOWN)
+    assert "nothing judged" in badge(replace(SAMPLE, results=()))
+    assert "not all" in badge(replace(SAMPLE, aborted="Ctrl-C"))
+    fromstring(badge(SAMPLE))
+
+
+def test_a_baseline_is_written_and_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "known.txt"
+    path.write_text(baseline_text(SAMPLE), "utf-8")
+    baseline = Baseline.read(path)
+    assert baseline.known == {"NMT-11"}
+    assert baseline_text(SAMPLE).splitlines()[1] == "NMT-11  # what NMT-11 wants"
+
+
+def test_exit_statuses() -> None:
+    only = {one.check.id: replace(SAMPLE, results=(one,)) for one in SAMPLE.results}
+    statuses = {name: Baseline().exit_status(report) for name, report in only.items()}
+    assert statuses == {
+        **{"NMT-01": 0, "NMT-11": 1, "HB-10": 4, "HB-12": 5, "HB-13": 5, "US-08": 5},
+        **{"PR-03": 4, "LS-02": 0},
+    }
+    assert {name: report.exit_status for name, report in only.items()} == statuses
+    assert KNOWN.exit_status(only["NMT-11"]) == 0
+    assert KNOWN.exit_status(SAMPLE) == 4
+    assert KNOWN.exit_status(MANY) == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"NMT-01 NMT-02\n", "line 1: 'NMT-01 NMT-02' is no id of a check"),
+        (b"\xff\xfe", "is no text: byte 0 is no UTF-8"),
+        (b"\n" + b"A" * 1_000, "line 2: 'AAAA"),
+        (b'{"v": 1, "checks": []}', "is no id of a check"),
+    ],
+)
+def test_what_is_no_baseline_is_refused(tmp_path: Path, data: bytes, why: str) -> None:
+    path = tmp_path / "known.txt"
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=re.escape(why)):
+        Baseline.read(path)
+
+
+def test_the_same_run_gives_the_same_bytes() -> None:
+    for write in (html_page, report_json, report_junit, text_report, badge):
+        assert write(SAMPLE, KNOWN) == write(replace(SAMPLE), Baseline(frozenset(KNOWN.known)))
