@@ -49,7 +49,7 @@ def text_report(
     found = [result for result in unwell(report) if not baseline.knows(result)]
     parts += [_failure(result, show, again) for result in found[:MOST_SHOWN]]
     parts.append([_title(result) for result in found[MOST_SHOWN:]])
-    parts += [_told("EDS and node", report.findings), _told("not restored", report.unrestored)]
+    parts += [_list("EDS and node", report.findings), _list("not restored", report.unrestored)]
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 
@@ -101,7 +101,7 @@ def _title(result: Result) -> str:
     return f"{verdict} {one_line(check.id)}: {one_line(check.title)}"
 
 
-def _told(what: str, lines: tuple[str, ...]) -> list[str]:
+def _list(what: str, lines: tuple[str, ...]) -> list[str]:
     return [f"{what}:", *(f"  {one_line(line)}" for line in lines)] if lines else []
 
 
