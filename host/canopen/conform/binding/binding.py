@@ -75,12 +75,14 @@ class Binding:
         bound: by name.
         reasons: for people, by the names that are not bound.
         findings: where EDS and node contradict each other, one a line.
+        known: the objects are those of an EDS.
     """
 
     device: EdsDevice
     bound: Mapping[str, Bound]
     reasons: Mapping[str, str]
     findings: tuple[str, ...] = ()
+    known: bool = True
 
 
 @dataclass(slots=True)
@@ -131,7 +133,7 @@ def bind(
     search.bound.update(pdos)
     search.reasons.update(missing)
     findings = (*reader.findings, *search.findings)
-    return Binding(found, search.bound, search.reasons, findings)
+    return Binding(found, search.bound, search.reasons, findings, search.known)
 
 
 def _bind_object(search: _Search, wanted: Wanted) -> None:

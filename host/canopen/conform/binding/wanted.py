@@ -106,9 +106,9 @@ def _mapping(entry: EntryDescription) -> Access:
     return entry.access & (Access.TPDO | Access.RPDO)
 
 
-def _fixed(name: str, index: int, sub: int, what: str) -> Wanted:
+def _fixed(name: str, index: int, sub: int, what: str, use: Use = Use.WRITE) -> Wanted:
     where = f"{index:04X}h:{sub:02X}, {what}"
-    return Wanted(name, where, Use.WRITE, lambda entry: (entry.index, entry.sub) == (index, sub))
+    return Wanted(name, where, use, lambda entry: (entry.index, entry.sub) == (index, sub))
 
 
 WANTED: Final[tuple[Wanted, ...]] = (
@@ -116,6 +116,14 @@ WANTED: Final[tuple[Wanted, ...]] = (
     *(_ro(bits) for bits in SIZES),
     *(_mapped("tpdo", Access.TPDO, bits) for bits in SIZES),
     *(_mapped("rpdo", Access.RPDO, bits) for bits in SIZES),
+    Wanted(
+        "tpdo_bool",
+        "BOOLEAN that may be read, written and mapped into TPDOs",
+        Use.WRITE,
+        lambda entry: (
+            _both(entry) and Access.TPDO in entry.access and entry.data_type is DataType.BOOLEAN
+        ),
+    ),
     Wanted(
         "rw_bool",
         "BOOLEAN that may be read and written",
@@ -191,6 +199,11 @@ WANTED: Final[tuple[Wanted, ...]] = (
         Use.READ,
         lambda entry: entry.data_type.is_integer and not _mapping(entry) and entry.readable,
     ),
+    _fixed("device_type", 0x1000, 0, "the device type", Use.READ),
+    _fixed("error_register", 0x1001, 0, "the error register", Use.READ),
+    _fixed("identity_1", 0x1018, 1, "the vendor-ID", Use.READ),
+    _fixed("identity_2", 0x1018, 2, "the product code", Use.READ),
+    _fixed("identity_3", 0x1018, 3, "the revision number", Use.READ),
     _fixed("error_history", 0x1003, 0, "the error history"),
     _fixed("sync_cob_id", 0x1005, 0, "the COB-ID of SYNC"),
     _fixed("sync_period", 0x1006, 0, "the period of SYNC"),

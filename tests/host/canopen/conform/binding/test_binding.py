@@ -188,7 +188,7 @@ def test_what_cannot_be_read_is_not_written() -> None:
 
 def test_a_node_that_does_not_answer_is_given_up() -> None:
     bench = bench_of(EntryDescription(0x2000, 0, "Gain", DataType.UNSIGNED8, RW))
-    bench.slave.node_id = 6
+    bench.wire.faults.arm("short")
     before_us = bench.link.now_us
     for known in (r1_device(), None):
         with pytest.raises(SdoTimeout):

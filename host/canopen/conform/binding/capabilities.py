@@ -1,0 +1,163 @@
+"""What a node can do, in the words that checks need: what its EDS says, confirmed by the node."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
+from tickrig.host.canopen.conform.binding.script_runner import ScriptRunner
+from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
+from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_value import parse_number
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import Abort
+from tickrig.wire.canopen.sdo.sdo_block import (
+    BlockUploadInitiateRequest,
+    BlockUploadInitiateResponse,
+)
+
+OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
+    "heartbeat": ("heartbeat",),
+    "hbcons": ("consumer_1",),
+    "guarding": ("guard_time", "life_factor"),
+    "emcy": ("emcy_cob_id",),
+    "history": ("error_history",),
+    "1029": ("error_behaviour",),
+    "1F80": ("startup",),
+    "store": ("store",),
+    "restore": ("restore",),
+    "sdo2": ("sdo_server_2",),
+    "sync": ("sync_cob_id",),
+    "syncprod": ("sync_cob_id", "sync_period"),
+    "synccounter": ("sync_counter",),
+    "syncstart": ("tpdo_sync_start",),
+    "eventtimer": ("tpdo_event_timer",),
+    "inhibit": ("tpdo_inhibit",),
+    "time": ("time_cob_id",),
+    "tpdo": ("tpdo_remappable",),
+    "rpdo": ("rpdo_remappable",),
+    "rtr": ("tpdo_remappable",),
+    "bits": ("tpdo_bool",),
+}
+"""Features that are there when the objects are to which these names are bound."""
+
+PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
+    "401": (401, (0x6000, 0x6200, 0x6400, 0x6401, 0x6411)),
+    "402": (402, (0x6040, 0x6041)),
+}
+"""The low word of 1000h, and objects of which there must be one."""
+
+LSS: Final = ("lss", "lssident", "unconfigured")
+IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
+DEVICE_TYPE: Final = 0x1000
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """What a node can do.
+
+    Attributes:
+        words: as checks need them.
+        reasons: why the others are not among them, for people.
+        findings: where EDS and node contradict each other, one a line.
+    """
+
+    words: frozenset[str]
+    reasons: Mapping[str, str]
+    findings: tuple[str, ...] = ()
+
+
+def find_features(binding: Binding, runner: ScriptRunner, file: EdsFile | None = None) -> Features:
+    """Find out what a node can do; the node is only read.
+
+    Whether it has LSS can only be said by its EDS: to try it would change the state of all
+    nodes on the bus. Where no EDS says it, the node counts as one without.
+
+    Args:
+        binding: its objects.
+        runner: reads it.
+        file: its EDS.
+    """
+    info = file.sections.get("DeviceInfo", {}) if file else {}
+    dummies = file.sections.get("DummyUsage", {}) if file else {}
+    reasons = dict(_missing(binding))
+    if not any(_number(text) for text in dummies.values()):
+        reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
+    if not _number(info.get("lss_supported", "")):
+        reasons |= dict.fromkeys(LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
+    if not has_block_upload(runner):
+        reasons["block"] = "it refuses a block upload of 1000h"
+    words = {*OF_OBJECTS, *PROFILES, *LSS, "dummy", "block"} - reasons.keys()
+    findings = (*_profile(binding), *_identity(binding, info))
+    return Features(frozenset(words), reasons, findings)
+
+
+def has_block_upload(runner: ScriptRunner) -> bool:
+    """Return whether a node begins a block upload of 1000h, which is then aborted."""
+    with suppress(SdoTimeout):
+        return runner.run(_try_block_upload())
+    return False
+
+
+def _try_block_upload() -> Script[bool]:
+    request = BlockUploadInitiateRequest(DEVICE_TYPE, 0, crc=True, block_size=1, threshold=0)
+    answer = yield SdoRequest(request.encode(), DEVICE_TYPE, 0)
+    if not isinstance(answer, BlockUploadInitiateResponse):
+        return False
+    yield SdoFrame(Abort(DEVICE_TYPE, 0, AbortCode.GENERAL).encode())
+    return True
+
+
+def _missing(binding: Binding) -> Iterator[tuple[str, str]]:
+    for word, names in OF_OBJECTS.items():
+        for name in names:
+            if name in binding.reasons:
+                yield word, binding.reasons[name]
+    for word, (number, _) in PROFILES.items():
+        if _profile_number(binding) != number:
+            yield word, f"1000h does not say that it is a device of CiA {number}"
+
+
+def _unsaid(file: EdsFile | None, key: str, what: str) -> str:
+    if file is None:
+        return f"without an EDS nobody knows whether {what}"
+    return f"{key} of the EDS does not say that {what}"
+
+
+def _number(text: str) -> int | None:
+    """Read a number of an EDS, None if it is none."""
+    with suppress(ValueError):
+        return parse_number(text)
+    return None
+
+
+def _profile_number(binding: Binding) -> int | None:
+    bound = binding.bound.get("device_type")
+    if isinstance(bound, BoundObject) and bound.value is not None:
+        return int.from_bytes(bound.value[:2], "little")
+    return None
+
+
+def _profile(binding: Binding) -> Iterator[str]:
+    """Compare 1000h with the objects of its profile."""
+    number = _profile_number(binding)
+    present = {entry.index for entry in binding.device.entries}
+    for wanted, objects in PROFILES.values():
+        if number == wanted and binding.known and not present.intersection(objects):
+            names = ", ".join(f"{index:04X}h" for index in objects)
+            yield f"1000h says that it is a device of CiA {wanted}, and it has none of {names}"
+
+
+def _identity(binding: Binding, info: Mapping[str, str]) -> Iterator[str]:
+    """Compare 1018h with what the head of the EDS says."""
+    for sub, key in IDENTITY:
+        said, bound = _number(info.get(key.lower(), "")), binding.bound.get(f"identity_{sub}")
+        if said is None or not isinstance(bound, BoundObject) or bound.value is None:
+            continue
+        held = int.from_bytes(bound.value, "little")
+        if held != said:
+            yield f"1018h:{sub:02X} is {held:08X}h, and the EDS has {key}={said:08X}h"
