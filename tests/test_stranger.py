@@ -37,11 +37,7 @@ SCENARIO = """\
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """Install our wheel and the stranger's package into an environment of their own."""
-    folder = tmp_path_factory.mktemp("stranger")
-    made = make_environment(folder)
-    shutil.copytree(ROOT / "tests" / "stranger", folder / "kettle")
-    made.run("pip", "install", "--quiet", "./kettle", cwd=folder)
-    return made
+    return make_environment(tmp_path_factory, "stranger")
 
 
 def test_a_scenario_with_faults_is_played_traced_and_replayed(

@@ -24,7 +24,7 @@ TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
-    return make_environment(tmp_path_factory.mktemp("tutorials"))
+    return make_environment(tmp_path_factory)
 
 
 @pytest.mark.realtime
