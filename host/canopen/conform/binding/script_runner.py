@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
-from tickrig.host.canopen.sdo_transfer import upload
+from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.links.link import StampedLink
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
@@ -35,6 +35,10 @@ class ScriptRunner:
             LinkClosed: the bus is gone.
         """
         return self.run(upload(index, sub))
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write an object; raises as `upload`."""
+        self.run(download(index, sub, data))
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""

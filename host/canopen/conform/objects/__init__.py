@@ -1,0 +1,1 @@
+"""The checks that are made for every object of an EDS, and the steps that only they have."""
