@@ -35,8 +35,11 @@ NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
 """Store, restore and program download: not even with what must be refused."""
 
 ERROR_FIELD: Final = 0x1003
-CONSTANTS: Final = (0x1000, 0x1018, *range(0x1200, 0x1280))
+CONSTANTS: Final = (0x1000, 0x1018)
 """Objects that hold what the EDS says wherever the bus cannot write them."""
+PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+RESERVED_SUB: Final = 4
+"""Of a PDO parameter: CiA 301 keeps it free, and files describe it."""
 SERIAL_NUMBER: Final = (0x1018, 4)
 DATA_TYPES: Final = range(0x0001, 0x1000)
 HIGHEST_SUB: Final = 0xFF
@@ -143,8 +146,6 @@ def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
 def _holds(entry: EntryDescription, constant: str | None) -> Check:
     """Make the check of what an entry holds."""
     step = _step(entry, constant)
-    if _may_have_none(entry):
-        step |= {"codes": list(NO_VALUE_YET)}
     title = f"holds {entry.data_type.name}"
     if constant is None:
         return _check(entry, "type", title, TYPES, step)
@@ -155,6 +156,8 @@ def _step(entry: EntryDescription, value: str | None) -> dict[str, object]:
     """Make the step that reads an entry; a value is hexadecimal."""
     step: dict[str, object] = {"holds": _place(entry), "type": entry.data_type.name}
     said = {"low": entry.low, "high": entry.high, "value": value}
+    if _may_have_none(entry):
+        step |= {"codes": list(NO_VALUE_YET)}
     return step | {key: number for key, number in said.items() if number is not None}
 
 
@@ -197,10 +200,11 @@ def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int
     """Read sub-indices that are not described."""
     known = {row.sub for row in rows}
     behind = max(known) + 1
-    asked = {*range(behind + 1), HIGHEST_SUB - 1, *share} - known - {HIGHEST_SUB}
+    asked = {*range(behind + 1), HIGHEST_SUB - 1, *share} - known
     steps: list[Step] = [
         {"refuse read": f"{index:04X}:{sub:02X}", "codes": list(ABSENT_SUB)}
         for sub in sorted(asked)
+        if sub < HIGHEST_SUB
     ]
     if HIGHEST_SUB not in known:
         structure = {"holds": f"{index:04X}:FF", "type": "UNSIGNED32"}
@@ -238,5 +242,5 @@ def _is_constant(entry: EntryDescription, counts: bool) -> bool:
 
 def _may_have_none(entry: EntryDescription) -> bool:
     """Return whether an entry may hold nothing: no error yet, an empty domain or string."""
-    reserved = entry.sub == 4 and entry.index in range(0x1800, 0x1A00)
+    reserved = entry.index in PDO_PARAMETERS and entry.sub == RESERVED_SUB
     return reserved or entry.index == ERROR_FIELD or not entry.size

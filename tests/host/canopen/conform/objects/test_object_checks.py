@@ -202,6 +202,16 @@ def test_the_structure_of_an_object_may_be_told_at_ff() -> None:
     assert len(compare([head], [head, entry(U8, RO, 7, sub=0xFF)])) == 1
 
 
+def test_the_highest_sub_index_has_no_next_one() -> None:
+    rows = [entry(U8, RO, 1), entry(U32, RO, sub=0xFE), entry(U32, RO, sub=0xFF)]
+    assert compare(rows, rows) == []
+
+
+def test_the_reserved_sub_index_of_a_pdo_may_be_described() -> None:
+    rows = [entry(U8, RO, 4, index=0x1400), entry(U8, RW, 0, index=0x1400, sub=4)]
+    assert compare(rows, rows) == []
+
+
 def test_what_is_missing_is_found() -> None:
     failed = compare([entry(U16, RW)], [entry(U16, RW, index=0x3000)])
     assert failed[0].startswith("OD-2000.00-type refused with object does not exist")
