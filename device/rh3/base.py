@@ -152,14 +152,20 @@ class Rh3Base(Copyable):
         Returns:
             The bytes that it sends in this tick.
         """
-        self._catch_up(now_us)
+        heard, before_us = self.slave.due_us <= now_us, now_us - TICK_US
+        happens = heard or self.inputs.changed or self._restarted
+        made = self._catch_up(before_us if happens else now_us) and not happens
+        if self._restarted:
+            self._restart(before_us)
+        self._now_us = self._driver.now_us = now_us
         if self.inputs.changed:
             self._inputs_changed()
         sent = b""
         if self._on:
-            self._unseen |= bool(rx) or self.slave.due_us <= now_us
+            self._unseen |= heard or bool(rx)
             sent = self.slave.tick(now_us, rx)
-        self._step()
+        if not made:
+            self._pass_to(now_us)
         if now_us % LOOK_US == 0:
             self._seen, self._unseen = self._observed(), self._moving
         return sent
@@ -180,26 +186,27 @@ class Rh3Base(Copyable):
             (self.slave.served, self.slave.garbled),
         )
 
-    def _catch_up(self, now_us: int) -> None:
-        """Make the steps of the milliseconds before this one."""
-        driver, step, before_us = self._driver, self._step, now_us - TICK_US
-        while self._moving and driver.now_us < before_us:
+    def _catch_up(self, until_us: int) -> bool:
+        """Make the milliseconds up to a time, while it moves; return whether all are made."""
+        driver = self._driver
+        while self._moving and driver.now_us < until_us:
             driver.now_us += TICK_US
-            step()
-        if self._restarted:
-            self._restarted, driver.now_us = False, max(0, before_us)
-            self._power_up()
-            self._on = self.inputs.changed = True
-        self._now_us = driver.now_us = now_us
+            self._pass_to(until_us)
+        return driver.now_us >= until_us
 
-    def _step(self) -> None:
+    def _restart(self, now_us: int) -> None:
+        self._restarted, self._driver.now_us = False, max(0, now_us)
+        self._power_up()
+        self._on = self.inputs.changed = True
+
+    def _pass_to(self, until_us: int) -> None:
+        """Let the present millisecond pass, and some behind it as far as they are like it."""
         driver, ground = self._driver, self.ground
         if self._on:
-            driver.step(self.slave.last_request_us)
+            lefts, rights = driver.step(self.slave.last_request_us, until_us)
         else:
-            driver.coast()
-        left, right = self.sides
-        ground.step(left.wheel.speed / COUNTS_PER_RAD, right.wheel.speed / COUNTS_PER_RAD)
+            lefts, rights = driver.coast()
+        ground.roll(lefts, rights)
         if ground.speed_m_s or not (ground.resting and driver.resting):
             self._moving = self._unseen = True
         else:

@@ -10,7 +10,7 @@ from tickrig.device.modbus.registers import Registers
 from tickrig.device.physical import QuantityBank
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rh3.register_map import TABLE
-from tickrig.device.rh3.side import Side
+from tickrig.device.rh3.side import STALL_MS, Side
 from tickrig.device.rh3.terminals import SIDES
 from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
@@ -19,6 +19,11 @@ from tickrig.wire.rh3 import Command, Fault, Mode, Status
 TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
 ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)
 """Plain numbers: a flag takes ten times as long."""
+
+STEP_US: Final = 1_000
+
+Pair = tuple[list[float], list[float]]
+"""Left and right, of each millisecond."""
 
 DELAYED: Final = TARGETS | {"mode", "command"}
 """What takes effect after the delay."""
@@ -93,11 +98,15 @@ class Driver(Part):
         if values.keys() & DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
-    def step(self, last_request_us: int) -> None:
-        """Let a millisecond pass.
+    def step(self, last_request_us: int, until_us: int) -> Pair:
+        """Let the millisecond of `now_us` pass, and those behind it in which nothing happens.
 
         Args:
             last_request_us: when the master was heard last.
+            until_us: the last of them; `now_us` becomes the one that was made last.
+
+        Returns:
+            The speeds of the wheels in each, counts/ms.
         """
         if self._waiting:
             self._take_waiting()
@@ -109,18 +118,32 @@ class Driver(Part):
         powered = self._enabled and self._mode is not Mode.FREE
         if powered != self._powered:
             powered = self._switch(powered=powered)
-        if powered:
-            stop, to_position = self._stopped, self._mode is Mode.POSITION
-            left.drive(stop=stop, to_position=to_position)
-            right.drive(stop=stop, to_position=to_position)
-        else:
-            left.coast(shorted=self._faulty)
-            right.coast(shorted=self._faulty)
+        if not powered:
+            return left.coast(shorted=self._faulty), right.coast(shorted=self._faulty)
+        stop, to_position = self._stopped, self._mode is Mode.POSITION
+        steps = 1
+        if until_us > self.now_us and not to_position:
+            steps = self._alike(last_request_us, until_us)
+            self.now_us += (steps - 1) * STEP_US
+        return (
+            left.drive(steps, stop=stop, to_position=to_position),
+            right.drive(steps, stop=stop, to_position=to_position),
+        )
 
-    def coast(self) -> None:
+    def coast(self) -> Pair:
         """Let a millisecond pass without supply: a relay shorts the motors."""
-        for side in self.sides:
-            side.coast(shorted=True)
+        left, right = self.sides
+        return left.coast(shorted=True), right.coast(shorted=True)
+
+    def _alike(self, last_request_us: int, until_us: int) -> int:
+        """Return how many milliseconds are like the present one, with it: the master is silent."""
+        left, right = self.sides
+        if left.stalling or right.stalling:
+            return 1
+        until_us = min(until_us, last_request_us + self._watch_us - 1)
+        if self._waiting:
+            until_us = min(until_us, self._waiting[0][0] - 1)
+        return max(1, min((until_us - self.now_us) // STEP_US + 1, STALL_MS))
 
     def _status(self) -> int:
         return self.status

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from tickrig.device.body.contact import Contact
 from tickrig.device.body.pose import Pose, arc
 from tickrig.device.chance import Chance
-from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.twin import Part
 
 STEP_S: Final = 1e-3
@@ -52,17 +53,26 @@ class Ground(Part):
         """Whether a step without turning would change nothing."""
         return not (self.speed_m_s or self.turn_rad_s or self.left.slip_m_s or self.right.slip_m_s)
 
-    def step(self, left_rad: float, right_rad: float) -> None:
-        """Let a millisecond pass in which the wheels turned by so much."""
-        left, right, tread_m = self.left, self.right, self._tread_m
-        if self._grips:
-            left_m, right_m = left_rad * left.radius_m, right_rad * right.radius_m
-        else:
-            left_m, right_m = left.roll(left_rad, STEP_S), right.roll(right_rad, STEP_S)
-        if self._noise:
-            left_m, right_m = self._roughened(left_m), self._roughened(right_m)
-        if left_m or right_m:
-            self._place = arc(self._place, left_m, right_m, tread_m)
+    def roll(self, lefts: Sequence[float], rights: Sequence[float]) -> None:
+        """Let milliseconds pass.
+
+        Args:
+            lefts: by how many counts the left wheel turned in each.
+            rights: the same of the right wheel.
+        """
+        left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
+        grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
+        for each, other in zip(lefts, rights):  # noqa: B905 - strict takes as long as a step
+            left_rad, right_rad = each / COUNTS_PER_RAD, other / COUNTS_PER_RAD
+            if grips:
+                left_m, right_m = left_rad * left.radius_m, right_rad * right.radius_m
+            else:
+                left_m, right_m = left.roll(left_rad, STEP_S), right.roll(right_rad, STEP_S)
+            if noise:
+                left_m, right_m = self._roughened(left_m), self._roughened(right_m)
+            if left_m or right_m:
+                place = arc(place, left_m, right_m, tread_m)
+        self._place = place
         self.speed_m_s = (left_m + right_m) / 2 / STEP_S
         self.turn_rad_s = (right_m - left_m) / tread_m / STEP_S
 

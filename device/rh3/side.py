@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import floor
 from typing import Final
 
 from tickrig.device.modbus.registers import Registers
@@ -42,7 +41,7 @@ class Side(Part):
     ) -> None:
         self.name, self.wheel = name, Wheel(parameters)
         self._registers, self._backward_bit = registers, backward_bit
-        self._speed_loop = SpeedLoop(registers, self.wheel.friction)
+        self._speed_loop = SpeedLoop(registers)
         self._position_loop = PositionLoop(registers)
         self._rated_ma, self._per_mille, self._zero = parameters.rated_ma, parameters.per_mille, 0
         self.power_up()
@@ -50,7 +49,7 @@ class Side(Part):
     def power_up(self) -> None:
         """Count from 0, without a fault."""
         self.fault, self.clipped, self.stalled = Fault(0), False, False
-        self._counted = self._stalled_ms = 0
+        self._speed_loop.counted = self._speed_loop.stalled_ms = 0
         self._speed, self._goal = 0.0, 0
         self.configure()
         self.take_over()
@@ -113,9 +112,13 @@ class Side(Part):
     @property
     def resting(self) -> bool:
         """Whether a step with the same target would change nothing."""
-        if self.wheel.speed or self._counted or self._stalled_ms:
-            return False
-        return self._speed_loop.settled and self.wheel.held(self.torque)
+        loop, wheel = self._speed_loop, self.wheel
+        return not (wheel.speed or loop.stalled_ms) and loop.settled and wheel.held(loop.torque)
+
+    @property
+    def stalling(self) -> bool:
+        """Whether full torque turns nothing."""
+        return self._speed_loop.stalled_ms > 0
 
     def inputs_changed(self, inputs: QuantityBank) -> None:
         """Take over what the world does to the wheel."""
@@ -134,38 +137,39 @@ class Side(Part):
             self.fault |= Fault.STALL
             self.stalled = False
 
-    def drive(self, *, stop: bool, to_position: bool) -> None:
-        """Turn for a millisecond as the targets say."""
-        wheel = self.wheel
+    def drive(self, steps: int, *, stop: bool, to_position: bool) -> list[float]:
+        """Turn as the targets say; return the speed in each millisecond, counts/ms.
+
+        Args:
+            steps: how many milliseconds; 1 towards a position, or while it is `stalling`.
+            stop: the target is standstill.
+            to_position: the target is a position, else a speed.
+        """
+        loop, wheel, limit = self._speed_loop, self.wheel, self._speed_loop.limit
         if stop:
             wanted = 0.0
         elif to_position:
             wanted = self._position_loop.step(self._goal - (wheel.counts - self._zero))
         else:
             wanted = self._speed
-        limit = self._speed_loop.limit
         self.clipped = not -limit <= wanted <= limit
         if self.clipped:
             wanted = limit if wanted > 0 else -limit
-        torque = self._speed_loop.step(wanted, self._counted)
-        before = floor(wheel.travel)
-        wheel.step(torque)
-        self._counted = floor(wheel.travel) - before
-        if self._counted or abs(torque) < PER_MILLE:
-            self._stalled_ms = 0
-        else:
-            self._stalled_ms += 1
-            self.stalled = self._stalled_ms >= STALL_MS
+        speeds = loop.drive(wheel, wanted, steps)
+        self.stalled = loop.stalled_ms >= STALL_MS
+        return speeds
 
-    def coast(self, *, shorted: bool) -> None:
-        """Turn for a millisecond without power, or with the motor shorted."""
-        self._speed_loop.take_over(0.0)
-        self._counted = self._stalled_ms = 0
+    def coast(self, *, shorted: bool) -> list[float]:
+        """Turn for a millisecond without power, or with the motor shorted; return the speed."""
+        loop, wheel = self._speed_loop, self.wheel
+        loop.take_over(0.0)
+        loop.counted = loop.stalled_ms = 0
         self.clipped = False
         if shorted:
-            self.wheel.brake()
+            wheel.brake()
         else:
-            self.wheel.step(0.0)
+            wheel.step(0.0)
+        return [wheel.speed]
 
     def _signed(self, value: int) -> int:
         """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""

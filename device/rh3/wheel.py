@@ -30,10 +30,11 @@ class Wheel(Part):
         load: torque against forward motion, per mille.
         jammed: something holds the wheel.
         friction: per mille of torque that it takes to turn it.
+        agility: counts/ms gained in a millisecond by a per mille of torque.
     """
 
     def __init__(self, parameters: BaseParameters) -> None:
-        self._agility = parameters.agility
+        self.agility = parameters.agility
         self.friction = parameters.per_mille(parameters.friction_nm)
         self.travel = self.speed = self.load = 0.0
         self.jammed = False
@@ -54,10 +55,10 @@ class Wheel(Part):
             self.speed = 0.0
             return
         against = friction if (speed or net) > 0 else -friction
-        self.speed = speed = speed + (net - against) * self._agility
+        self.speed = speed = speed + (net - against) * self.agility
         self.travel += speed
 
     def brake(self) -> None:
         """Turn for a millisecond with the motor shorted."""
-        most = min(BRAKE, abs(self.speed) / self._agility)
+        most = min(BRAKE, abs(self.speed) / self.agility)
         self.step(-copysign(most, self.speed) if self.speed else 0.0)

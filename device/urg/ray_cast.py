@@ -6,12 +6,12 @@ meet it for certain and which may, and both are computed as there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from math import asin, atan2, ceil, cos, floor, hypot, inf, sin, tau
+from collections.abc import Iterator
+from math import asin, atan2, ceil, floor, hypot, inf, tau
 from typing import Final
 
 from tickrig.device.twin import Part
-from tickrig.device.urg.world import Post, Wall, World
+from tickrig.device.urg.world import Post, Rays, Wall, World
 
 BLUR: Final = 1e-6
 """From nearer than so much of its size a thing is asked for all beams: its angles are vague."""
@@ -26,14 +26,14 @@ class Beams(Part):
     Args:
         x_m: of the place.
         y_m: of the place.
-        angles_rad: where they go, each `tau / turn` beyond the one before; within 2e6.
+        rays: where they go, each `tau / turn` beyond the one before.
+        first_rad: where the first goes; within 2e6.
         turn: how many there are in a whole turn; there are no more here.
     """
 
-    def __init__(self, x_m: float, y_m: float, angles_rad: Sequence[float], turn: int) -> None:
+    def __init__(self, x_m: float, y_m: float, rays: Rays, first_rad: float, turn: int) -> None:
         self._x_m, self._y_m, self._turn = x_m, y_m, turn
-        self._first_rad = angles_rad[0] if angles_rad else 0.0
-        self._rays = list(zip(map(cos, angles_rad), map(sin, angles_rad), strict=True))
+        self._rays, self._first_rad = rays, first_rad
         self._ways_m = [inf] * len(self._rays)
 
     def cast_m(self, world: World) -> list[float]:

@@ -42,9 +42,9 @@ class Urg(Copyable):
 
     def __init__(self, parameters: UrgParameters | None = None, world: World | None = None) -> None:
         self.parameters, self.world = parameters or UrgParameters(), world or World()
-        self.inputs = QuantityBank(INPUTS, GROUPS)
+        self.inputs = QuantityBank(INPUTS, GROUPS, self._input_set)
         self._server, self._lines = ScipServer(self.parameters), LineSplitter()
-        self._on, self._restarted = True, False
+        self._on, self._restarted, self._switched = True, False, True
         self._obeyed: tuple[float, ...] = ()
 
     @property
@@ -55,7 +55,7 @@ class Urg(Copyable):
     @property
     def due_us(self) -> int:
         """When anything would happen without input."""
-        if self._restarted or (self.inputs.changed and self._switches != self._obeyed):
+        if self._restarted or self._switched:
             return 0
         return self._server.due_us
 
@@ -127,9 +127,13 @@ class Urg(Copyable):
         self._lines.clear()
         self._server.power_up(now_us)
 
+    def _input_set(self) -> None:
+        self._switched = self._switches != self._obeyed
+
     def _inputs_changed(self, now_us: int) -> bytes:
         inputs, server = self.inputs, self._server
-        inputs.changed, self._obeyed = False, self._switches
+        inputs.changed = self._switched = False
+        self._obeyed = self._switches
         on = not inputs["power_cut"]
         if on != self._on:
             self._on = on

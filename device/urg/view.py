@@ -14,7 +14,7 @@ from tickrig.device.chance import Chance
 from tickrig.device.twin import Immutable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.ray_cast import Beams
-from tickrig.device.urg.world import World
+from tickrig.device.urg.world import Rays, World, rays_of
 from tickrig.wire.scip.description import Specification
 
 HALF: Final = 2.0**63
@@ -81,8 +81,8 @@ class View(Immutable):
     def _ways_m(self, steps: range) -> list[float]:
         """Return how far it is in the direction of each step, with the noise of the sensor."""
         kind, pose = self.kind, self.pose
-        angles_rad = [pose.heading_rad + off_rad for off_rad in _off_rad(kind, steps)]
-        ways_m = Beams(pose.x_m, pose.y_m, angles_rad, kind.resolution).cast_m(self.world)
+        rays, first_rad = _rays(kind, steps, pose.heading_rad)
+        ways_m = Beams(pose.x_m, pose.y_m, rays, first_rad, kind.resolution).cast_m(self.world)
         if not self.parameters.noise:
             return ways_m
         return [
@@ -110,6 +110,13 @@ class View(Immutable):
 def _off_rad(kind: Specification, steps: range) -> tuple[float, ...]:
     """Return the directions of steps from straight ahead; each scan asks for the same."""
     return tuple((step - kind.front) * tau / kind.resolution for step in steps)
+
+
+@lru_cache(maxsize=8)  # a robot that stands or goes straight: a third of the time of a scan
+def _rays(kind: Specification, steps: range, heading_rad: float) -> tuple[Rays, float]:
+    """Return where the beams of steps go, and the angle of the first."""
+    angles_rad = [heading_rad + off_rad for off_rad in _off_rad(kind, steps)]
+    return rays_of(angles_rad), angles_rad[0] if angles_rad else 0.0
 
 
 def _least_of_each(ways_m: Sequence[float], cluster: int) -> list[float]:

@@ -12,6 +12,11 @@ Rays = Sequence[tuple[float, float]]
 """Directions, each a vector of length 1."""
 
 
+def rays_of(angles_rad: Sequence[float]) -> Rays:
+    """Return where angles point."""
+    return tuple(zip(map(cos, angles_rad), map(sin, angles_rad), strict=True))
+
+
 @dataclass(frozen=True, slots=True)
 class Wall(Immutable):
     """A straight wall between two places, in m."""
@@ -80,7 +85,7 @@ class World(Immutable):
         >>> World((Wall(2.0, -1.0, 2.0, 1.0),)).distances_m(0.5, 0.0, [0.0])
         [1.5]
         """
-        rays = [(cos(angle_rad), sin(angle_rad)) for angle_rad in angles_rad]
+        rays = rays_of(tuple(angles_rad))
         things: tuple[Wall | Post, ...] = (*self.walls, *self.posts)
         nothing = [inf] * len(rays)
         ways = [thing.distances_m(x_m, y_m, rays) for thing in things]

@@ -267,7 +267,8 @@ class Rig(Copyable):
             for station in self._looked_at:
                 next_us = min(next_us, station.wake_us(now_us))
             for coupling in self._couplings:
-                next_us = min(next_us, _next_tick_us(now_us, coupling.due_us, coupling.tick_us))
+                if (due_us := coupling.due_us) < next_us:
+                    next_us = min(next_us, _next_tick_us(now_us, due_us, coupling.tick_us))
         else:
             for tick_us in self._periods:
                 next_us = min(next_us, now_us - now_us % tick_us + tick_us)

@@ -87,10 +87,12 @@ class Wires(Part):
         Returns:
             False if nothing is left that ends by then, and nobody was woken.
         """
+        if not self._busy:
+            return False
         if len(self._busy) == 1:
             return self._wires[self._busy[0]].advance_until_received(until_us)
         dues = self._dues()
-        first_us = min(dues)[0] if dues else NEVER
+        first_us = min(dues)[0]
         if first_us > until_us:
             return False
         for tick_us in self._periods:  # nobody who hears of it has a tick before

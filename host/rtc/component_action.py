@@ -29,8 +29,13 @@ def guarded(
     try:
         return callback(*args, **kwargs)
     except Exception:
-        _LOG.exception("%s: %s raised", who, callback.__name__)
-        return ReturnCode.RTC_ERROR
+        return failed(who, callback)
+
+
+def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
+    """Log the exception that a callback has raised; it counts as RTC_ERROR."""
+    _LOG.exception("%s: %s raised", who, callback.__name__)
+    return ReturnCode.RTC_ERROR
 
 
 class ComponentAction:

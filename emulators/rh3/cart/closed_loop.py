@@ -32,6 +32,8 @@ AHEAD_M: Final = 0.2
 OUTLINE_M: Final = 0.25
 """How wide a robot looks to others: a post around the middle of its axle; a choice."""
 
+_PLACE: Final = ("x_m", "y_m", "heading_rad")
+
 
 class MountedUrg:
     """A sensor in front of the axle, as a coupling of the rig.
@@ -66,14 +68,13 @@ class MountedUrg:
 
     def act(self, now_us: int, /) -> None:
         """Put the sensor where the base has taken it, and others where they are."""
-        x_m, y_m, heading = (self._base.read(name) for name in ("x_m", "y_m", "heading_rad"))
+        read, inputs = self._base.read, self.urg.inputs
+        x_m, y_m, heading = read("x_m"), read("y_m"), read("heading_rad")
         place = (x_m + AHEAD_M * cos(heading), y_m + AHEAD_M * sin(heading), heading)
-        inputs = self.urg.inputs
-        for name, value in zip(("x_m", "y_m", "heading_rad"), place, strict=True):
+        for name, value in zip(_PLACE, place, strict=True):
             if inputs[name] != value:
                 inputs.set(name, value)
-        places = [(base.read("x_m"), base.read("y_m")) for base in self._others]
-        posts = [Post(x, y, OUTLINE_M) for x, y in places]
+        posts = [Post(base.read("x_m"), base.read("y_m"), OUTLINE_M) for base in self._others]
         self.urg.world = self.world.with_posts(*posts) if posts else self.world
 
 

@@ -91,5 +91,5 @@ def _range_data(now: Time, scan: UrgScan) -> RangeData:
         rangeRes=0.001,
         frequency=specification.speed_rpm / 60,
     )
-    ranges = tuple(n / 1_000 if low <= n <= high else 0.0 for n in numbers)
+    ranges = tuple([n / 1_000 if low <= n <= high else 0.0 for n in numbers])
     return RangeData(now, ranges, config=config)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.rtc.component_action import ComponentAction, guarded
+from tickrig.host.rtc.component_action import ComponentAction, failed
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 
 if TYPE_CHECKING:
@@ -118,7 +118,10 @@ class Participant:
             self.state = _INACTIVE
 
     def _call(self, callback: Callback) -> ReturnCode:
-        return guarded(self.component.instance_name, callback, self._context)
+        try:  # `guarded`, without a call for each callback
+            return callback(self._context)
+        except Exception:
+            return failed(self.component.instance_name, callback)
 
 
 _MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], None]]] = {

@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tickrig.device.urg.ray_cast import Beams
-from tickrig.device.urg.world import Post, Wall, World, room
+from tickrig.device.urg.world import Post, Wall, World, rays_of, room
 
 TURN = 1_024
 OFF_RAD = [(step - 384) * tau / TURN for step in range(44, 726)]
@@ -34,8 +34,12 @@ headings = st.one_of(
 )
 
 
+def beams(x_m: float, y_m: float, angles_rad: list[float]) -> Beams:
+    return Beams(x_m, y_m, rays_of(angles_rad), angles_rad[0] if angles_rad else 0.0, TURN)
+
+
 def check(world: World, x_m: float, y_m: float, angles_rad: list[float]) -> None:
-    cast_m = Beams(x_m, y_m, angles_rad, TURN).cast_m(world)
+    cast_m = beams(x_m, y_m, angles_rad).cast_m(world)
     plain_m = world.distances_m(x_m, y_m, angles_rad)
     assert pack(f"{len(cast_m)}d", *cast_m) == pack(f"{len(plain_m)}d", *plain_m)
 
@@ -82,5 +86,5 @@ def test_most_beams_of_a_room_are_not_asked_twice(monkeypatch: pytest.MonkeyPatc
         return plain(wall, x_m, y_m, rays)
 
     monkeypatch.setattr(Wall, "distances_m", count)
-    Beams(0.2, 0.1, OFF_RAD, TURN).cast_m(room(4, 3))
+    beams(0.2, 0.1, OFF_RAD).cast_m(room(4, 3))
     assert sum(counted) <= 4 * 4
