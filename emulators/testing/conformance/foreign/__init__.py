@@ -1,0 +1,1 @@
+"""Slaves of other stacks in virtual time: LocalNode of the canopen library, durand."""

@@ -1,0 +1,74 @@
+"""What the conformance tester can judge in virtual time: a slave that is told the time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from tickrig.wire.can import Frames
+
+TICK_US: Final = 1_000
+
+
+class Slave(Protocol):
+    """A CANopen slave as a machine: frames in with the time, frames out.
+
+    A slave of `tickrig.device` is one. Yours is, too, if it takes the time as an argument and
+    says when it next wants to be called; it may be written around a library in C.
+    """
+
+    @property
+    def tick_us(self) -> int:
+        """How often it looks, in microseconds: it is called at multiples of it, 1000 is usual."""
+        ...
+
+    @property
+    def due_us(self) -> int:
+        """When it would do something without being sent anything, in microseconds.
+
+        A time that has passed means: in the next tick. `tickrig.wire.instant.NEVER`: not by
+        itself. It is not called before, unless a frame arrives.
+        """
+        ...
+
+    def reset(self) -> None:
+        """Lose and get back the power: it boots in the next tick, and keeps what was stored."""
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Do what is to be done.
+
+        Args:
+            now_us: time since the beginning in microseconds, a multiple of `tick_us`.
+            rx: frames that arrived since the last call, in their order.
+
+        Returns:
+            The frames that it sends, in their order.
+        """
+        ...
+
+
+SlaveCall = Callable[[int, Frames], Frames]
+"""The `tick` of a slave alone, called each millisecond."""
+
+
+class CalledSlave:
+    """A slave of a callable: it is called each millisecond.
+
+    Args:
+        make: makes the callable, fresh from power-on; called once more at each power-on.
+    """
+
+    tick_us: int = TICK_US
+
+    def __init__(self, make: Callable[[], SlaveCall]) -> None:
+        self._make, self._call = make, make()
+        self.due_us = 0
+
+    def reset(self) -> None:
+        """Make it anew."""
+        self._call, self.due_us = self._make(), 0
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Call it."""
+        self.due_us = now_us + self.tick_us
+        return tuple(self._call(now_us, rx))

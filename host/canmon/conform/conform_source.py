@@ -1,0 +1,141 @@
+"""Where the node under test is: a bus of python-can, or a rig file in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, parse_source
+from tickrig.host.canopen.conform.plan import Stimulus
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.links.errors import LinkClosed
+
+if TYPE_CHECKING:
+    from tickrig.host.links.can_link import CanLink
+    from tickrig.host.links.link import StampedLink
+    from tickrig.wire.canopen.eds.eds_file import EdsFile
+
+RIG_FILE: Final = ".toml"
+ECHOING: Final = ("udp_multicast",)
+"""Interfaces that give a host its own frames."""
+
+RIGS: Final = ExtensionGroup[Any](
+    "tickrig.conform_sources",
+    "source",
+    {"rig": "tickrig.emulators.testing.conformance.rig_source:open_rig"},
+    callable,
+    "a function",
+)
+"""What opens a rig file: hosts know no emulators, so it is loaded by its name."""
+
+
+Disturb = Callable[[str], None]
+"""Takes why a check that fails now says nothing of the node."""
+
+
+def _leave() -> None:
+    """Leave all as it is."""
+
+
+def _watch_nothing(disturb: Disturb) -> None:
+    """Nothing disturbs here."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConformSource:
+    """An open bus.
+
+    Attributes:
+        link: the bus.
+        name: what people call it.
+        adapter: what it is behind, for people.
+        bit_rate: in bit/s, None if nobody says it.
+        virtual: nobody else is on it, and its time is none of this machine.
+        nodes: what is known to be on it, by node-ID.
+        eds: what is known of these nodes beforehand.
+        stimulus: makes what moves the inputs of a node; None where nobody can.
+        close: gives the bus back.
+        watch: has somebody told, from now on, what disturbs on the bus.
+    """
+
+    link: StampedLink
+    name: str
+    adapter: str
+    bit_rate: int | None = None
+    virtual: bool = False
+    nodes: dict[int, str] = field(default_factory=dict)
+    eds: dict[int, EdsFile] = field(default_factory=dict)
+    stimulus: Callable[[int], Stimulus] | None = None
+    close: Callable[[], object] = _leave
+    watch: Callable[[Disturb], None] = _watch_nothing
+
+
+def open_conform_source(
+    word: str | None, node_id: int | None, options: BusOptions
+) -> ConformSource:
+    """Open what a SOURCE word names.
+
+    Args:
+        word: `can0`, `slcan:/dev/ttyACM0@500k`, a rig file as `bench.toml`; None where the options
+            name a bus.
+        node_id: of the node, which says the bus of a rig that has several; None for the first.
+        options: interface, bit rate and such of a bus.
+
+    Raises:
+        Refused: it is nothing that can be asked anything.
+        SourceFailed: it cannot be opened.
+    """
+    if word is None and not options:
+        raise Refused("no SOURCE: name a bus as can0, or a rig file as bench.toml")
+    if word is not None and word.lower().endswith(RIG_FILE):
+        return _open_rig(Path(word), node_id)
+    spec = BusSpec() if word is None else parse_source(word)
+    if spec is None or isinstance(spec, FileSpec):
+        raise Refused(
+            f"SOURCE {word!r} is no bus: a log holds what was said, and answers nothing;"
+            " canmon check holds it against rules"
+        )
+    if not isinstance(spec, BusSpec) or spec.chosen is not None:
+        raise Refused(f"SOURCE {word!r} is no whole CAN bus as can0 or slcan:/dev/ttyACM0@500k")
+    return _open_bus(spec, options)
+
+
+def _open_rig(path: Path, node_id: int | None) -> ConformSource:
+    try:
+        source: ConformSource = RIGS.load("rig")(path, node_id)
+    except OSError as error:
+        refuse_path("rig", error)
+    except (ExtensionError, ValueError) as error:
+        raise Refused(str(error)) from None
+    return source
+
+
+def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
+    from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
+    from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
+
+    given = bus_source.merged(spec, options)
+    bus, interface, name = bus_source.open_bus(given)
+    try:
+        link = CanLink(bus, name)
+    except LinkClosed as error:
+        bus.shutdown()
+        raise SourceFailed(str(error)) from None
+    return ConformSource(
+        EchoFreeLink(link) if interface in ECHOING else link,
+        name,
+        interface,
+        given.bitrate,
+        close=link.close,
+        watch=partial(_watch_errors, link),
+    )
+
+
+def _watch_errors(link: CanLink, disturb: Disturb) -> None:
+    link.on_error_frame = lambda error: disturb("error frames on the bus")

@@ -1,0 +1,87 @@
+"""Moves the inputs of an emulated device by the names of its signals (docs/control.md)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed
+from tickrig.host.text.page_text import one_line
+from tickrig.host.text.values import Setting, parse_setting
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.errors import FieldError
+
+HEX = "hex:"
+"""Begins the bytes of an octet string or a domain."""
+
+
+class SignalStimulus(ABC):
+    """Takes the words of a check, and sets, reads and switches by name."""
+
+    def __call__(self, *words: str) -> str:
+        """Do it, and return what was read; Disturbed if it cannot be done."""
+        try:
+            return self._act(*words)
+        except (OSError, ValueError, KeyError, FieldError) as error:
+            text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            raise Disturbed(f"{' '.join(words)}: {one_line(text)}") from None
+
+    def _act(self, *words: str) -> str:
+        match words:
+            case ("input", name, value):
+                signal = signal_name(name)
+                self.set(signal, _value(value, self.unit(signal)))
+            case ("output", name):
+                signal = signal_name(name)
+                return _hex(self.get(signal), self.unit(signal))
+            case ("emergency", code, *_):
+                self.set("emergency", int(code, 16))
+            case ("power", ("on" | "off") as state):
+                self.switch(on=state == "on")
+            case _:
+                raise ValueError("an emulated device has no such input")
+        return ""
+
+    @abstractmethod
+    def set(self, name: str, value: Setting) -> None:
+        """Set an input; ValueError if it cannot be."""
+
+    @abstractmethod
+    def get(self, name: str) -> Setting:
+        """Return the value of a signal; ValueError if there is none."""
+
+    @abstractmethod
+    def unit(self, name: str) -> str:
+        """Return the unit of a signal, of an object its data type; empty if it has none."""
+
+    @abstractmethod
+    def switch(self, *, on: bool) -> None:
+        """Switch its supply."""
+
+
+def signal_name(name: str) -> str:
+    """Return what an emulator calls an object of a check.
+
+    >>> signal_name("6000:01"), signal_name("2000:00"), signal_name("stick")
+    ('0x6000:1', '0x2000', 'stick')
+    """
+    index, colon, sub = name.partition(":")
+    if not colon:
+        return name
+    return f"0x{index}:{int(sub, 16)}" if int(sub, 16) else f"0x{index}"
+
+
+def _value(text: str, unit: str) -> Setting:
+    """Read the bytes of an object as its type, what is none as a number."""
+    if unit not in DataType.__members__:
+        return parse_setting(text)
+    value = DataType[unit].decode(bytes.fromhex(text))
+    return f"{HEX}{value.hex()}" if isinstance(value, bytes) else value
+
+
+def _hex(value: Setting, unit: str) -> str:
+    """Write the value of an object as it goes over the bus."""
+    if unit not in DataType.__members__:
+        return str(value)
+    if isinstance(value, str) and value.startswith(HEX):
+        return value.removeprefix(HEX).upper()
+    return DataType[unit].encode(value).hex().upper()

@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus
+from tickrig.host.canmon.conform.stimulus import CommandStimulus, open_stimulus
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed
+from tickrig.host.text.values import Setting
+
+
+def command(tmp_path: Path, program: str) -> CommandStimulus:
+    path = tmp_path / "stimulus.py"
+    path.write_text(program)
+    found = open_stimulus(f"{sys.executable} '{path}'")
+    assert isinstance(found, CommandStimulus)
+    return found
+
+
+def test_a_command_gets_the_words_and_its_first_line_is_the_answer(tmp_path: Path) -> None:
+    stimulus = command(tmp_path, "import sys; print(sys.argv[1:]); print('more')")
+    assert stimulus("output", "6200:01; rm -rf $HOME") == "['output', '6200:01; rm -rf $HOME']"
+
+
+@pytest.mark.parametrize(
+    ("program", "why"),
+    [
+        ("import sys; sys.exit('no \\x1b[2J relay')", "exit status 1: no ␛[2J relay"),
+        ("import sys; sys.exit(7)", "exit status 7"),
+    ],
+)
+def test_a_command_that_fails_disturbs_the_check(tmp_path: Path, program: str, why: str) -> None:
+    with pytest.raises(Disturbed, match="power off: "):
+        command(tmp_path, program)("power", "off")
+    with pytest.raises(Disturbed) as caught:
+        command(tmp_path, program)("power", "off")
+    assert str(caught.value).endswith(why)
+
+
+class Board(SignalStimulus):
+    """A device with an input, an object and a supply."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Setting] = {"0x6000:1": 0, "0x2007": "short", "di1": 0}
+        self.units = {"0x6000:1": "UNSIGNED16", "0x2007": "VISIBLE_STRING"}
+        self.on = True
+
+    def set(self, name: str, value: Setting) -> None:
+        if name not in (*self.values, "emergency"):
+            raise ValueError(f"no input {name}")
+        self.values[name] = value
+
+    def get(self, name: str) -> Setting:
+        return self.values[name]
+
+    def unit(self, name: str) -> str:
+        return self.units.get(name, "")
+
+    def switch(self, *, on: bool) -> None:
+        self.on = on
+
+
+def test_objects_are_set_and_read_as_they_go_over_the_bus() -> None:
+    board = Board()
+    board("input", "6000:01", "3412")
+    assert board.values["0x6000:1"] == 0x1234
+    assert board("output", "6000:01") == "3412"
+    assert board("output", "2007:00") == b"short".hex().upper()
+    board("input", "di1", "1")
+    assert board("output", "di1") == "1"
+
+
+def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
+    board = Board()
+    board("emergency", "5000", "01")
+    assert board.values["emergency"] == 0x5000
+    board("power", "off")
+    assert not board.on
+    board("power", "on")
+    assert board.on
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("input", "7000:01", "01"),
+        ("output", "nosuch"),
+        ("power", "half"),
+        ("input", "6000:01", "x"),
+    ],
+)
+def test_what_a_device_has_not_disturbs_the_check(words: tuple[str, ...]) -> None:
+    with pytest.raises(Disturbed, match=" ".join(words)):
+        Board()(*words)
