@@ -11,8 +11,9 @@ from collections import defaultdict, deque
 from enum import Enum
 from typing import Final
 
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
-from tickrig.wire.can import CanFrame
+from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.core import Device
+from tickrig.wire.can import CanFrame, Frames
 
 MS_US: Final = 1_000
 
@@ -33,7 +34,7 @@ class Runner:
         pace: when frames go over the bus.
     """
 
-    def __init__(self, slave: CanopenSlave, pace: Pace = Pace.SINGLE) -> None:
+    def __init__(self, slave: Device[Frames], pace: Pace = Pace.SINGLE) -> None:
         self.slave, self.pace = slave, pace
         self.now_us = 0
         self.transcript: list[str] = []

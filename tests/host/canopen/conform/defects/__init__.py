@@ -1,0 +1,1 @@
+"""Copies of our slave, each with one defect: they judge the tester."""
