@@ -57,7 +57,7 @@ class CanSegment(TransmissionOutcomes):
         super().__init__(bit_rate, faults, observers, on_traffic)
         self.now_us, self.shorted = start_us, False
         self.received: bool
-        self._lengths: Cache[int, tuple[CanFrame, int]] = Cache()  # of the latest by CAN-ID
+        self._lengths: Cache[int, tuple[bytes, int]] = Cache()  # of the latest data by CAN-ID
         self._finish: Callable[[], None]  # of the plan
 
     @property
@@ -180,7 +180,10 @@ class CanSegment(TransmissionOutcomes):
             self._winners = winners
             frame = winners[0].queue[0]
             latest = self._lengths.get(frame[0])
-            bits = latest[1] if latest and latest[0] == frame else self._length(frame)
+            if latest and latest[0] == frame[1] and not (frame[2] or frame[3]):
+                bits = latest[1]
+            else:
+                bits = self._length(frame)
             if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
                 self._settle(self._deliver, bits)
             else:
@@ -200,7 +203,8 @@ class CanSegment(TransmissionOutcomes):
         if len(self._lengths) >= KEPT_LENGTHS:
             self._lengths.clear()
         bits = frame_bits(frame)
-        self._lengths[frame[0]] = frame, bits
+        if not (frame[2] or frame[3]):
+            self._lengths[frame[0]] = frame[1], bits
         return bits
 
     def _judge(self, frame: CanFrame, bits: int) -> None:

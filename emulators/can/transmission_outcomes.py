@@ -80,9 +80,11 @@ class TransmissionOutcomes(Part):
         if queue:
             arbiter.push(sender)
         self._winners = []
-        for end in self.routes.receivers(frame):
-            if end is not sender:
-                end.receive(at_us, frame)
+        if receivers := self.routes.receivers(frame):
+            alone = (frame,)
+            for end in receivers:
+                if end is not sender:
+                    end.receive(at_us, frame, alone)
 
     def _deliver_and_count(self) -> None:
         """Hand a frame to all that accept it, and count it in error counters and recovery."""
@@ -91,7 +93,7 @@ class TransmissionOutcomes(Part):
         self._take_off(frame)
         for end in self.routes.receivers(frame):
             if end not in winners:
-                end.receive(at_us, frame)
+                end.receive(at_us, frame, (frame,))
 
     def _drop(self) -> None:
         """Let a frame be acknowledged, and lost."""
@@ -103,7 +105,7 @@ class TransmissionOutcomes(Part):
         frame = winners[0].queue[0]
         for end in self.routes.receivers(frame):
             if end not in winners:
-                end.receive(at_us, frame)
+                end.receive(at_us, frame, (frame,))
         self._notify(frame)
         self._confinement.failed_to_send(at_us, winners)
         self._end_attempt()

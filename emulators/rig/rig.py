@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from functools import partial
 from itertools import compress
 from operator import not_
 from typing import Any, Final, Generic, TypeVar, overload
@@ -39,11 +38,22 @@ class Station(Part, Generic[W]):
         at_us: the tick for which it stands in the timetable of its rig.
     """
 
-    __slots__ = ("at_us", "device", "port", "tick_us")
+    __slots__ = ("_timetable", "at_us", "device", "port", "tick_us")
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
         self.device, self.port, self.tick_us = device, port, device.tick_us
         self.at_us: int = NEVER
+        self._timetable: Timetable | None = None
+
+    def _stand_in(self, timetable: Timetable | None) -> None:
+        """Enter itself in a timetable when traffic arrives; without one it is looked at anyway."""
+        self._timetable = timetable
+        if isinstance(self.port, WirePort):
+            self.port.attach(self.device, self._wake)
+
+    def _wake(self, at_us: int) -> None:
+        if at_us < self.at_us and self._timetable is not None:
+            self._timetable.enter(self, at_us)
 
     def wake_us(self, now_us: int) -> int:
         """Return the first tick after `now_us` at which this station has work."""
@@ -118,8 +128,7 @@ class Rig(Copyable):
         port, device = station.port, station.device
         if not isinstance(port, WirePort):
             return False
-        enter = partial(self._timetable.enter, station)
-        port.attach(device, _ignore if self._dense else enter)
+        station._stand_in(None if self._dense else self._timetable)
         self.move_on(port.wire)
         if hasattr(device, "horizon"):
             device.horizon = None if self._dense else self._horizon
@@ -364,11 +373,11 @@ class Rig(Copyable):
         timetable = self._timetable
         woken, enter = timetable.take(now_us), timetable.enter
         timetable.open_us = now_us + 1
-        for station in woken:
+        for station in woken:  # what they send nobody has in this tick: one look at each is enough
             device, port = station.device, station.port
             received = port.poll(now_us)
-            if received or device.due_us <= now_us:
-                sent.append((port, device.tick(now_us, received)))
+            if (received or device.due_us <= now_us) and (out := device.tick(now_us, received)):
+                port.send(now_us, out)
             if (due_us := device.due_us) < NEVER:
                 enter(station, due_us)
         for port, traffic in sent:
@@ -381,10 +390,6 @@ class Rig(Copyable):
             coupling.act(now_us)
         if acting:
             self._enter_due()
-
-
-def _ignore(at_us: int) -> None:
-    """Wake nobody: a dense rig looks at all stations anyway."""
 
 
 def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:

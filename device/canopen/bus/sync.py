@@ -38,6 +38,10 @@ class Sync(Service):
     tick is left; the EMCY of a SYNC that stays away, which CiA 301 leaves open.
     """
 
+    __slots__ = (
+        *("_cob_id", "_counter", "_due_us", "_length", "_length_error", "_overflow", "_period"),
+    )
+
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         find = node.dictionary.find

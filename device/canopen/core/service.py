@@ -34,6 +34,8 @@ class Service(Copyable):
         slot: its place in the order of a tick.
     """
 
+    __slots__ = ("node", "slot")
+
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         self.node, self.slot = node, slot
 

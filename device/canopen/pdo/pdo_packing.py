@@ -41,6 +41,12 @@ def total_bits(slots: tuple[Slot, ...]) -> int:
     return sum(slot.bits for slot in slots)
 
 
+def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
+    """Return the entry whose bytes are those of a TPDO; None if it takes more to make them."""
+    entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
+    return None if entry is None or entry.source is not None else entry
+
+
 def make_pack(slots: tuple[Slot, ...]) -> Pack:
     """Return what makes the bytes of a TPDO out of the entries.
 

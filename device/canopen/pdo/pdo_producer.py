@@ -32,6 +32,8 @@ class PdoProducer(Service):
         on_sent: called with the mapped objects of each TPDO that has been sent.
     """
 
+    __slots__ = ("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "quiet", "tpdos")
+
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.quiet: set[int] = set()
@@ -42,7 +44,7 @@ class PdoProducer(Service):
         ]
         self._synchronous: tuple[TpdoMode, ...] = ()
         self._timed: tuple[TpdoMode, ...] = ()
-        self._counters: list[int] = []
+        self._counters: tuple[int, ...] = ()
         self._due_us = NEVER
         node.sync_handlers.append(self._sync)
 
@@ -83,7 +85,7 @@ class PdoProducer(Service):
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
         """Start all TPDOs in Operational, stop them when it is left."""
-        self._counters.clear()
+        self._counters = ()
         for tpdo in self.tpdos:
             if new is NmtState.OPERATIONAL:
                 tpdo.begin()
@@ -107,7 +109,7 @@ class PdoProducer(Service):
     def tick(self, now_us: int) -> None:
         """Send what SYNC has asked for, then what events have."""
         if self._counters:
-            counters, self._counters = self._counters, []
+            counters, self._counters = self._counters, ()
             for counter in counters:
                 for mode in self._synchronous:
                     mode.on_sync(counter)
@@ -120,7 +122,7 @@ class PdoProducer(Service):
 
     def _sync(self, counter: int) -> None:
         if self._synchronous:
-            self._counters.append(counter)
+            self._counters += (counter,)
             self.wake(self.node.now_us)
 
     def _collect(self) -> None:

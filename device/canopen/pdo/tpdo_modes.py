@@ -43,6 +43,8 @@ class TpdoMode(Part):
         on_sync: called with the counter of each SYNC, 0 if it has none.
     """
 
+    __slots__ = ("due_us", "on_sync", "sender")
+
     synchronous: ClassVar[bool] = False
     timed: ClassVar[bool] = False
     on_change: ClassVar[bool] = False
@@ -99,6 +101,8 @@ class SynchronousCyclic(TpdoMode):
     With a SYNC start value, and if SYNC carries a counter, the first is the one
     whose counter has that value, as in CANopenNode.
     """
+
+    __slots__ = ("_left", "_period", "_start")
 
     synchronous: ClassVar[bool] = True
 
