@@ -102,6 +102,7 @@ def test_what_cannot_be_copied_says_so() -> None:
         assert "\n" not in text, way
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("make", MACHINES.values(), ids=MACHINES)
 def test_a_copy_is_another_machine(make: Callable[[], object]) -> None:
     machine = make()

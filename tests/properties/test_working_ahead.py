@@ -175,6 +175,25 @@ STORED = st.dictionaries(
 )
 
 
+MIDWAY = [(61_000, "later", (14_500, "load_nm", 0.01 * n)) for n in range(1, 6)]
+AT_REST = [(500_000, "signal", ("load_nm", load_nm)) for load_nm in (0.3, -0.3, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("master", "steps"),
+    [
+        ((10, 4_000, 6.28), MIDWAY),
+        ((47, 900, 1.0), AT_REST),
+        ((1, 40, 0.25), [(50_000, "order", (0x0F,))]),
+    ],
+    ids=["midway", "at rest", "each tick"],
+)
+def test_a_load_makes_no_difference(master: tuple[int, int, float], steps: list[Step]) -> None:
+    ahead, plain = (Bench(Master(*master), {}, dense=dense) for dense in (False, True))
+    assert ahead.play(steps) == plain.play(steps)
+
+
+@pytest.mark.unmeasured
 @settings(max_examples=60, deadline=None)
 @given(MASTERS, STORED, STEPS)
 def test_working_ahead_makes_no_difference(
@@ -184,6 +203,7 @@ def test_working_ahead_makes_no_difference(
     assert ahead.play(steps) == plain.play(steps)
 
 
+@pytest.mark.unmeasured
 @settings(max_examples=15, deadline=None)
 @given(MASTERS, STEPS, STEPS, st.integers(1, 60_000))
 def test_a_copy_made_while_a_drive_is_ahead_goes_on_as_it_does(

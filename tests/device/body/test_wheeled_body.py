@@ -151,6 +151,7 @@ def test_a_body_slides_on_when_its_wheels_are_held() -> None:
     assert body.contacts["left"].load_nm == 0
 
 
+@pytest.mark.unmeasured
 @given(st.lists(st.floats(-0.01, 0.01), max_size=50), st.floats(0, 1))
 def test_the_ground_never_changes_its_speed_faster_than_friction_allows(
     turns: list[float], friction: float

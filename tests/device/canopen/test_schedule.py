@@ -127,6 +127,7 @@ class PlainSlave:
         self.dues[slot] = due_us
 
 
+@pytest.mark.unmeasured
 @given(
     st.lists(st.lists(requests, max_size=3), max_size=20),
     st.lists(st.lists(requests, max_size=2), max_size=8),

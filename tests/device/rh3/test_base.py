@@ -92,6 +92,7 @@ def test_a_load_slows_it_down_and_the_integral_gain_mends_it() -> None:
     assert driven.read("speed_left") == pytest.approx(0.1 * M_S, rel=5e-3)
 
 
+@pytest.mark.unmeasured
 def test_a_position_is_reached_and_held() -> None:
     driven = Driven()
     driven.write(watchdog_ms=0)

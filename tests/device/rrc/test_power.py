@@ -110,6 +110,7 @@ def test_off_by_button_takes_50_ticks_and_starts_again() -> None:
     assert bench.step() == ["EV:Initialized"]
 
 
+@pytest.mark.unmeasured
 def test_a_forced_stop_waits_for_the_power_button() -> None:
     bench = RrcBench().enter("PowerOffByOthers")
     assert bench.run(10_000) == []

@@ -91,6 +91,7 @@ def prepare_status(bench: Bench, kind: str) -> None:
         bench.inputs.update(stick_v_pct=-100, stick_w_pct=-100)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("vector", by_id("lines"))
 def test_lines_are_answered(vector: dict[str, Any]) -> None:
     bench = prepared(vector)

@@ -120,6 +120,7 @@ def force_off(bench: RrcBench, cause: str) -> list[str]:
     return lines
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("row", VECTORS["power"], ids=ids(VECTORS["power"]))
 def test_power_sequence(row: dict[str, Any]) -> None:
     bench = RrcBench()

@@ -93,6 +93,7 @@ def test_a_jump_of_many_turns_settles(servo: Servo) -> None:
     assert (servo.counts, servo.resting) == (-200_000, True)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("velocity", [-20_000, 37, 20_000])
 def test_a_velocity_is_kept(servo: Servo, velocity: int) -> None:
     servo.drive_velocity(velocity)
@@ -134,6 +135,7 @@ def test_the_supply_limits_the_speed() -> None:
     assert speeds[1] / speeds[0] == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.unmeasured
 def test_the_integral_does_not_wind_up_at_a_limit(servo: Servo) -> None:
     servo.blocked = True
     servo.drive_velocity(20_000)
@@ -170,6 +172,7 @@ def test_the_stage_bears_its_peak_for_its_time(servo: Servo) -> None:
     assert (servo.current_a, servo.overloaded) == (stage.continuous_a, True)
 
 
+@pytest.mark.unmeasured
 def test_the_peak_comes_back_after_a_while(servo: Servo) -> None:
     servo.blocked = True
     servo.drive_current(100.0)
@@ -191,6 +194,7 @@ def test_a_hot_winding_gets_less_current() -> None:
     assert not servo.resting
 
 
+@pytest.mark.unmeasured
 def test_a_warm_winding_lets_less_current_through() -> None:
     servo, motor = Servo(QUICKLY_WARM), QUICKLY_WARM.motor
     servo.blocked = True
@@ -234,6 +238,7 @@ def test_a_strong_load_turns_a_released_shaft_backward(servo: Servo) -> None:
     assert servo.shaft_deg_s < 0
 
 
+@pytest.mark.unmeasured
 def test_a_held_shaft_stands_and_draws_current(servo: Servo) -> None:
     servo.blocked = True
     servo.drive_position(5_000)

@@ -36,6 +36,7 @@ requests = frames(dict(layout.REQUESTS))
 replies = frames(dict(layout.REPLIES))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("data", "direction"),
     [*((data, "request") for data in REQUESTS), *((data, "reply") for data in REPLIES)],
@@ -47,6 +48,7 @@ def test_a_golden_frame_is_read_and_written_back(data: bytes, direction: str) ->
     assert frame.encode() == data
 
 
+@pytest.mark.unmeasured
 @given(st.lists(requests, max_size=5), st.sampled_from(Checksum), st.integers(1, 9))
 def test_requests_come_back_however_they_are_cut(
     sent: list[LiteFrame], checksum: Checksum, size: int
@@ -58,6 +60,7 @@ def test_requests_come_back_however_they_are_cut(
     assert not decoder.begun
 
 
+@pytest.mark.unmeasured
 @given(st.lists(replies, max_size=5), st.sampled_from(Checksum))
 def test_replies_come_back(sent: list[LiteFrame], checksum: Checksum) -> None:
     data = b"".join(frame.encode(checksum) for frame in sent)

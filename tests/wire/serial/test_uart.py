@@ -108,6 +108,7 @@ def test_any_settings_give_characters_in_order(
     assert len(received) <= 1 + len(data) * sender.duration_ps() // frame_ps
 
 
+@pytest.mark.unmeasured
 @given(settings, settings, st.binary(max_size=8), st.lists(st.integers(1, 10**9), max_size=30))
 def test_levels_may_come_in_any_pieces(
     sender: UartSetting, receiver: UartSetting, data: bytes, cuts: list[int]
@@ -162,6 +163,7 @@ def test_with_a_parity_bit_that_is_not_sent_half_of_all_bytes_are_wrong() -> Non
     assert not any(got[0].framing_error for got in alone)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("wanted", PARITIES)
 @pytest.mark.parametrize("sent", PARITIES)
 def test_a_parity_error_is_a_bit_that_is_not_the_one_expected(sent: Parity, wanted: Parity) -> None:

@@ -47,6 +47,7 @@ def board(field: str, kind: DataType, bits: int, **defaults: int) -> Board:
     return made
 
 
+@pytest.mark.unmeasured
 @every_width
 def test_the_second_element_begins_where_the_first_ends(
     field: str, kind: DataType, bits: int

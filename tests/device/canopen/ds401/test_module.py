@@ -107,6 +107,7 @@ def test_an_analogue_event_waits_for_6423h(running: Bench) -> None:
     assert running.step() == ["285#6400000000000000"]
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("trigger", "objects", "quiet", "loud"),
     [

@@ -95,6 +95,7 @@ def test_the_controlword_moves_the_state(
     assert bench.read(0x6041) & 0x6F == state
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("option", "state", "resumed"),
     [

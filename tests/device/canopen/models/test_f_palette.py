@@ -102,6 +102,7 @@ def linked(palette: Palette) -> Palette:
     return palette
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("at", TABLE, ids=lambda at: f"{at[0]:04X}h:{at[1]:02X}")
 def test_the_objects_are_those_of_its_table(palette: Palette, at: tuple[int, int]) -> None:
     entry, (access, default) = palette.slave.dictionary[at], TABLE[at]

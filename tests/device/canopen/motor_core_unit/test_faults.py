@@ -111,6 +111,7 @@ FAULTS = [
 """Cause, EMCY with its error register, what the observer reads."""
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("cause", "emcy", "name"), FAULTS)
 def test_a_fault_takes_the_power_off_and_is_told(
     bench: UnitBench, cause: Callable[[UnitBench], None], emcy: str, name: str
@@ -158,6 +159,7 @@ def test_a_fault_whose_cause_is_seen_cannot_be_cleared(
     assert (bench.status, bench.emergencies) == (FAULT, told)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("cause", "emcy"),
     [(cause_short_circuit, "202303"), (cause_stall, "217121"), (cause_open_phase, "227121")],
@@ -240,6 +242,7 @@ def test_a_blocked_shaft_is_no_fault_while_a_current_is_wanted(bench: UnitBench)
     assert bench.see("current_a") == pytest.approx(3.05, rel=0.02)
 
 
+@pytest.mark.unmeasured
 def test_i2t_cuts_the_peak_current_to_the_continuous_one(bench: UnitBench) -> None:
     bench.set("shaft_blocked", 1)
     bench.begin(CURRENT, 32_767)
@@ -269,6 +272,7 @@ def test_a_fault_leaves_the_node_operational(bench: UnitBench) -> None:
     assert "720#05" in bench.heard
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("error_mode", "angle_deg"), [(1, -90.0027), (0, 90.0027)])
 def test_after_a_fault_6443h_and_6444h_give_the_reference_until_another_comes(
     bench: UnitBench, error_mode: int, angle_deg: float

@@ -32,6 +32,7 @@ def bench() -> UnitBench:
     return UnitBench()
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("reference", "angle_deg"), [(row["ai16"], row["angle_deg"]) for row in POTENTIOMETER]
 )
@@ -67,6 +68,7 @@ def test_the_shaft_follows_the_planned_motion(bench: UnitBench) -> None:
     assert max(behind) < 0.1
 
 
+@pytest.mark.unmeasured
 def test_the_velocity_limit_holds_in_angle_mode(bench: UnitBench) -> None:
     bench.begin(ANGLE)
     bench.refer(32767, velocity_limit=8192)
@@ -150,6 +152,7 @@ def test_free_lets_the_shaft_coast_to_a_stop(bench: UnitBench) -> None:
     assert bench.see("velocity_deg_s") == 0
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL])
 @pytest.mark.parametrize("mode", [CURRENT, VELOCITY, ANGLE])
 def test_whoever_leaves_operational_brakes_and_holds(
@@ -179,6 +182,7 @@ def test_a_reference_acts_again_when_the_node_is_operational_again(bench: UnitBe
     assert bench.see("velocity_deg_s") == pytest.approx(180, rel=0.01)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("first", [CURRENT, VELOCITY, ANGLE])
 @pytest.mark.parametrize("second", [VELOCITY, ANGLE])
 def test_a_mode_begins_with_the_motion_that_is(bench: UnitBench, first: int, second: int) -> None:

@@ -86,6 +86,7 @@ def test_a_client_may_be_slow_inside_a_block() -> None:
     assert bus.step(END) == ENDED
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("received", range(1, 6))
 def test_a_client_silent_in_a_block_is_aborted_after_5_s(received: int) -> None:
     bus = booted()

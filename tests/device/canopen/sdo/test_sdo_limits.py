@@ -59,6 +59,7 @@ def download(bus: Bus, data: bytes, *, size: int | None) -> Response:
     return client.ask(BlockEnd(-len(data) % SEGMENT, crc16(data)))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("told", [True, False])
 def test_a_firmware_goes_into_a_domain(told: bool) -> None:
     bus, firmware = booted(), bytes(range(256)) * 257  # more than 64 KiB

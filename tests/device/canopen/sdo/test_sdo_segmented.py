@@ -99,6 +99,7 @@ def test_a_client_abort_without_a_transfer_is_silent() -> None:
     dialogue(booted(), ("8008100000000008", ""), ("4001100000000000", "4F01100000000000"))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     "begin", ["4008100000000000", "2107200010000000", "A40810007F000000", "C60720001E000000"]
 )

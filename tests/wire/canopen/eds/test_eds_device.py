@@ -5,6 +5,7 @@ import pytest
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_value import parse_number
 from tickrig.wire.canopen.eds.object_table import RO, RW, WO, EntryDescription
 
 U8 = "ParameterName=x\nDataType=5\nAccessType=rw\n"
@@ -327,3 +328,9 @@ def test_objects_that_only_define_a_type_are_none() -> None:
 def test_long_texts_are_shortened() -> None:
     _, (error,), _ = read(f"[2000]\n{U8}DefaultValue={'x' * 1_000}\n")
     assert error == f"a.eds:5: [2000] DefaultValue={'x' * 37}... is no UNSIGNED8 (default-value)"
+
+
+@pytest.mark.parametrize("text", ["\u0663", "1_000"])
+def test_what_python_alone_takes_is_no_number(text: str) -> None:
+    with pytest.raises(ValueError, match="is no number"):
+        parse_number(text)

@@ -35,6 +35,7 @@ def swing(wheel: Wheel, amplitude: int, period_ms: int, cycles: int) -> list[tup
     return seen
 
 
+@pytest.mark.unmeasured
 def test_csp_follows_a_cosine_of_targets(wheel: Wheel) -> None:
     amplitude, period_ms = 4_000, 1_000
     wheel.step("000#0101")
@@ -46,6 +47,7 @@ def test_csp_follows_a_cosine_of_targets(wheel: Wheel) -> None:
         assert position == pytest.approx(demand, abs=60)  # a step of control at 25 000 counts/s
 
 
+@pytest.mark.unmeasured
 def test_csp_has_a_reference_without_steps(wheel: Wheel) -> None:
     wheel.step("000#0101")
     wheel.enable(8)
@@ -128,6 +130,7 @@ def test_torque_accelerates_the_wheel_as_newton_says(wheel: Wheel, mode: int) ->
     assert wheel.read(0x6078) == pytest.approx(1_032, abs=5)
 
 
+@pytest.mark.unmeasured
 def test_torque_ends_at_the_speed_that_the_voltage_allows(wheel: Wheel) -> None:
     wheel.enable(10)
     wheel.write(0x6071, 1_000)
@@ -175,6 +178,7 @@ def test_torque_is_cut_by_each_limit(
         assert bool(wheel.read(0x6041) & INTERNAL_LIMIT) is (wanted != got)
 
 
+@pytest.mark.unmeasured
 def test_profile_velocity_is_a_trapezoid(wheel: Wheel) -> None:
     wheel.write(0x6083, 2_000)
     wheel.write(0x6084, 4_000)

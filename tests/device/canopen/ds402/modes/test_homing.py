@@ -112,6 +112,7 @@ def test_home_is_the_index_pulse_behind_the_edge(method: int, start: str) -> Non
     assert wheel.read(0x6064) == pytest.approx(OFFSET, abs=AT_HOME)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("start", HOME_DEG)
 @pytest.mark.parametrize("method", range(17, 31))
 def test_home_is_the_edge(method: int, start: str) -> None:
@@ -123,6 +124,7 @@ def test_home_is_the_edge(method: int, start: str) -> None:
     assert wheel.read(0x6064) == pytest.approx(OFFSET, abs=AT_HOME)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("method", "turns"), [(33, -1), (34, 1)])
 def test_33_and_34_go_to_the_next_index_pulse(method: int, turns: int) -> None:
     wheel = make_wheel(method)
@@ -189,6 +191,7 @@ def test_the_home_position_stays_when_bit_4_falls_and_in_other_modes() -> None:
     assert wheel.read(0x6063) == pytest.approx(-TURN - OFFSET, abs=AT_HOME)
 
 
+@pytest.mark.unmeasured
 def test_what_a_homing_found_holds_until_the_next_one_begins() -> None:
     wheel = make_wheel(33)
     home(wheel)
@@ -222,6 +225,7 @@ def test_after_halt_a_rising_edge_begins_anew() -> None:
     assert home(wheel) == REACHED | BIT_12
 
 
+@pytest.mark.unmeasured
 def test_halt_on_the_way_back_delays_it() -> None:
     wheel = make_wheel(17)
     wheel.write(0x609A, 1_000)

@@ -160,6 +160,7 @@ def test_a_limit_switch_ahead_ends_a_method_that_does_not_use_it(method: int) ->
     assert abs(position - 50.0) == pytest.approx(30.0, abs=FAST / 1_000)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("method", range(23, 31))
 def test_a_home_switch_that_is_nowhere_is_looked_for_at_both_ends(method: int) -> None:
     first = METHODS[method].first

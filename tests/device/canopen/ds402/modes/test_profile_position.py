@@ -56,6 +56,7 @@ def arrive(wheel: Wheel) -> int:
     return wheel.run_until(lambda: bool(wheel.bits & REACHED))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("target", [100_000, -100_000, 5_000, 30])
 def test_the_demand_is_the_trapezoid_and_the_motor_follows(wheel: Wheel, target: int) -> None:
     wheel.write(0x607A, target)
@@ -70,6 +71,7 @@ def test_the_demand_is_the_trapezoid_and_the_motor_follows(wheel: Wheel, target:
     assert (wheel.read(0x6064), wheel.read(0x606C)) == (target, 0)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("target", "expected_ms"),
     [(100_000, 1_225), (-100_000, 1_225), (20_000, 425), (5_000, 213)],
@@ -132,6 +134,7 @@ def test_a_third_set_point_at_once_replaces_both(wheel: Wheel) -> None:
     assert wheel.read(0x6062) == -2_000
 
 
+@pytest.mark.unmeasured
 def test_a_set_point_at_once_turns_the_way_without_a_jump(wheel: Wheel) -> None:
     give(wheel, 100_000)
     wheel.run(300)
@@ -143,6 +146,7 @@ def test_a_set_point_at_once_turns_the_way_without_a_jump(wheel: Wheel) -> None:
     assert wheel.read(0x6062) == 0
 
 
+@pytest.mark.unmeasured
 def test_a_set_point_keeps_what_it_came_with(wheel: Wheel) -> None:
     give(wheel, 100_000)
     wheel.write(0x6081, 100)
@@ -185,6 +189,7 @@ def test_change_on_set_point_passes_without_a_stop(
     assert wheel.read(0x6062) == following
 
 
+@pytest.mark.unmeasured
 def test_with_an_end_velocity_the_motor_goes_on(wheel: Wheel) -> None:
     wheel.write(0x6082, 600)
     give(wheel, 50_000)
@@ -198,6 +203,7 @@ def test_with_an_end_velocity_the_motor_goes_on(wheel: Wheel) -> None:
     assert wheel.read(0x6062) == 0
 
 
+@pytest.mark.unmeasured
 def test_halt_brakes_and_goes_on(wheel: Wheel) -> None:
     give(wheel, 100_000)
     wheel.run(300)
@@ -251,6 +257,7 @@ def test_a_target_beyond_a_software_limit_ends_there(wheel: Wheel) -> None:
     assert wheel.read(0x6041) & INTERNAL_LIMIT == 0
 
 
+@pytest.mark.unmeasured
 def test_a_profile_velocity_of_0_is_the_slowest() -> None:
     wheel = make_wheel()
     wheel.write(0x6081, 0)
@@ -272,6 +279,7 @@ def test_ramps_without_a_limit_jump(wheel: Wheel) -> None:
     assert wheel.read(0x606B) == VELOCITY
 
 
+@pytest.mark.unmeasured
 def test_sin2_ramps_start_gently(wheel: Wheel) -> None:
     wheel.write(0x6086, 1)
     give(wheel, 100_000)
@@ -299,6 +307,7 @@ def test_a_mode_that_begins_in_motion_brakes(wheel: Wheel) -> None:
     assert wheel.read(0x606B) == 0
 
 
+@pytest.mark.unmeasured
 def test_a_limit_switch_stops_the_way_and_the_way_back_is_free() -> None:
     wheel = make_wheel(make_lenient)
     give(wheel, 100_000)
@@ -313,6 +322,7 @@ def test_a_limit_switch_stops_the_way_and_the_way_back_is_free() -> None:
     assert wheel.read(0x6062) == 0
 
 
+@pytest.mark.unmeasured
 def test_a_way_goes_on_when_the_limit_switch_is_released() -> None:
     wheel = make_wheel(make_lenient)
     give(wheel, 100_000)

@@ -40,6 +40,7 @@ def stands(wheel: Wheel) -> bool:
     return abs(wheel.read(0x606C)) < 10 and wheel.read(0x606B) == 0
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("option", "duration_ms", "state"),
     [
@@ -63,6 +64,7 @@ def test_a_quick_stop_follows_605ah(
     assert (wheel.read(0x606C) > 900) is (option == 0)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("index", "controlword", "state"),
     [
@@ -93,6 +95,7 @@ def test_a_ramp_out_of_operation_enabled_is_called_off_by_enabling_again(wheel: 
     assert wheel.read(0x606C) == pytest.approx(1_000, abs=2)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("option", "duration_ms"), [(1, SLOW_MS), (2, QUICK_MS), (3, HARD_MS)])
 def test_halt_follows_605dh_and_stays_enabled(
     wheel: Wheel, option: int, duration_ms: range
@@ -105,6 +108,7 @@ def test_halt_follows_605dh_and_stays_enabled(
     assert wheel.drive.enabled
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("option", "duration_ms"), [(0, COASTS), (1, SLOW_MS), (2, QUICK_MS), (3, HARD_MS)]
 )
@@ -134,6 +138,7 @@ def test_a_quick_stop_in_torque_mode_brakes_by_velocity(wheel: Wheel) -> None:
     assert wheel.run_until(lambda: wheel.drive.state is SOD) in range(40, 65)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("index", "value"),
     [

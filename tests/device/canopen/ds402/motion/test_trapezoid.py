@@ -52,6 +52,7 @@ def arrival_us(path: Path) -> int:
     return now_us - path.began_us
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("distance", "limits"),
     [
@@ -184,6 +185,7 @@ def test_what_is_too_fast_brakes_to_the_limit_first() -> None:
     assert path.at(5_000_000).velocity == 50.0
 
 
+@pytest.mark.unmeasured
 @given(POSITIONS, VELOCITIES, POSITIONS, LIMITS, st.integers(0, 100_000))
 def test_a_path_ends_on_its_target(
     position: float, velocity: float, target: float, limits: PathLimits, end: int

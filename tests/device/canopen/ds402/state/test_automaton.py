@@ -38,6 +38,7 @@ MOVES = {
 """CiA 402-2, finite state automaton: where a command leads to; elsewhere to nowhere."""
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("state", "command"), [*product(DriveState, Command)])
 def test_a_command_leads_where_the_automaton_says(state: DriveState, command: Command) -> None:
     wheel = Wheel()

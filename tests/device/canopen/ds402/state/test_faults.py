@@ -76,6 +76,7 @@ def test_a_blocked_wheel_is_found_after_a_second_by_its_current(wheel: Wheel) ->
     assert recovers(wheel)
 
 
+@pytest.mark.unmeasured
 def test_a_broken_motor_wire_is_found_because_no_current_flows(wheel: Wheel) -> None:
     turning(wheel).set(motor_phase_open=1)
     wheel.run_until(lambda: wheel.drive.state is FAULT, 5_000)
@@ -126,6 +127,7 @@ def test_a_hot_winding_warns_and_then_switches_off(wheel: Wheel) -> None:
     assert recovers(wheel)
 
 
+@pytest.mark.unmeasured
 def test_a_cooling_winding_is_looked_at_each_second(wheel: Wheel) -> None:
     wheel.write(0x60FF, 300)
     wheel.enable(3)
