@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict, deque
+from collections.abc import Callable
 from functools import cache
 from typing import Final
 
@@ -13,6 +14,8 @@ from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
 from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedLink
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
+from tickrig.wire.instant import NEVER
 
 MS_US: Final = 1_000
 
@@ -21,6 +24,9 @@ SLICE_US: Final = 20_000
 
 HOST_GAP_US: Final = 10_000
 """By so much a wait, or what is between two waits, may last too long before the host is late."""
+
+PERIOD_TOLERANCE: Final = 0.05
+"""By this share may the mean of periods be off: CiA 301 says nothing; crystals are far better."""
 
 NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
@@ -35,26 +41,33 @@ class Exchange:
     Args:
         link: the bus; its time stamps are what is judged.
         node_id: of the node under test, 1..127.
-        allowance: how much may be sent.
-        foreign: the load by others.
+        bit_rate: of the bus in bit/s.
+        max_load: share of it that may be used, above 0 to 1.
+        permit: looks at each frame before it is sent; raises NotAllowed.
         resolution_us: of the time stamps; a frame may be so much late.
 
     Attributes:
         evidence: of the check under way.
         disturbances: why the check under way cannot fail, each once.
+        boots: boot-up messages of the node so far.
+        deadline_us: when the check under way has to have ended.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - a bus, by keyword
         self,
         link: StampedLink,
         node_id: int,
-        allowance: Allowance,
-        foreign: ForeignLoad,
+        *,
+        bit_rate: int,
+        max_load: float,
+        permit: Callable[[CanFrame], None],
         resolution_us: int = MS_US,
     ) -> None:
         self._link, self._node_id, self.resolution_us = link, node_id, resolution_us
-        self._allowance, self._foreign = allowance, foreign
+        self._allowance, self._foreign = Allowance(bit_rate, max_load), ForeignLoad(bit_rate)
+        self._permit, self._boot_up = permit, f"{ERROR_CONTROL_COB_ID + node_id:03X}#00"
         self.start_us = self._known_us = self._busy_us = link.now_us
+        self.deadline_us, self.boots = NEVER, 0
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -64,14 +77,16 @@ class Exchange:
         """Bus time."""
         return self._link.now_us
 
-    def begin(self, watched: frozenset[str] = frozenset()) -> None:
-        """Begin a check: read what is there, and forget it.
+    def begin(self, within_us: int, watched: frozenset[str] = frozenset()) -> None:
+        """Begin a check, or what is done between checks: forget all frames before.
 
         Args:
+            within_us: how long it may last.
             watched: CAN-IDs of which frames are kept, beside those of the node.
         """
+        self.deadline_us = NEVER
         self._listen(self.now_us)
-        self._watched = watched
+        self.deadline_us, self._watched = self.now_us + within_us, watched
         self._unread.clear()
         self.evidence, self.disturbances = Evidence(), {}
         self._busy_us = self.now_us
@@ -87,7 +102,8 @@ class Exchange:
             self.remark(reason)
 
     def send(self, frame: CanFrame) -> None:
-        """Send a frame, when the load allows it."""
+        """Send a frame, when the load allows it; NotAllowed if the level does not."""
+        self._permit(frame)
         self._listen(self.now_us)
         while (wait_us := self._allowance.wait_us(self.now_us)) > 0:
             self._listen(self.now_us + wait_us)
@@ -133,6 +149,22 @@ class Exchange:
         if not least <= got <= most:
             raise StepFailed(f"{got} x {pattern} in {for_ms} ms, want {least}..{most}")
 
+    def period(self, pattern: str, each_ms: int, times: int) -> None:
+        """Wait; StepFailed unless frames that match come each so many milliseconds.
+
+        Args:
+            pattern: of the frames.
+            each_ms: their period.
+            times: how many periods are measured: their mean may be `PERIOD_TOLERANCE` off.
+        """
+        stamps = self.collect(pattern, each_ms * (times + 2))[: times + 1]
+        if len(stamps) <= times:
+            raise StepFailed(f"{len(stamps)} x {pattern}, want {times + 1}, each {each_ms} ms")
+        mean_ms = (stamps[-1] - stamps[0]) / times / MS_US
+        allowed_ms = each_ms * PERIOD_TOLERANCE + self.resolution_us / times / MS_US
+        if abs(mean_ms - each_ms) > allowed_ms:
+            raise StepFailed(f"{pattern} each {mean_ms:.1f} ms, want {each_ms} ms")
+
     def collect(self, pattern: str, for_ms: int) -> list[int]:
         """Wait; return the times of the frames that match and come meanwhile."""
         unread = self._unread[can_id_of(pattern)]
@@ -143,9 +175,30 @@ class Exchange:
         unread.clear()
         return times
 
+    def forget(self, can_id: str) -> None:
+        """Forget the frames of a CAN-ID that have come."""
+        self._listen(self.now_us)
+        self._unread[can_id].clear()
+
+    def forget_all(self) -> None:
+        """Forget all frames that have come."""
+        self._listen(self.now_us)
+        self._unread.clear()
+
+    def excuse(self) -> None:
+        """Let what lasted since the last look be no lateness of this host: a person was asked."""
+        self._busy_us = self.now_us
+
     def wait(self, for_ms: int) -> None:
         """Let time pass."""
         self._listen_until(self.now_us + for_ms * MS_US)
+
+    def next(self, can_id: str, until_us: int) -> str | None:
+        """Return the next frame on a CAN-ID, None if none has come by a time."""
+        queue = self._unread[can_id]
+        while not queue and self._known_us < until_us:
+            self._listen(until_us)
+        return queue.popleft()[1] if queue else None
 
     def unread(self, can_id: str) -> deque[tuple[int, str]]:
         """Return the frames of a CAN-ID, with their times, that nobody has taken."""
@@ -158,6 +211,8 @@ class Exchange:
     def _listen(self, until_us: int) -> None:
         """Take what arrives, at most until a time, and see whether the host was late."""
         before_us = self.now_us
+        if before_us > self.deadline_us:
+            raise StepFailed("the node kept the check going beyond its time")
         wait_us = max(0, min(until_us - before_us, SLICE_US))
         self._known_us, received = self._link.receive_stamped(wait_us)
         after_us = self.now_us
@@ -177,6 +232,7 @@ class Exchange:
             self.evidence.add(at_us - self.start_us, Direction.RECEIVED, text)
         if own:
             self._allowance.use(at_us, frame)
+            self.boots += text == self._boot_up
         elif self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
 

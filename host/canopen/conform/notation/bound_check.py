@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from tickrig.host.canopen.conform.check import Check, Step
+from tickrig.host.canopen.conform.notation.macro_words import longest_ms, written_by
 from tickrig.host.canopen.conform.notation.names import (
     NAME,
     Address,
@@ -18,10 +19,16 @@ from tickrig.host.canopen.conform.notation.names import (
 TARGETS: Final = frozenset({"write", "read", "refuse write", "refuse read", "keep"})
 """Steps of an object; what their first word names is an address."""
 
-WRITES: Final = frozenset({"write", "refuse write", "keep"})
-DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
-"""Macros that write the object that they name first."""
+MARGIN_US: Final = 2_000_000
+"""Beyond the sum of all waits: for what is sent, when the load has to be kept low."""
 
+STIMULUS_MS: Final = 60_000
+"""So long may the hand at the inputs take; a person is slow."""
+
+LONGEST_TRANSFER_MS: Final = 3_000
+"""So long may an object of a few bytes take."""
+
+WRITES: Final = frozenset({"write", "refuse write", "keep"})
 
 @dataclass(frozen=True, slots=True)
 class BoundCheck:
@@ -32,12 +39,16 @@ class BoundCheck:
         steps: with numbers; an object is its index and sub-index.
         written: objects that it may change, whether or not the node should let it.
         can_ids: of the frames that it looks at.
+        within_us: how long it may last at most.
+        resets: it may reset the node, so that all its values change.
     """
 
     check: Check
     steps: tuple[Mapping[str, Any], ...]
     written: frozenset[Address]
     can_ids: frozenset[str]
+    within_us: int
+    resets: bool
 
 
 def bind_check(check: Check, names: Names) -> BoundCheck:
@@ -46,7 +57,8 @@ def bind_check(check: Check, names: Names) -> BoundCheck:
     request = resolve("$request", names)
     written = frozenset(address for step in steps for address in _written(step, request))
     can_ids = frozenset(text.partition("#")[0] for step in steps for text in _watched(step))
-    return BoundCheck(check, steps, written, can_ids)
+    within_us = MARGIN_US + 1_000 * sum(map(_longest_ms, steps))
+    return BoundCheck(check, steps, written, can_ids, within_us, any(map(_resets, steps)))
 
 
 def _bind_step(step: Step, names: Names) -> Mapping[str, Any]:
@@ -70,11 +82,31 @@ def _bind_word(word: str, names: Names) -> object:
     return resolve(word, names) if match is None or match[2] else names.address(match[1])
 
 
+def _longest_ms(step: Step) -> int:
+    """Return how long a step lasts at most."""
+    match step:
+        case {"expect": _, "in": ms} | {"none": _, "for": ms} | {"count": _, "for": ms}:
+            return int(ms)
+        case {"wait": ms}:
+            return int(ms)
+        case {"period": _, "each": ms, "times": times}:
+            return int(ms) * (int(times) + 2)
+        case {"macro": [name, *words]}:
+            return longest_ms(name, words)
+        case {"app": _}:
+            return STIMULUS_MS
+    return 0 if {"send", "forget", "keep"} & step.keys() else LONGEST_TRANSFER_MS
+
+
+def _resets(step: Step) -> bool:
+    return "app" in step or str(step.get("send", ""))[:6] in ("000#81", "000#82")
+
+
 def _written(step: Mapping[str, Any], request: str) -> Iterator[Address]:
     for key in WRITES & step.keys():
         yield step[key]
-    if "macro" in step and step["macro"][0] in DOWNLOADS:
-        yield step["macro"][1]
+    if "macro" in step:
+        yield from written_by(*step["macro"])
     can_id, _, data = str(step.get("send", "")).partition("#")
     if can_id == request and len(data) >= 8 and data[0] in "23CDcd":
         yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)

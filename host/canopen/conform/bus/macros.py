@@ -1,0 +1,225 @@
+"""Macros of the checks: whole transfers, SYNC periods, re-mapping, fastscan."""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from tickrig.host.canopen.conform.bus.exchange import matches
+from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
+from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.notation.names import Address
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.sdo.sdo_command import SEGMENT_BYTES
+
+MOST_BYTES: Final = 20_000
+"""A transfer that brings more than this failed: a node that never ends one is found out."""
+
+SCAN_MS: Final = 10
+FOUND: Final = "7E4#4F00000000000000"
+
+
+def pattern(size: int) -> bytes:
+    """Return the bytes of a transfer: (7k + n) mod 256, 1 for 0."""
+    return bytes((7 * k + size) % 256 or 1 for k in range(size))
+
+
+def sync(sdo: SdoFrames, can_id: str, count: str) -> None:
+    """Send SYNCs 1 ms apart."""
+    for _ in range(int(count)):
+        sdo.exchange.send(CanFrame.parse(f"{can_id}#"))
+        sdo.exchange.wait(1)
+
+
+def sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
+    """SYNC until the first TPDO, then one TPDO must come with every n-th SYNC."""
+    every, seen = int(period), sdo.exchange.unread(tpdo)
+    for _ in range(every):
+        _sync_and_wait(sdo, can_id)
+        if seen:
+            break
+    if len(seen) != 1:
+        raise StepFailed(f"{len(seen)} x {tpdo} within {every} SYNC, want 1")
+    seen.clear()
+    for number in range(1, 3 * every + 1):
+        _sync_and_wait(sdo, can_id)
+        want = number % every == 0
+        if len(seen) != want:
+            raise StepFailed(f"{len(seen)} x {tpdo} at SYNC {number} after the first, want {want:d}")
+        seen.clear()
+
+
+def _sync_and_wait(sdo: SdoFrames, can_id: str) -> None:
+    sdo.exchange.send(CanFrame.parse(f"{can_id}#"))
+    sdo.exchange.wait(PDO_MS)
+
+
+PDO_MS: Final = 5
+"""So long after a SYNC its TPDO is waited for."""
+
+
+def download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
+    """Write the pattern in segments."""
+    data = pattern(int(size))
+    sdo.say(bytes([0x21, *_mux(at)]) + len(data).to_bytes(4, "little"))
+    sdo.answer(f"60{multiplexer(at)}00000000")
+    sdo.download_segments(data)
+
+
+def upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
+    """Read in segments; it must be the pattern."""
+    _compare(upload_segmented(sdo, at), pattern(int(size)))
+
+
+def upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
+    """Read in segments whatever is there, with alternating toggle; return it."""
+    sdo.say(bytes([0x40, *_mux(at), *bytes(4)]))
+    size = int.from_bytes(sdo.answer(f"41{multiplexer(at)}........")[4:], "little")
+    data, toggle, last = b"", 0, False
+    while not last:
+        sdo.say(bytes([0x60 | toggle, *bytes(7)]))
+        segment = sdo.answer(f"{toggle >> 4:X}[0-9A-F]..............")
+        last = bool(segment[0] & 1)
+        data += segment[1 : 8 - (segment[0] >> 1 & 7)]
+        toggle ^= 0x10
+        if len(data) > MOST_BYTES:
+            raise StepFailed(f"{len(data)} bytes, and still no last segment")
+    if len(data) != size:
+        raise StepFailed(f"{len(data)} bytes came, {size} were indicated")
+    return data
+
+
+def download_block(sdo: SdoFrames, at: Address, size: str) -> None:
+    """Write the pattern in blocks with CRC."""
+    data, done = pattern(int(size)), 0
+    sdo.say(bytes([0xC6, *_mux(at)]) + len(data).to_bytes(4, "little"))
+    block = sdo.answer(f"A[04]{multiplexer(at)}..000000")[4]
+    while done < len(data):
+        if not 1 <= block <= 127:
+            raise StepFailed(f"block size {block}, want 1..127")
+        parts = list(_block(data[done:], block))
+        for part in parts:
+            sdo.say(part)
+        answer = sdo.answer("A2....0000000000")
+        if not 1 <= answer[1] <= len(parts):
+            raise StepFailed(f"segment {answer[1]} acknowledged of {len(parts)}")
+        done, block = done + SEGMENT_BYTES * answer[1], answer[2]
+    end = 0xC1 | (-len(data) % SEGMENT_BYTES) << 2
+    sdo.say(bytes([end]) + crc_hqx(data, 0).to_bytes(2, "little") + bytes(5))
+    sdo.answer("A100000000000000")
+
+
+def upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> None:
+    """Read in blocks with CRC; it must be the pattern."""
+    _compare(upload_block(sdo, at, block), pattern(int(size)))
+
+
+def upload_same(sdo: SdoFrames, at: Address, block: str = "127") -> None:
+    """Read in blocks, and in segments; it must be the same."""
+    _compare(upload_block(sdo, at, block), upload_segmented(sdo, at))
+
+
+def upload_block(sdo: SdoFrames, at: Address, block: str) -> bytes:
+    """Read in blocks with CRC whatever is there; return it."""
+    most = int(block)
+    sdo.say(bytes([0xA4, *_mux(at), most, 0, 0, 0]))
+    answer = sdo.answer(f"C[2367]{multiplexer(at)}........")
+    checked, size = bool(answer[0] & 4), int.from_bytes(answer[4:], "little")
+    sdo.say(bytes([0xA3, *bytes(7)]))
+    data, number, last = b"", 0, False
+    while not last:
+        number += 1
+        segment = sdo.answer(f"[{number >> 4:X}{number >> 4 | 8:X}]{number & 15:X}..............")
+        last = bool(segment[0] & 0x80)
+        data += segment[1:]
+        if len(data) > MOST_BYTES:
+            raise StepFailed(f"{len(data)} bytes, and still no last segment")
+        if last or number == most:
+            sdo.say(bytes([0xA2, number, most, *bytes(5)]))
+            number = 0
+    end = sdo.answer("[CD][159D]....0000000000")
+    data = data[: len(data) - (end[0] >> 2 & 7)]
+    wanted = crc_hqx(data, 0) if checked else 0
+    if int.from_bytes(end[1:3], "little") != wanted:
+        raise StepFailed(f"CRC {end[2]:02X}{end[1]:02X}h, want {wanted:04X}h")
+    if answer[0] & 2 and len(data) != size:
+        raise StepFailed(f"{len(data)} bytes came, {size} were indicated")
+    sdo.say(bytes([0xA1, *bytes(7)]))
+    return data
+
+
+def remap(  # noqa: PLR0913 - as the check gives them
+    sdo: SdoFrames, comm: str, mapping: str, on: str, kind: str, *entries: str
+) -> None:
+    """Map objects by the procedure of CiA 301, and enable the PDO with a transmission type."""
+    head, body = int(comm, 16), int(mapping, 16)
+    cob_id = bytes.fromhex(on)
+    off = cob_id[:3] + bytes([cob_id[3] | 0x80])
+    sdo.write((head, 1), off)
+    sdo.write((body, 0), b"\0")
+    for sub, entry in enumerate(entries, 1):
+        sdo.write((body, sub), bytes.fromhex(entry))
+    sdo.write((body, 0), bytes([len(entries)]))
+    sdo.write((head, 2), bytes.fromhex(kind))
+    sdo.write((head, 1), cob_id)
+
+
+def fastscan(sdo: SdoFrames, *address: str) -> None:
+    """Find the LSS address bit by bit (CiA 305, LSS fastscan)."""
+    if not _scan(sdo, 0, 0x80, 0, 0):
+        raise StepFailed("no answer to the start of the fastscan")
+    for sub, wanted in enumerate(address):
+        found = 0
+        for bit in range(31, -1, -1):
+            if not _scan(sdo, found, bit, sub, sub):
+                found |= 1 << bit
+        number = int.from_bytes(bytes.fromhex(wanted), "little")
+        if found != number:
+            raise StepFailed(f"found {found:X}h as LSS sub {sub}, want {number:X}h")
+        if not _scan(sdo, found, 0, sub, (sub + 1) % 4):
+            raise StepFailed(f"LSS sub {sub} is not confirmed")
+
+
+def _scan(sdo: SdoFrames, number: int, bit: int, sub: int, following: int) -> bool:
+    text = "7E5#51" + (number.to_bytes(4, "little") + bytes([bit, sub, following])).hex()
+    sdo.exchange.send(CanFrame.parse(text))
+    sdo.exchange.wait(SCAN_MS)
+    answers = sdo.exchange.unread(FOUND[:3])
+    wrong = [text for _, text in answers if not matches(FOUND, text)]
+    answered = bool(answers)
+    answers.clear()
+    if wrong:
+        raise StepFailed(f"got {wrong[0]}, want {FOUND}")
+    return answered
+
+
+def _block(data: bytes, most: int) -> Iterator[bytes]:
+    for number, start in enumerate(range(0, min(len(data), SEGMENT_BYTES * most), 7), 1):
+        last = 0x80 if start + SEGMENT_BYTES >= len(data) else 0
+        part = data[start : start + SEGMENT_BYTES]
+        yield bytes([number | last]) + part.ljust(SEGMENT_BYTES, b"\0")
+
+
+def _mux(at: Address) -> bytes:
+    return bytes.fromhex(multiplexer(at))
+
+
+def _compare(got: bytes, wanted: bytes) -> None:
+    if got != wanted:
+        place = next((k for k, pair in enumerate(zip(got, wanted)) if pair[0] != pair[1]), len(got))
+        raise StepFailed(f"{len(got)} bytes, want {len(wanted)}; the first other one is {place}")
+
+
+MACROS: Final[dict[str, Callable[..., object]]] = {
+    "sync": sync,
+    "syncperiod": sync_period,
+    "segdn": download_segmented,
+    "segup": upload_pattern,
+    "blkdn": download_block,
+    "blkup": upload_block_pattern,
+    "upload": upload_segmented,
+    "blockup": upload_same,
+    "map": remap,
+    "fastscan": fastscan,
+}

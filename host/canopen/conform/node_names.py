@@ -1,0 +1,117 @@
+"""What the names in checks stand for on one node: its COB-IDs, and what was bound to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from typing import Final
+
+from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
+from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
+from tickrig.host.canopen.conform.notation.names import Address, Unbound
+from tickrig.host.canopen.conform.sample_values import sample_value
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+
+EMCY_COB_ID: Final = 0x80
+SYNC_COB_ID: Final = 0x80
+HIGHEST_NODE_ID: Final = 127
+IDENTITY: Final = ("vendor", "product", "revision", "serial")
+
+ReadNumber = Callable[[int, int], int | None]
+"""Reads an unsigned number of the node by index and sub-index, None if it has none."""
+
+
+class NodeNames:
+    """The `Names` of a node.
+
+    Args:
+        node_id: of the node, 1..127.
+        binding: objects and PDOs by name.
+        number: reads the node.
+        others: node-IDs that were heard on the bus.
+    """
+
+    def __init__(
+        self, node_id: int, binding: Binding, number: ReadNumber, others: Collection[int] = ()
+    ) -> None:
+        self._binding = binding
+        self._texts: Mapping[str, str] = {
+            **_connection_set(node_id, number),
+            **_peer(node_id, others),
+            **_identity(number),
+        }
+
+    def text(self, name: str, attribute: str) -> str:
+        """Return what stands for `$name.attribute`, in hex as it goes over the bus."""
+        if not attribute and name in self._texts:
+            return self._texts[name]
+        bound = self._bound(name)
+        if isinstance(bound, BoundPdo):
+            return _pdo_text(name, attribute, bound)
+        if not attribute:
+            return f"{bound.index & 0xFF:02X}{bound.index >> 8:02X}{bound.sub:02X}"
+        if not isinstance(bound, BoundObject):
+            raise Unbound(name, f"nothing is there that has a {attribute}")
+        return sample_value(name, attribute, bound)
+
+    def address(self, name: str) -> Address:
+        """Return index and sub-index of an object."""
+        bound = self._bound(name)
+        return bound.index, 0 if isinstance(bound, BoundPdo) else bound.sub
+
+    def _bound(self, name: str) -> object:
+        try:
+            return self._binding.bound[name]
+        except KeyError:
+            reason = self._binding.reasons.get(name, "no check has such a name")
+            raise Unbound(name, reason) from None
+
+
+def _connection_set(node_id: int, number: ReadNumber) -> dict[str, str]:
+    emcy, sync = number(0x1014, 0), number(0x1005, 0)
+    return {
+        "node": f"{node_id:02X}",
+        "request": f"{REQUEST_COB_ID + node_id:03X}",
+        "response": f"{RESPONSE_COB_ID + node_id:03X}",
+        "heartbeat": f"{ERROR_CONTROL_COB_ID + node_id:03X}",
+        "emcy": f"{_can_id(emcy) or EMCY_COB_ID + node_id:03X}",
+        "sync": f"{_can_id(sync) or SYNC_COB_ID:03X}",
+    }
+
+
+def _can_id(cob_id: int | None) -> int:
+    return 0 if cob_id is None or cob_id & EXTENDED else cob_id & CAN_ID_MASK
+
+
+def _peer(node_id: int, others: Collection[int]) -> dict[str, str]:
+    """Choose a node-ID that nobody has: for a node that the tester plays."""
+    free = [n for n in range(HIGHEST_NODE_ID - 1, 0, -1) if n != node_id and n not in others]
+    if not free:
+        return {}
+    return {"peer": f"{free[0]:02X}", "peer_heartbeat": f"{ERROR_CONTROL_COB_ID + free[0]:03X}"}
+
+
+def _identity(number: ReadNumber) -> dict[str, str]:
+    numbers = {name: number(0x1018, sub) for sub, name in enumerate(IDENTITY, 1)}
+    return {name: _u32(value) for name, value in numbers.items() if value is not None}
+
+
+def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
+    if not pdo.can_id:
+        raise Unbound(name, f"{pdo.index:04X}h has no CAN-ID")
+    cob_id = pdo.cob_id & ~INVALID
+    texts = {
+        "comm": f"{pdo.index:04X}",
+        "map": f"{pdo.mapping_index:04X}",
+        "id": f"{pdo.can_id:03X}",
+        "on": _u32(cob_id),
+        "off": _u32(cob_id | INVALID),
+        "rtr": _u32(cob_id & ~FLAG_30),
+        "data": "00" * pdo.size,
+    }
+    return texts[attribute]
+
+
+def _u32(number: int) -> str:
+    return number.to_bytes(4, "little").hex().upper()

@@ -1,0 +1,55 @@
+"""What the words of macros say before they are played: what is written, and how long it lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from tickrig.host.canopen.conform.notation.names import Address
+
+DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
+MAP: Final = "map"
+
+PER_BYTE_US: Final = 2_500
+"""What a byte of a transfer takes at most: two frames for seven, at 30 % of 125 kbit/s."""
+TRANSFER_MS: Final = 5_000
+
+
+def written_by(name: str, *words: Any) -> tuple[Address, ...]:
+    """Return what a bound macro writes.
+
+    >>> written_by("segdn", (0x2008, 0), "1000"), written_by("segup", (0x2008, 0), "1000")
+    (((8200, 0),), ())
+    """
+    if name in DOWNLOADS:
+        return (words[0],)
+    if name == MAP:
+        communication, mapping = int(words[0], 16), int(words[1], 16)
+        objects = words[4:]
+        entries = ((mapping, sub) for sub in range(len(objects) + 1))
+        return ((communication, 1), (communication, 2), *entries)
+    return ()
+
+
+def longest_ms(name: str, words: Sequence[Any]) -> int:
+    """Return how long a bound macro lasts at most."""
+    return _LONGEST_MS[name](words)
+
+
+def _transfer(words: Sequence[Any]) -> int:
+    size = int(words[1]) if len(words) > 1 else 0
+    return TRANSFER_MS + size * PER_BYTE_US // 1_000
+
+
+_LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
+    "sync": lambda words: 20 * int(words[1]),
+    "syncperiod": lambda words: 100 * int(words[2]),
+    "segdn": _transfer,
+    "segup": _transfer,
+    "blkdn": _transfer,
+    "blkup": _transfer,
+    "upload": _transfer,
+    "blockup": _transfer,
+    "fastscan": lambda words: 10_000,
+    MAP: lambda words: TRANSFER_MS,
+}

@@ -1,0 +1,1 @@
+"""What may be done to the node, and how it is put back as it was."""

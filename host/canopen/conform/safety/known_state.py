@@ -1,0 +1,106 @@
+"""The state in which each check begins, and the one in which the node is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
+from tickrig.host.canopen.conform.notation.names import Address
+from tickrig.host.canopen.conform.safety.write_order import Values, in_order
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed
+from tickrig.wire.canopen.cob_id import FLAG_30
+
+SYNC_COB_ID: Final = (0x1005, 0)
+QUIET: Final = (
+    (0x1006, 0),
+    (0x100C, 0),
+    (0x100D, 0),
+    (0x1015, 0),
+    (0x1017, 0),
+    (0x1019, 0),
+    (0x1029, 1),
+)
+"""Objects that are 0 when a check begins: no SYNC, guarding or heartbeat by itself."""
+CONSUMERS: Final = 0x1016
+
+
+class KnownState:
+    """Values of the node before the run, and in the state in which checks begin.
+
+    Args:
+        exchange: the bus.
+        client: reads and writes the node.
+
+    Attributes:
+        unrestored: what could not be written back, one a line.
+    """
+
+    def __init__(self, exchange: Exchange, client: SdoClient) -> None:
+        self._exchange, self._client = exchange, client
+        self._original: Values = {}
+        self._begin: Values = {}
+        self.unrestored: dict[str, None] = {}
+
+    def learn(self, addresses: Iterable[Address]) -> None:
+        """Read objects that are not known yet; what cannot be read is not restored."""
+        for at in addresses:
+            if at not in self._original:
+                value = self._read(at)
+                if value is not None:
+                    self._original[at] = self._begin[at] = value
+
+    def prepare(self) -> None:
+        """Bring what is known into the state in which checks begin."""
+        for at, value in self._original.items():
+            if at in QUIET or at[0] == CONSUMERS and at[1]:
+                self._begin[at] = bytes(len(value))
+            elif at == SYNC_COB_ID:
+                number = int.from_bytes(value, "little") & ~FLAG_30
+                self._begin[at] = number.to_bytes(len(value), "little")
+        left = self._write_back(self._begin, self._begin)
+        for at in left:
+            self._begin[at] = self._original[at]
+
+    def tidy(self, addresses: Iterable[Address] | None) -> None:
+        """Bring objects into the state in which checks begin; all that are known if None."""
+        touched = self._begin if addresses is None else addresses
+        self._write_back(self._begin, [at for at in touched if at in self._begin])
+
+    def restore(self) -> None:
+        """Bring all objects into the state before the run, and tell what could not be."""
+        for at in self._write_back(self._original, self._original):
+            value = self._original[at].hex().upper()
+            self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value}"] = None
+
+    def give_up(self) -> None:
+        """Tell all that is not as it was, as far as anybody knows: the node is gone."""
+        for at, value in self._original.items():
+            if self._begin[at] != value:
+                self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value.hex().upper()}"] = None
+
+    def _write_back(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
+        """Write what differs; return what differs still."""
+        wrong = self._differing(target, addresses)
+        if not wrong:
+            return []
+        for at, value in in_order({at: target[at] for at in wrong}, self._number):
+            try:
+                self._client.download(*at, value)
+            except (SdoAborted, NotAllowed):
+                continue  # told below, if it differs still
+        return self._differing(target, wrong)
+
+    def _differing(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
+        return [at for at in addresses if self._read(at) != target[at]]
+
+    def _number(self, at: Address) -> int:
+        return int.from_bytes(self._read(at) or b"", "little")
+
+    def _read(self, at: Address) -> bytes | None:
+        try:
+            return self._client.upload(*at)
+        except SdoAborted:
+            return None

@@ -1,0 +1,185 @@
+"""Brings the node into the state in which checks begin, gets it back, and leaves it as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.canopen.conform.bus.exchange import MS_US, Exchange
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation.bound_check import BoundCheck
+from tickrig.host.canopen.conform.notation.names import Address
+from tickrig.host.canopen.conform.safety.known_state import KnownState
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
+from tickrig.wire.can import data_frame
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand, NmtState
+
+SETTLE_MS: Final = 20
+"""So long after an NMT command a node is in its new state."""
+
+CARE_US: Final = 60_000_000
+"""So long may it take to write everything back."""
+
+RETURN_MS: Final = 3_000
+"""So long may a node take to come back after a reset."""
+
+GONE_MS: Final = 10_000
+"""So long is waited at the end for a node that was lost, to restore it."""
+
+TRIES: Final = 2
+PROBE_MS: Final = 50
+HEARTBEAT: Final = (0x1017, 0)
+ERROR_REGISTER: Final = (0x1001, 0)
+HISTORY: Final = (0x1003, 0)
+DEVICE_TYPE: Final = (0x1000, 0)
+
+TO_STATE: Final = {
+    NmtState.OPERATIONAL: NmtCommand.START,
+    NmtState.STOPPED: NmtCommand.STOP,
+}
+
+
+class NodeCare:
+    """Cares for one node during a run.
+
+    Args:
+        exchange: the bus.
+        client: reads and writes the node.
+        node_id: of the node, 1..127.
+        level: of the run; at READ_ONLY nothing is done but reading.
+
+    Attributes:
+        lost: the node does not answer any more.
+    """
+
+    def __init__(
+        self, exchange: Exchange, client: SdoClient, node_id: int, level: Level
+    ) -> None:
+        self._exchange, self._client, self._node_id = exchange, client, node_id
+        self._level, self._state = level, KnownState(exchange, client)
+        self._nmt_state: NmtState | None = None
+        self._errors = 0
+        self.lost = False
+
+    @property
+    def unrestored(self) -> tuple[str, ...]:
+        """What could not be written back, one a line."""
+        return tuple(self._state.unrestored)
+
+    def prepare(self, addresses: Iterable[Address]) -> None:
+        """Learn how the node is, and bring it into the state in which checks begin.
+
+        Args:
+            addresses: of the objects that may change in the run.
+        """
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(CARE_US)
+        self._state.learn(addresses)
+        self._nmt_state = self._learn_state()
+        self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._state.prepare()
+        self._errors = self._client.number(*ERROR_REGISTER) or 0
+
+    def begin(self, bound: BoundCheck) -> None:
+        """Learn what a check may change, if that is not known yet."""
+        if self._level is not Level.READ_ONLY:
+            self._exchange.begin(CARE_US)
+            self._state.learn(bound.written)
+
+    def tidy(self, bound: BoundCheck, boots_before: int) -> None:
+        """Bring the node back after a check; `lost` is set if it cannot be."""
+        changed = bound.resets or self._exchange.boots != boots_before
+        self._exchange.begin(CARE_US)
+        try:
+            self._tidy(None if changed else bound.written)
+        except (SdoFailed, StepFailed):
+            self._recover()
+
+    def restore(self) -> None:
+        """Leave the node as it was before the run, as far as can be."""
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(CARE_US)
+        if self.lost and not self._answers(GONE_MS):
+            self._state.give_up()
+            return
+        try:
+            self._client.abort()
+            self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+            self._state.restore()
+            if self._nmt_state in TO_STATE:
+                self._command(TO_STATE[self._nmt_state])
+        except (SdoFailed, StepFailed):
+            self._state.give_up()
+
+    def _tidy(self, touched: Iterable[Address] | None) -> None:
+        self._client.abort()
+        if self._level is Level.READ_ONLY:
+            self._client.upload(*DEVICE_TYPE)
+            return
+        self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._state.tidy(touched)
+        if self._has_errors():
+            self._command(NmtCommand.RESET_COMMUNICATION)
+            self._answers(RETURN_MS)
+            self._state.tidy(None)
+
+    def _has_errors(self) -> bool:
+        """Say whether a check left an error behind; the history of errors is emptied."""
+        number = self._client.number(*ERROR_REGISTER)
+        if number is None:
+            self._client.upload(*DEVICE_TYPE)  # absent, or is the node gone?
+        return number not in (None, self._errors)
+
+    def _recover(self) -> None:
+        """Try to get a node back that does not answer."""
+        commands = [NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE]
+        for command in commands[: int(self._level)] or [None]:
+            self._exchange.begin(CARE_US)
+            if command is not None:
+                self._command(command)
+            if self._answers(RETURN_MS):
+                try:
+                    self._tidy(None)
+                except (SdoFailed, StepFailed):
+                    continue
+                return
+        self.lost = True
+
+    def _answers(self, within_ms: int) -> bool:
+        """Wait until the node answers to SDO again."""
+        until_us = self._exchange.now_us + within_ms * MS_US
+        while True:
+            try:
+                self._client.upload(*DEVICE_TYPE)
+            except SdoAborted:
+                return True
+            except SdoTimeout:
+                if self._exchange.now_us >= until_us:
+                    return False
+                self._exchange.wait(PROBE_MS)
+            else:
+                return True
+
+    def _learn_state(self) -> NmtState | None:
+        """Learn the NMT state from a heartbeat, which is switched on for the purpose."""
+        before = self._client.number(*HEARTBEAT)
+        if before is None:
+            return None
+        try:
+            self._client.download(*HEARTBEAT, PROBE_MS.to_bytes(2, "little"))
+            pattern = f"{ERROR_CONTROL_COB_ID + self._node_id:03X}#.."
+            text = self._exchange.expect([pattern], 3 * PROBE_MS)
+            return NmtState(int(text[-2:], 16) & 0x7F)
+        except (SdoFailed, StepFailed, ValueError):
+            return None
+
+    def _command(self, command: NmtCommand) -> None:
+        try:
+            self._exchange.send(data_frame(NMT_COB_ID, bytes((command, self._node_id))))
+        except NotAllowed:
+            return
+        self._exchange.wait(SETTLE_MS)

@@ -1,0 +1,99 @@
+"""What a level lets through to the bus: looked at frame by frame, behind all checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Final
+
+from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
+from tickrig.host.canopen.conform.check import Level
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID
+from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
+from tickrig.wire.canopen.sdo.sdo_command import (
+    REQUEST_COB_ID,
+    SPECIFIER,
+    ClientCommand,
+    index_sub,
+)
+
+UPLOADS: Final = frozenset(
+    {
+        ClientCommand.UPLOAD,
+        ClientCommand.UPLOAD_SEGMENT,
+        ClientCommand.BLOCK_UPLOAD,
+        ClientCommand.ABORT,
+    }
+)
+DOWNLOADS: Final = frozenset({ClientCommand.DOWNLOAD, ClientCommand.BLOCK_DOWNLOAD})
+
+PROFILE: Final = 0x6000
+MANUFACTURER: Final = 0x2000
+PROGRAMS: Final = range(0x1F50, 0x1F5A)
+"""Program download and control: nothing here is for a tester."""
+STORAGE: Final = (0x1010, 0x1011)
+
+Confirm = Callable[[str], bool]
+
+
+class Permission:
+    """Looks at each frame before it is sent.
+
+    Args:
+        level: of the run.
+        allow: indices of the profile area that may be written.
+        node_id: of the node under test.
+        confirm: is asked, once, before each thing that concerns other nodes.
+    """
+
+    def __init__(
+        self, level: Level, allow: Collection[int], node_id: int, confirm: Confirm
+    ) -> None:
+        self._level, self._allow, self._node_id = level, allow, node_id
+        self._confirm = confirm
+        self._answers: dict[str, bool] = {}
+
+    def check(self, frame: CanFrame) -> None:
+        """Let a frame pass, or raise NotAllowed."""
+        is_request = frame.can_id == REQUEST_COB_ID + self._node_id and not frame.extended
+        if self._level is Level.READ_ONLY:
+            if not is_request or frame.remote or not _is_upload(frame.data):
+                raise NotAllowed(f"{frame} is more than reading: --communication")
+        elif frame.can_id == NMT_COB_ID and not frame.extended:
+            self._check_nmt(frame.data)
+        elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:
+            raise NotAllowed("LSS may change the node-ID: --intrusive")
+        elif is_request and len(frame.data) > 3 and frame.data[0] & SPECIFIER in DOWNLOADS:
+            self.check_write(index_sub(frame.data)[0], refused=True)
+
+    def check_write(self, index: int, *, refused: bool = False) -> None:
+        """Let an object be written, or raise NotAllowed.
+
+        Args:
+            index: of the object.
+            refused: the node must refuse it.
+        """
+        if index in PROGRAMS:
+            raise NotAllowed(f"{index:04X}h is of program download, which is never written")
+        if index >= PROFILE and index not in self._allow:
+            raise NotAllowed(f"{index:04X}h may move something: --allow {index:04X}h")
+        beyond = index in STORAGE or (MANUFACTURER <= index < PROFILE and not refused)
+        if beyond and self._level < Level.INTRUSIVE:
+            raise NotAllowed(f"{index:04X}h would be written: --intrusive")
+
+    def check_confirmed(self, question: str) -> None:
+        """Ask a person, once; NotAllowed if the answer is no."""
+        if question not in self._answers:
+            self._answers[question] = self._confirm(question)
+        if not self._answers[question]:
+            raise NotAllowed(f"{question}: nobody said yes (--yes)")
+
+    def _check_nmt(self, data: bytes) -> None:
+        if data[:1] == bytes([NmtCommand.RESET_NODE]) and self._level < Level.INTRUSIVE:
+            raise NotAllowed("resets the node: --intrusive")
+        if data[1:2] == bytes([ALL_NODES]):
+            self.check_confirmed("NMT command to all nodes")
+
+
+def _is_upload(data: bytes) -> bool:
+    return bool(data) and data[0] & SPECIFIER in UPLOADS

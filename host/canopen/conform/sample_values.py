@@ -1,0 +1,80 @@
+"""Values with which an object of a node is written: allowed ones, and such as must be refused."""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+from tickrig.host.canopen.conform.binding.binding import BoundObject
+from tickrig.host.canopen.conform.notation.names import Unbound
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+
+PATTERNS: Final = (bytes.fromhex("A5345678F1E2D3C4"), bytes.fromhex("5AC3877A1E2D3C4B"))
+"""Two values no byte of which is another's: what is swapped or cut is seen."""
+TEXTS: Final = (b"conformance", b"tested node")
+BOOLEANS: Final = (b"\x01", b"\x00")
+REALS: Final = (1.5, -2.25)
+FORMATS: Final = {DataType.REAL32: "<f", DataType.REAL64: "<d"}
+
+
+def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
+    """Return a value in hex as it goes over the bus.
+
+    Args:
+        name: in the check, for the message.
+        attribute: `new` or `other`, two allowed values; `old`, what it held; `low` and `high`;
+            `below` and `above` them; `map`, its mapping entry; `size`, of the value, in 32 bits.
+        bound: the object.
+
+    Raises:
+        Unbound: it has no such value.
+    """
+    entry = bound.entry
+    match attribute:
+        case "map":
+            index = entry.index.to_bytes(2, "little")
+            return bytes([entry.data_type.bits, entry.sub, *index]).hex().upper()
+        case "new" | "other":
+            return _allowed(name, entry, ("new", "other").index(attribute)).hex().upper()
+        case "old" if bound.value is not None:
+            return bound.value.hex().upper()
+        case "size" if bound.value is not None:
+            return len(bound.value).to_bytes(4, "little").hex().upper()
+        case "low" | "high" | "below" | "above":
+            return _limit(name, entry, attribute).hex().upper()
+    raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has no {attribute}")
+
+
+def _allowed(name: str, entry: EntryDescription, number: int) -> bytes:
+    kind = entry.data_type
+    if kind is DataType.BOOLEAN:
+        return BOOLEANS[number]
+    if kind in FORMATS:
+        return struct.pack(FORMATS[kind], REALS[number])
+    if not kind.is_integer:
+        return TEXTS[number][: entry.max_bytes]
+    if entry.low is None and entry.high is None:
+        return PATTERNS[number][: kind.size]
+    low, high = _limits(entry)
+    value = (low, high)[number]
+    if low == high:
+        raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has only the value {low}")
+    return value.to_bytes(kind.size, "little", signed=kind.signed)
+
+
+def _limits(entry: EntryDescription) -> tuple[int, int]:
+    kind = entry.data_type
+    lowest = -1 << kind.bits - 1 if kind.signed else 0
+    highest = lowest + (1 << kind.bits) - 1
+    low = lowest if entry.low is None else int(entry.low)
+    return low, highest if entry.high is None else int(entry.high)
+
+
+def _limit(name: str, entry: EntryDescription, attribute: str) -> bytes:
+    low, high = _limits(entry)
+    value = {"low": low, "high": high, "below": low - 1, "above": high + 1}[attribute]
+    try:
+        return value.to_bytes(entry.size, "little", signed=entry.signed)
+    except OverflowError:
+        raise Unbound(name, f"nothing is {attribute} the limits of {entry.index:04X}h") from None
