@@ -2,28 +2,166 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 from typing import Final
 
-from tickrig.host.canopen.conform.binding.binding import Binding, bind
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
-from tickrig.host.canopen.conform.check import STIMULUS, Check, Level
+from tickrig.host.canopen.conform.check import Check
 from tickrig.host.canopen.conform.judge import Judge
-from tickrig.host.canopen.conform.node_names import NodeNames
-from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
-from tickrig.host.canopen.conform.notation.names import Address, Unbound
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
+from tickrig.host.canopen.conform.settings import describe_settings
+from tickrig.host.canopen.conform.subject import Subject, examine
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedLink
-from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+
+LISTEN_MS: Final = 1_000
+"""So long is only listened at first: who else is on the bus?"""
+
+EXAMINE_US: Final = 120_000_000
+"""So long may it take to read the node before the first check."""
+
+MakeChecks = Callable[[Subject], Iterable[Check]]
+
+
+class ConformRun:
+    """Judges one node.
+
+    Args:
+        link: the bus; nobody else may read from this link.
+        node_id: of the node, 1..127.
+        plan: what was chosen.
+        device: what the EDS says of the node, None to ask the node itself.
+        eds: the file that says it.
+        source: the bus, as the user named it.
+        more: makes further checks of what was found, as those of each object.
+        on_result: called with each result when it is there.
+    """
+
+    def __init__(  # noqa: PLR0913 - a run, by keyword
+        self,
+        link: StampedLink,
+        node_id: int,
+        plan: Plan,
+        *,
+        device: EdsDevice | None = None,
+        eds: EdsFile | None = None,
+        source: str = "",
+        more: MakeChecks = lambda subject: (),
+        on_result: Callable[[Result], object] = lambda result: None,
+    ) -> None:
+        self._node_id, self._plan, self._source = node_id, plan, source
+        self._device, self._eds, self._more, self._on_result = device, eds, more, on_result
+        self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm)
+        self._exchange = Exchange(
+            link,
+            node_id,
+            bit_rate=plan.bit_rate or ASSUMED_BIT_RATE,
+            max_load=plan.max_load,
+            permit=self._permission.check,
+            resolution_us=plan.resolution_us,
+        )
+        self._client = SdoClient(self._exchange, node_id)
+        self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
+        player = Player(self._exchange, node_id, plan.stimulus)
+        self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
+        self._results: list[Result] = []
+        self._subject: Subject | None = None
+
+    def disturb(self, reason: str) -> None:
+        """Let the check under way be inconclusive if it fails: the adapter lost frames, or such."""
+        self._exchange.disturb(reason)
+
+    def run(self) -> Report:
+        """Judge the node and return the report; whatever happens, what was changed is restored.
+
+        Ctrl-C ends it with a report of what was judged; a second one, while the node is being
+        restored, leaves the node as it is.
+        """
+        aborted = ""
+        try:
+            self._run()
+        except KeyboardInterrupt:
+            aborted = "interrupted"
+        except LinkClosed as error:
+            aborted = str(error)
+        finally:
+            self._restore()
+        return self._report(aborted)
+
+    def _run(self) -> None:
+        self._exchange.begin(EXAMINE_US)
+        self._exchange.wait(LISTEN_MS)
+        self._permission.others = frozenset(self._exchange.others)
+        try:
+            self._examine()
+        except (SdoFailed, StepFailed) as error:
+            self._block([*_suite()], str(error))
+            return
+        assert self._subject is not None
+        checks = [*_suite(), *self._more(self._subject)]
+        self._judge_all([check for check in checks if self._plan.chooses(check)])
+
+    def _examine(self) -> None:
+        self._subject = examine(
+            *(self._client, self._node_id, self._plan),
+            *(self._device, self._eds, self._exchange.others),
+        )
+        self._care.prepare(self._subject.restorable(self._plan.level))
+
+    def _judge_all(self, checks: list[Check]) -> None:
+        assert self._subject is not None
+        until_us = self._exchange.now_us + self._judge.bound_us(checks, self._subject)
+        for number, check in enumerate(checks):
+            if self._care.lost:
+                self._block(checks[number:], "the node does not answer any more")
+                return
+            if self._exchange.now_us > until_us:
+                self._block(checks[number:], "the run took too long")
+                return
+            self._keep(self._judge.result(check, self._subject))
+
+    def _block(self, checks: list[Check], reason: str) -> None:
+        for check in checks:
+            if self._plan.chooses(check):
+                self._keep(Result(check, Outcome(Verdict.BLOCKED, reason)))
+
+    def _keep(self, result: Result) -> None:
+        self._results.append(result)
+        self._on_result(result)
+
+    def _restore(self) -> None:
+        try:
+            self._care.restore()
+        except (KeyboardInterrupt, LinkClosed):
+            self._care.give_up()
+
+    def _report(self, aborted: str) -> Report:
+        subject = self._subject
+        findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
+        return Report(
+            self._source,
+            self._node_id,
+            self._plan.level,
+            tuple(self._results),
+            node=subject.about if subject else {},
+            settings=describe_settings(self._plan, self._exchange.others, self._judge.longest_us),
+            findings=findings,
+            unrestored=self._care.unrestored,
+            duration_us=self._exchange.now_us - self._exchange.start_us,
+            aborted=aborted,
+        )
+
+
+def _suite() -> list[Check]:
+    return [check for group in read_suite() for check in group.checks]

@@ -1,35 +1,110 @@
-"""Judges one check: plays its steps, and says what came of them."""
+"""Judges one check: may it be done, what came of it, and once more if it failed."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
-from tickrig.host.canopen.conform.notation.bound_check import BoundCheck
-from tickrig.host.canopen.conform.verdict import Outcome, Verdict
+from tickrig.host.canopen.conform.check import STIMULUS, Check
+from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
+from tickrig.host.canopen.conform.notation.names import Unbound
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.safety.node_care import CARE_US, NodeCare
+from tickrig.host.canopen.conform.safety.permission import Permission
+from tickrig.host.canopen.conform.subject import Subject
+from tickrig.host.canopen.conform.verdict import Outcome, Result, Verdict
+
+CARE_SHARE_US: Final = 2_000_000
+"""What is reckoned for each go at a check, to bring the node back after it."""
 
 
 class Judge:
     """Plays checks on a node that is in the state in which each begins.
 
     Args:
+        plan: of the run.
         exchange: the bus.
         player: plays steps on it.
+        care: brings the node back after a check.
+        permission: says what may be written.
+
+    Attributes:
+        longest_us: how long the checks of the run may last at most.
     """
 
-    def __init__(self, exchange: Exchange, player: Player) -> None:
-        self._exchange, self._player = exchange, player
+    def __init__(
+        self,
+        plan: Plan,
+        exchange: Exchange,
+        player: Player,
+        care: NodeCare,
+        permission: Permission,
+    ) -> None:
+        self._plan, self._exchange, self._player = plan, exchange, player
+        self._care, self._permission = care, permission
+        self.longest_us = 0
 
-    def judge(self, bound: BoundCheck) -> Outcome:
-        """Play a check once."""
-        self._exchange.begin(bound.can_ids)
-        start_us = self._exchange.now_us
+    def bound_us(self, checks: Iterable[Check], subject: Subject) -> int:
+        """Return how long checks may last at most, each done twice."""
+        self.longest_us = CARE_US
+        for check in checks:
+            bound = self._bind(check, subject)
+            if isinstance(bound, BoundCheck):
+                self.longest_us += 2 * (bound.within_us + CARE_SHARE_US)
+        return self.longest_us
+
+    def result(self, check: Check, subject: Subject) -> Result:
+        """Judge a check; one that failed is done again, and both are told."""
+        bound = self._bind(check, subject)
+        if isinstance(bound, str):
+            return Result(check, Outcome(Verdict.NOT_APPLICABLE, bound))
+        first = self._go(bound)
+        if first.verdict is not Verdict.FAIL or self._care.lost:
+            return Result(check, first)
+        again = self._go(bound)
+        if again.verdict is Verdict.PASS:
+            reason = f"passed when it was done again; before: {first.reason}"
+            again = replace(again, verdict=Verdict.INCONCLUSIVE, reason=reason)
+        return Result(check, again, first)
+
+    def _bind(self, check: Check, subject: Subject) -> BoundCheck | str:
+        """Return the check with the numbers of the node, or why it cannot be done."""
+        for word in sorted(check.needs - subject.features.words):
+            if word != STIMULUS:
+                return subject.features.reasons.get(word, f"the node has no {word}")
+            if self._plan.stimulus is None:
+                return "needs somebody at the inputs of the device: --stimulus"
+        try:
+            bound = bind_check(check, subject.names)
+            for index, _ in sorted(bound.changed):
+                self._permission.check_write(index)
+            for index, _ in sorted(bound.written - bound.changed):
+                self._permission.check_write(index, refused=True)
+            for question in sorted(bound.questions):
+                self._permission.check_confirmed(question)
+        except Unbound as error:
+            return error.reason
+        except NotAllowed as error:
+            return str(error)
+        return bound
+
+    def _go(self, bound: BoundCheck) -> Outcome:
+        """Do a check once, and bring the node back."""
+        self._care.begin(bound)
+        if self._care.lost:
+            return Outcome(Verdict.BLOCKED, "the node does not answer any more")
+        boots = self._exchange.boots
+        self._exchange.begin(bound.within_us, bound.can_ids)
+        start_us, begun_us = self._exchange.now_us, self._exchange.start_us
         verdict, reason = self._play(bound)
-        begun_us = self._exchange.start_us
-        lines = self._exchange.evidence.lines()
-        return Outcome(
-            verdict, reason, lines, start_us - begun_us, self._exchange.now_us - begun_us
-        )
+        lines, end_us = self._exchange.evidence.lines(), self._exchange.now_us
+        if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL:
+            verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
+        return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
 
     def _play(self, bound: BoundCheck) -> tuple[Verdict, str]:
         number = 0

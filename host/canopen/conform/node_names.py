@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
-from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
+from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject
 from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
 from tickrig.host.canopen.conform.notation.names import Address, Unbound
 from tickrig.host.canopen.conform.sample_values import sample_value
@@ -60,7 +60,7 @@ class NodeNames:
         bound = self._bound(name)
         return bound.index, 0 if isinstance(bound, BoundPdo) else bound.sub
 
-    def _bound(self, name: str) -> object:
+    def _bound(self, name: str) -> Bound:
         try:
             return self._binding.bound[name]
         except KeyError:

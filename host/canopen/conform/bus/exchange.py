@@ -12,9 +12,10 @@ from tickrig.host.canopen.conform.bus.evidence import Evidence
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
 from tickrig.host.canopen.conform.verdict import Direction
-from tickrig.host.links.link import StampedLink
+from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 from tickrig.wire.instant import NEVER
 
 MS_US: Final = 1_000
@@ -30,6 +31,9 @@ PERIOD_TOLERANCE: Final = 0.05
 
 NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
+
+NODES: Final = range(0x081, 0x780)
+"""CAN-IDs of the pre-defined connection set that belong to a node."""
 
 UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
@@ -50,6 +54,7 @@ class Exchange:
         evidence: of the check under way.
         disturbances: why the check under way cannot fail, each once.
         boots: boot-up messages of the node so far.
+        others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
     """
 
@@ -67,7 +72,8 @@ class Exchange:
         self._allowance, self._foreign = Allowance(bit_rate, max_load), ForeignLoad(bit_rate)
         self._permit, self._boot_up = permit, f"{ERROR_CONTROL_COB_ID + node_id:03X}#00"
         self.start_us = self._known_us = self._busy_us = link.now_us
-        self.deadline_us, self.boots = NEVER, 0
+        self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
+        self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -208,7 +214,14 @@ class Exchange:
         while self._known_us < until_us:
             self._listen(until_us)
 
-    def _listen(self, until_us: int) -> None:
+    def listen(self, until_us: int) -> tuple[int, StampedFrames]:
+        """Wait for a first frame; return a time, and all that had arrived by then."""
+        received = self._listen(until_us)
+        while not received and self._known_us < until_us:
+            received = self._listen(until_us)
+        return self._known_us, received
+
+    def _listen(self, until_us: int) -> StampedFrames:
         """Take what arrives, at most until a time, and see whether the host was late."""
         before_us = self.now_us
         if before_us > self.deadline_us:
@@ -222,18 +235,25 @@ class Exchange:
             self.disturb(f"this host was late by {gap_us / MS_US:.0f} ms")
         for at_us, frame in received:
             self._take(at_us, frame)
+        return received
 
     def _take(self, at_us: int, frame: CanFrame) -> None:
         text = str(frame)
         can_id = can_id_of(text)
         own = frame.can_id & NODE_ID_MASK == self._node_id and not frame.extended
+        own = own and can_id not in self._reserved
         if own or can_id in self._watched:
             self._unread[can_id].append((at_us, text))
             self.evidence.add(at_us - self.start_us, Direction.RECEIVED, text)
         if own:
             self._allowance.use(at_us, frame)
             self.boots += text == self._boot_up
-        elif self._foreign.add(at_us, frame):
+            return
+        if not frame.extended and NODES.start <= frame.can_id < NODES.stop:
+            self.others.add(frame.can_id & NODE_ID_MASK)
+        if can_id in self._reserved:
+            self.disturb(f"somebody else sent {text}")
+        if self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
 
 

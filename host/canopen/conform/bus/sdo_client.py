@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, TypeVar
-
+from tickrig.host.canopen.conform.binding.script_runner import ScriptRunner
 from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.canopen.sdo_transfer import download, upload
-from tickrig.wire.can import CanFrame, data_frame
+from tickrig.host.canopen.sdo_transfer import download
+from tickrig.host.links.link import StampedFrames
+from tickrig.wire.can import Frames, data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
-
-T = TypeVar("T")
-
-MOST_BYTES: Final = 64_000
-"""More is read of no object: a node that never says which segment is the last has an end."""
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 
 
-class SdoClient:
+class SdoClient(ScriptRunner):
     """The client of the default SDO server of a node.
 
     Args:
@@ -28,24 +22,15 @@ class SdoClient:
     """
 
     def __init__(self, exchange: Exchange, node_id: int) -> None:
-        self._exchange, self._node_id = exchange, node_id
-        self._response = f"{RESPONSE_COB_ID + node_id:03X}"
-
-    def upload(self, index: int, sub: int) -> bytes:
-        """Read an object.
-
-        Raises:
-            SdoAborted: the node refuses.
-            SdoTimeout: it does not answer.
-        """
-        return self._run(upload(index, sub))
+        super().__init__(ExchangeLink(exchange), node_id)
+        self._exchange, self._request = exchange, REQUEST_COB_ID + node_id
 
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write an object; raises as `upload`."""
-        self._run(download(index, sub, data))
+        self.run(download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number, None if the node has none there."""
+        """Return an unsigned number, None if the node gives none."""
         try:
             return int.from_bytes(self.upload(index, sub), "little")
         except SdoFailed:
@@ -53,22 +38,32 @@ class SdoClient:
 
     def abort(self) -> None:
         """End a transfer that a check left open."""
-        frame = Abort(0, 0, AbortCode.GENERAL).encode()
-        self._exchange.send(data_frame(REQUEST_COB_ID + self._node_id, frame))
+        self._exchange.send(data_frame(self._request, Abort(0, 0, AbortCode.GENERAL).encode()))
 
-    def _run(self, script: Script[T]) -> T:
-        ended: list[Any] = []
-        exchange = self._exchange
-        exchange.unread(self._response).clear()
-        talk = Dialogue(self._node_id, lambda can_id, data: exchange.send(data_frame(can_id, data)))
-        talk.start(exchange.now_us, QueuedScript("", script, ended.append, ended.append))
-        while not ended:
-            text = exchange.next(self._response, talk.due_us)
-            if text is None:
-                talk.tick(talk.due_us)
-            else:
-                talk.receive_sdo(exchange.now_us, CanFrame.parse(text).data)
-        if isinstance(ended[0], Exception):
-            raise ended[0]
-        result: T = ended[0]
-        return result
+
+class ExchangeLink:
+    """The exchange as a `StampedLink`, with its limits, for who talks beside the checks."""
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+
+    @property
+    def now_us(self) -> int:
+        """Bus time."""
+        return self._exchange.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        """Send, when load and level allow it."""
+        for frame in traffic:
+            self._exchange.send(frame)
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        """Return what arrives first."""
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
+
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        """Return what arrives first, with its time."""
+        return self._exchange.listen(self.now_us + timeout_us)
+
+    def close(self) -> None:
+        """Leave the bus open: it is not ours."""

@@ -28,7 +28,17 @@ STIMULUS_MS: Final = 60_000
 LONGEST_TRANSFER_MS: Final = 3_000
 """So long may an object of a few bytes take."""
 
-WRITES: Final = frozenset({"write", "refuse write", "keep"})
+RESETS: Final = ("000#81", "000#82")
+NMT: Final = "000"
+LSS: Final = "7E5"
+STORAGE: Final = (0x1010, 0x1011)
+
+NMT_TO_ALL: Final = "send NMT commands to all nodes of the bus"
+LSS_TO_ALL: Final = "send LSS requests, which every node of the bus takes"
+SYNC_TO_ALL: Final = "send SYNC, which every node of the bus takes"
+STORED: Final = "store parameters in the node, in place of those stored before"
+"""What a person is asked."""
+
 
 @dataclass(frozen=True, slots=True)
 class BoundCheck:
@@ -37,7 +47,9 @@ class BoundCheck:
     Attributes:
         check: as it is written down.
         steps: with numbers; an object is its index and sub-index.
-        written: objects that it may change, whether or not the node should let it.
+        changed: objects that it writes.
+        written: these, and those that the node must refuse to write, or may.
+        questions: what a person is asked before it.
         can_ids: of the frames that it looks at.
         within_us: how long it may last at most.
         resets: it may reset the node, so that all its values change.
@@ -45,7 +57,9 @@ class BoundCheck:
 
     check: Check
     steps: tuple[Mapping[str, Any], ...]
+    changed: frozenset[Address]
     written: frozenset[Address]
+    questions: frozenset[str]
     can_ids: frozenset[str]
     within_us: int
     resets: bool
@@ -54,11 +68,19 @@ class BoundCheck:
 def bind_check(check: Check, names: Names) -> BoundCheck:
     """Put numbers in place of names; Unbound if the node has nothing for one."""
     steps = tuple(_bind_step(step, names) for step in check.steps)
-    request = resolve("$request", names)
-    written = frozenset(address for step in steps for address in _written(step, request))
-    can_ids = frozenset(text.partition("#")[0] for step in steps for text in _watched(step))
-    within_us = MARGIN_US + 1_000 * sum(map(_longest_ms, steps))
-    return BoundCheck(check, steps, written, can_ids, within_us, any(map(_resets, steps)))
+    request, sync = resolve("$request", names), resolve("$sync", names)
+    changed = frozenset(address for step in steps for address in _changed(step, request))
+    refused = frozenset(step["refuse write"] for step in steps if "refuse write" in step)
+    return BoundCheck(
+        check,
+        steps,
+        changed,
+        changed | refused,
+        frozenset(question for step in steps for question in _questions(step, sync)),
+        frozenset(text.partition("#")[0] for step in steps for text in _watched(step)),
+        MARGIN_US + 1_000 * sum(map(_longest_ms, steps)),
+        any(map(_resets, steps)),
+    )
 
 
 def _bind_step(step: Step, names: Names) -> Mapping[str, Any]:
@@ -99,17 +121,32 @@ def _longest_ms(step: Step) -> int:
 
 
 def _resets(step: Step) -> bool:
-    return "app" in step or str(step.get("send", ""))[:6] in ("000#81", "000#82")
+    return "app" in step or str(step.get("send", ""))[:6] in RESETS
 
 
-def _written(step: Mapping[str, Any], request: str) -> Iterator[Address]:
-    for key in WRITES & step.keys():
-        yield step[key]
+def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
+    for key in ("write", "keep"):
+        if key in step:
+            yield step[key]
     if "macro" in step:
         yield from written_by(*step["macro"])
     can_id, _, data = str(step.get("send", "")).partition("#")
-    if can_id == request and len(data) >= 8 and data[0] in "23CDcd":
+    if can_id == request and len(data) >= 8 and data[0] in "23CD":
         yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
+
+
+def _questions(step: Mapping[str, Any], sync: str) -> Iterator[str]:
+    """Yield what concerns other nodes, or cannot be undone."""
+    can_id, _, data = str(step.get("send", "")).partition("#")
+    macro = step.get("macro", [""])
+    if can_id == NMT and data[2:4] == "00":
+        yield NMT_TO_ALL
+    if can_id == LSS or macro[0] == "fastscan":
+        yield LSS_TO_ALL
+    if can_id == sync or macro[0] in ("sync", "syncperiod"):
+        yield SYNC_TO_ALL
+    if step.get("write", (0, 0))[0] in STORAGE:
+        yield STORED
 
 
 def _watched(step: Mapping[str, Any]) -> Iterator[str]:

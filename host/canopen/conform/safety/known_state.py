@@ -7,10 +7,10 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.safety.write_order import Values, in_order
-from tickrig.host.canopen.errors import SdoAborted, SdoFailed
+from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen.cob_id import FLAG_30
 
 SYNC_COB_ID: Final = (0x1005, 0)
@@ -55,7 +55,7 @@ class KnownState:
     def prepare(self) -> None:
         """Bring what is known into the state in which checks begin."""
         for at, value in self._original.items():
-            if at in QUIET or at[0] == CONSUMERS and at[1]:
+            if at in QUIET or (at[0] == CONSUMERS and at[1]):
                 self._begin[at] = bytes(len(value))
             elif at == SYNC_COB_ID:
                 number = int.from_bytes(value, "little") & ~FLAG_30

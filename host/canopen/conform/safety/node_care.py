@@ -35,6 +35,13 @@ ERROR_REGISTER: Final = (0x1001, 0)
 HISTORY: Final = (0x1003, 0)
 DEVICE_TYPE: Final = (0x1000, 0)
 
+RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
+    Level.READ_ONLY: (None,),
+    Level.COMMUNICATION: (NmtCommand.RESET_COMMUNICATION,),
+    Level.INTRUSIVE: (NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE),
+}
+"""What is tried to get a node back that does not answer."""
+
 TO_STATE: Final = {
     NmtState.OPERATIONAL: NmtCommand.START,
     NmtState.STOPPED: NmtCommand.STOP,
@@ -54,9 +61,7 @@ class NodeCare:
         lost: the node does not answer any more.
     """
 
-    def __init__(
-        self, exchange: Exchange, client: SdoClient, node_id: int, level: Level
-    ) -> None:
+    def __init__(self, exchange: Exchange, client: SdoClient, node_id: int, level: Level) -> None:
         self._exchange, self._client, self._node_id = exchange, client, node_id
         self._level, self._state = level, KnownState(exchange, client)
         self._nmt_state: NmtState | None = None
@@ -84,19 +89,28 @@ class NodeCare:
         self._errors = self._client.number(*ERROR_REGISTER) or 0
 
     def begin(self, bound: BoundCheck) -> None:
-        """Learn what a check may change, if that is not known yet."""
-        if self._level is not Level.READ_ONLY:
-            self._exchange.begin(CARE_US)
+        """Learn what a check may change, if that is not known yet; `lost` if it cannot be."""
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(CARE_US)
+        try:
             self._state.learn(bound.written)
+        except (SdoFailed, StepFailed):
+            self._recover()
 
-    def tidy(self, bound: BoundCheck, boots_before: int) -> None:
-        """Bring the node back after a check; `lost` is set if it cannot be."""
+    def give_up(self) -> None:
+        """Tell what is not as it was: nobody can write it back."""
+        self._state.give_up()
+
+    def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
+        """Bring the node back after a check; False, and it is lost, if it cannot be."""
         changed = bound.resets or self._exchange.boots != boots_before
         self._exchange.begin(CARE_US)
         try:
             self._tidy(None if changed else bound.written)
         except (SdoFailed, StepFailed):
             self._recover()
+        return not self.lost
 
     def restore(self) -> None:
         """Leave the node as it was before the run, as far as can be."""
@@ -136,8 +150,7 @@ class NodeCare:
 
     def _recover(self) -> None:
         """Try to get a node back that does not answer."""
-        commands = [NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE]
-        for command in commands[: int(self._level)] or [None]:
+        for command in RECOVERY[self._level]:
             self._exchange.begin(CARE_US)
             if command is not None:
                 self._command(command)

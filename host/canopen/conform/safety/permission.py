@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation.bound_check import NMT_TO_ALL, SYNC_TO_ALL
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
@@ -43,7 +44,10 @@ class Permission:
         level: of the run.
         allow: indices of the profile area that may be written.
         node_id: of the node under test.
-        confirm: is asked, once, before each thing that concerns other nodes.
+        confirm: is asked, once, before each thing that concerns other nodes or is not undone.
+
+    Attributes:
+        others: node-IDs that were on the bus.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class Permission:
         self._level, self._allow, self._node_id = level, allow, node_id
         self._confirm = confirm
         self._answers: dict[str, bool] = {}
+        self.others: frozenset[int] = frozenset()
 
     def check(self, frame: CanFrame) -> None:
         """Let a frame pass, or raise NotAllowed."""
@@ -82,17 +87,22 @@ class Permission:
             raise NotAllowed(f"{index:04X}h would be written: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
-        """Ask a person, once; NotAllowed if the answer is no."""
+        """Ask a person, once; NotAllowed if the answer is no.
+
+        SYNC is not asked for where nobody else is on the bus.
+        """
+        if question == SYNC_TO_ALL and not self.others:
+            return
         if question not in self._answers:
             self._answers[question] = self._confirm(question)
         if not self._answers[question]:
-            raise NotAllowed(f"{question}: nobody said yes (--yes)")
+            raise NotAllowed(f"would {question}: nobody said yes (--yes)")
 
     def _check_nmt(self, data: bytes) -> None:
         if data[:1] == bytes([NmtCommand.RESET_NODE]) and self._level < Level.INTRUSIVE:
             raise NotAllowed("resets the node: --intrusive")
         if data[1:2] == bytes([ALL_NODES]):
-            self.check_confirmed("NMT command to all nodes")
+            self.check_confirmed(NMT_TO_ALL)
 
 
 def _is_upload(data: bytes) -> bool:

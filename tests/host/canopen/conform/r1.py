@@ -1,9 +1,10 @@
-"""R1, the reference slave, on a rig in virtual time, and what names stand for on it."""
+"""R1, the reference slave, on a rig in virtual time, under the tester."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
 from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
@@ -13,7 +14,13 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.canopen.conform.notation.names import Address, Unbound
+from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.verdict import Report
+from tickrig.host.canopen.eds import open_eds
+from tickrig.wire.canopen.eds.eds_device import read_device
+
+EDS: Final = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 
 
 class R1:
@@ -26,31 +33,23 @@ class R1:
     def __init__(
         self, needs: Iterable[str] = (), application: type[Application] = Application
     ) -> None:
-        self.slave: CanopenSlave = make_slave(
-            make_dictionary(frozenset(needs)), NODE_ID, application=application
-        )
-        wire = CanWire()
-        self.rig = Rig(Station(self.slave, wire.end()))
-        self.link = CanHost(self.rig, wire.end())
+        dictionary = make_dictionary(frozenset(needs))
+        self.slave: CanopenSlave = make_slave(dictionary, NODE_ID, application=application)
+        self.wire = CanWire()
+        self.rig = Rig(Station(self.slave, self.wire.end()))
+        self.link = CanHost(self.rig, self.wire.end())
         self.rig.run_for(100_000)
 
+    def values(self) -> dict[tuple[int, int], bytes]:
+        """Return what all its objects hold."""
+        return {(e.index, e.sub): e.data for e in self.slave.dictionary}
 
-class R1Names:
-    """The names of the communication profile on node 5."""
+    def judge(self, plan: Plan, **given: Any) -> Report:
+        """Run the tester against it."""
+        file = open_eds(EDS)
+        device = read_device(file)
+        return ConformRun(self.link, NODE_ID, plan, device=device, eds=file, **given).run()
 
-    TEXTS: Final = {
-        ("node", ""): "05",
-        ("request", ""): "605",
-        ("response", ""): "585",
-        ("heartbeat", ""): "705",
-        ("emcy", ""): "085",
-    }
 
-    def text(self, name: str, attribute: str) -> str:
-        try:
-            return self.TEXTS[name, attribute]
-        except KeyError:
-            raise Unbound(name, "not of the table of R1") from None
-
-    def address(self, name: str) -> Address:
-        raise Unbound(name, "not of the table of R1")
+def yes(question: str) -> bool:
+    return True

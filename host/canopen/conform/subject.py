@@ -1,0 +1,85 @@
+"""The node under test: what it has, and what it says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.host.canopen.conform.binding.binding import Binding, bind
+from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.node_names import NodeNames
+from tickrig.host.canopen.conform.notation.names import Address
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.safety.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
+from tickrig.host.canopen.errors import SdoFailed
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+
+TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
+IDENTITY: Final = ("vendor", "product", "revision", "serial")
+COMMUNICATION: Final = 0x1000
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What was found out about the node before the first check.
+
+    Attributes:
+        binding: its objects by name.
+        features: what it can do.
+        names: what stands for names in checks.
+        about: what it says of itself, by name, for people.
+    """
+
+    binding: Binding
+    features: Features
+    names: NodeNames
+    about: dict[str, str]
+
+    def restorable(self, level: Level) -> Iterator[Address]:
+        """Yield objects that a run may change, be it by a reset: read before, written after."""
+        highest = PROFILE if level is Level.INTRUSIVE else MANUFACTURER
+        for entry in self.binding.device.entries:
+            inside = COMMUNICATION <= entry.index < highest and entry.index not in PROGRAMS
+            value = entry.data_type is not DataType.DOMAIN and entry.index not in STORAGE
+            if inside and value and entry.readable and entry.writable:
+                yield entry.index, entry.sub
+
+
+def examine(  # noqa: PLR0913, PLR0917 - all that is known
+    client: SdoClient,
+    node_id: int,
+    plan: Plan,
+    device: EdsDevice | None,
+    eds: EdsFile | None,
+    others: Collection[int],
+) -> Subject:
+    """Find out what a node has; it is only read.
+
+    Raises:
+        SdoTimeout: it does not answer.
+    """
+    binding = bind(device, client.upload, allow=plan.allow)
+    features = find_features(binding, client, eds)
+    names = NodeNames(node_id, binding, client.number, others)
+    return Subject(binding, features, names, dict(_about(client)))
+
+
+def _about(client: SdoClient) -> Iterator[tuple[str, str]]:
+    device_type = client.number(0x1000, 0)
+    if device_type is not None:
+        yield "device type", f"{device_type:08X}h"
+    for index, name in TEXTS.items():
+        try:
+            text = client.upload(index, 0).decode("latin-1")
+        except SdoFailed:
+            continue
+        yield name, "".join(c for c in text if c.isprintable())
+    for sub, name in enumerate(IDENTITY, 1):
+        number = client.number(0x1018, sub)
+        if number is not None:
+            yield name, f"{number:08X}h"
