@@ -121,7 +121,7 @@ class ConformRun:
 
     def _judge_all(self, checks: list[Check]) -> None:
         assert self._subject is not None
-        until_us = self._exchange.now_us + self._judge.bound_us(checks, self._subject)
+        until_us = self._exchange.start_us + round(self._plan.longest_s * 1e6)
         for number, check in enumerate(checks):
             if self._care.lost:
                 self._block(checks[number:], "the node does not answer any more")
@@ -155,7 +155,7 @@ class ConformRun:
             self._plan.level,
             tuple(self._results),
             node=subject.about if subject else {},
-            settings=describe_settings(self._plan, self._exchange.others, self._judge.longest_us),
+            settings=describe_settings(self._plan, self._exchange.others),
             findings=findings,
             unrestored=self._care.unrestored,
             duration_us=self._exchange.now_us - self._exchange.start_us,

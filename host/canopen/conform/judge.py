@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
-from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
@@ -13,13 +12,10 @@ from tickrig.host.canopen.conform.check import STIMULUS, Check
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
 from tickrig.host.canopen.conform.notation.names import Unbound
 from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.safety.node_care import CARE_US, NodeCare
+from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.subject import Subject
 from tickrig.host.canopen.conform.verdict import Outcome, Result, Verdict
-
-CARE_SHARE_US: Final = 2_000_000
-"""What is reckoned for each go at a check, to bring the node back after it."""
 
 
 class Judge:
@@ -31,9 +27,6 @@ class Judge:
         player: plays steps on it.
         care: brings the node back after a check.
         permission: says what may be written.
-
-    Attributes:
-        longest_us: how long the checks of the run may last at most.
     """
 
     def __init__(
@@ -46,16 +39,6 @@ class Judge:
     ) -> None:
         self._plan, self._exchange, self._player = plan, exchange, player
         self._care, self._permission = care, permission
-        self.longest_us = 0
-
-    def bound_us(self, checks: Iterable[Check], subject: Subject) -> int:
-        """Return how long checks may last at most, each done twice."""
-        self.longest_us = CARE_US
-        for check in checks:
-            bound = self._bind(check, subject)
-            if isinstance(bound, BoundCheck):
-                self.longest_us += 2 * (bound.within_us + CARE_SHARE_US)
-        return self.longest_us
 
     def result(self, check: Check, subject: Subject) -> Result:
         """Judge a check; one that failed is done again, and both are told."""
@@ -80,6 +63,8 @@ class Judge:
                 return "needs somebody at the inputs of the device: --stimulus"
         try:
             bound = bind_check(check, subject.names)
+            if (missing := subject.missing(bound.changed | bound.read)) is not None:
+                return f"the node has no {missing}"
             for index, _ in sorted(bound.changed):
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):
@@ -101,6 +86,7 @@ class Judge:
         self._exchange.begin(bound.within_us, bound.can_ids)
         start_us, begun_us = self._exchange.now_us, self._exchange.start_us
         verdict, reason = self._play(bound)
+        self._end(bound)
         lines, end_us = self._exchange.evidence.lines(), self._exchange.now_us
         if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
@@ -111,7 +97,8 @@ class Judge:
         try:
             for step in bound.steps:
                 number += 1
-                self._player.play(step)
+                if "finally" not in step:
+                    self._player.play(step)
         except NotAllowed as error:
             return Verdict.NOT_APPLICABLE, str(error)
         except Disturbed as error:
@@ -119,6 +106,13 @@ class Judge:
         except StepFailed as error:
             return self._failed(bound, f"step {number}: {error}")
         return Verdict.PASS, ""
+
+    def _end(self, bound: BoundCheck) -> None:
+        """Do what is done at the end, however the check went."""
+        for step in bound.steps:
+            if "finally" in step:
+                with suppress(StepFailed, Disturbed, NotAllowed):
+                    self._player.play(step)
 
     def _failed(self, bound: BoundCheck, reason: str) -> tuple[Verdict, str]:
         if self._exchange.disturbances:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
-from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject
+from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject, BoundPlace
 from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
 from tickrig.host.canopen.conform.notation.names import Address, Unbound
 from tickrig.host.canopen.conform.sample_values import sample_value
@@ -15,6 +15,12 @@ from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
 
 EMCY_COB_ID: Final = 0x80
 SYNC_COB_ID: Final = 0x80
+RPDO1: Final = 0x200
+RPDO2: Final = 0x300
+TPDO1: Final = 0x180
+TPDO2: Final = 0x280
+FREE_CAN_ID: Final = 0x6A2
+"""A CAN-ID that is neither restricted nor of the pre-defined connection set."""
 HIGHEST_NODE_ID: Final = 127
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
@@ -49,6 +55,8 @@ class NodeNames:
         bound = self._bound(name)
         if isinstance(bound, BoundPdo):
             return _pdo_text(name, attribute, bound)
+        if attribute == "map" and isinstance(bound, BoundPlace):
+            return f"08{bound.sub:02X}{bound.index & 0xFF:02X}{bound.index >> 8:02X}"
         if not attribute:
             return f"{bound.index & 0xFF:02X}{bound.index >> 8:02X}{bound.sub:02X}"
         if not isinstance(bound, BoundObject):
@@ -70,13 +78,24 @@ class NodeNames:
 
 def _connection_set(node_id: int, number: ReadNumber) -> dict[str, str]:
     emcy, sync = number(0x1014, 0), number(0x1005, 0)
+    emcy_id, sync_id = _can_id(emcy) or EMCY_COB_ID + node_id, _can_id(sync) or SYNC_COB_ID
     return {
         "node": f"{node_id:02X}",
+        "request_cob": _u32(REQUEST_COB_ID + node_id),
+        "response_cob": _u32(RESPONSE_COB_ID + node_id),
+        "rpdo1_cob": _u32(RPDO1 + node_id),
+        "tpdo1_cob": _u32(TPDO1 + node_id | FLAG_30),
+        "tpdo1_rtr_cob": _u32(TPDO1 + node_id),
+        "rpdo2": f"{RPDO2 + node_id:03X}",
+        "tpdo2": f"{TPDO2 + node_id:03X}",
+        "emcy_default": _u32(EMCY_COB_ID + node_id),
+        "emcy_off": _u32(emcy_id | INVALID),
+        "sync_on": _u32(sync_id | FLAG_30),
         "request": f"{REQUEST_COB_ID + node_id:03X}",
         "response": f"{RESPONSE_COB_ID + node_id:03X}",
         "heartbeat": f"{ERROR_CONTROL_COB_ID + node_id:03X}",
-        "emcy": f"{_can_id(emcy) or EMCY_COB_ID + node_id:03X}",
-        "sync": f"{_can_id(sync) or SYNC_COB_ID:03X}",
+        "emcy": f"{emcy_id:03X}",
+        "sync": f"{sync_id:03X}",
     }
 
 
@@ -94,7 +113,10 @@ def _peer(node_id: int, others: Collection[int]) -> dict[str, str]:
 
 def _identity(number: ReadNumber) -> dict[str, str]:
     numbers = {name: number(0x1018, sub) for sub, name in enumerate(IDENTITY, 1)}
-    return {name: _u32(value) for name, value in numbers.items() if value is not None}
+    texts = {name: _u32(value) for name, value in numbers.items() if value is not None}
+    if (serial := numbers["serial"]) is not None:
+        texts["other_serial"] = _u32(serial ^ 1)
+    return texts
 
 
 def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
@@ -108,9 +130,19 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
         "on": _u32(cob_id),
         "off": _u32(cob_id | INVALID),
         "rtr": _u32(cob_id & ~FLAG_30),
-        "data": "00" * pdo.size,
+        "nortr": _u32(cob_id | FLAG_30),
+        "long": _u32(cob_id | EXTENDED),
+        "moved": _u32(cob_id & ~CAN_ID_MASK | FREE_CAN_ID),
+        "movedid": f"{FREE_CAN_ID:03X}",
+        "first": _first(pdo),
     }
     return texts[attribute]
+
+
+def _first(pdo: BoundPdo) -> str:
+    """Return the first object that a PDO carries, as `6000:01`."""
+    mapped = pdo.mapping[0] if pdo.mapping else 0
+    return f"{mapped >> 16:04X}:{mapped >> 8 & 0xFF:02X}"
 
 
 def _u32(number: int) -> str:

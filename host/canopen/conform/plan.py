@@ -9,7 +9,10 @@ from fnmatch import fnmatchcase
 from tickrig.host.canopen.conform.check import Check, Level
 
 Stimulus = Callable[..., str]
-"""Moves the inputs of the device: takes words as `input 6000:01 01`, returns what it answers."""
+"""Moves the inputs of the device: takes words as `input 6000:01 01`, returns what it answers.
+
+Raises ValueError for what it cannot do.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +28,7 @@ class Plan:
         seed: of the random part.
         stimulus: moves the inputs of the device, None if nobody can.
         confirm: is asked before what concerns other nodes or cannot be undone; no says no.
+        longest_s: after so long no further check is begun.
         resolution_us: of the time stamps of the adapter.
     """
 
@@ -36,6 +40,7 @@ class Plan:
     seed: int = 0
     stimulus: Stimulus | None = None
     confirm: Callable[[str], bool] = lambda question: False
+    longest_s: float = 1_800
     resolution_us: int = 1_000
 
     def chooses(self, check: Check) -> bool:

@@ -24,7 +24,7 @@ def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
     Args:
         name: in the check, for the message.
         attribute: `new` or `other`, two allowed values; `old`, what it held; `low` and `high`;
-            `below` and `above` them; `map`, its mapping entry; `size`, of the value, in 32 bits.
+            `below` and `above` them; `map`, its mapping entry; `longmap`, one twice as long.
         bound: the object.
 
     Raises:
@@ -32,15 +32,13 @@ def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
     """
     entry = bound.entry
     match attribute:
-        case "map":
-            index = entry.index.to_bytes(2, "little")
-            return bytes([entry.data_type.bits, entry.sub, *index]).hex().upper()
+        case "map" | "longmap":
+            bits = entry.data_type.bits << (attribute == "longmap")
+            return bytes([bits, entry.sub, *entry.index.to_bytes(2, "little")]).hex().upper()
         case "new" | "other":
             return _allowed(name, entry, ("new", "other").index(attribute)).hex().upper()
         case "old" if bound.value is not None:
             return bound.value.hex().upper()
-        case "size" if bound.value is not None:
-            return len(bound.value).to_bytes(4, "little").hex().upper()
         case "low" | "high" | "below" | "above":
             return _limit(name, entry, attribute).hex().upper()
     raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has no {attribute}")

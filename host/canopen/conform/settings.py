@@ -9,16 +9,13 @@ from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
 from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
 from tickrig.host.canopen.conform.plan import Plan
 
-MINUTE_US = 60_000_000
 
-
-def describe_settings(plan: Plan, others: Collection[int], longest_us: int) -> dict[str, str]:
+def describe_settings(plan: Plan, others: Collection[int]) -> dict[str, str]:
     """Return bit rate, limits and tolerances of a run.
 
     Args:
         plan: what was chosen.
         others: node-IDs that were on the bus.
-        longest_us: how long the run would have lasted at most.
     """
     rate = f"{plan.bit_rate} bit/s" if plan.bit_rate else f"{ASSUMED_BIT_RATE} bit/s, assumed"
     nodes = ", ".join(str(node) for node in sorted(set(others) - {0})) or "none"
@@ -30,6 +27,6 @@ def describe_settings(plan: Plan, others: Collection[int], longest_us: int) -> d
         "answers": f"within {ANSWER_MS} ms, where the check says nothing else",
         "periods": f"mean within {PERIOD_TOLERANCE:.0%}",
         "late host": f"{HOST_GAP_US / MS_US:g} ms make a failure inconclusive",
-        "longest run": f"{longest_us / MINUTE_US:.0f} min",
+        "longest run": f"{plan.longest_s / 60:g} min; then the rest is blocked",
         "seed": str(plan.seed),
     }

@@ -21,6 +21,7 @@ from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
+MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 COMMUNICATION: Final = 0x1000
 
 
@@ -39,6 +40,14 @@ class Subject:
     features: Features
     names: NodeNames
     about: dict[str, str]
+
+    def missing(self, addresses: Collection[Address]) -> str | None:
+        """Return the first object of these that the node does not have, for people."""
+        has = {(entry.index, entry.sub) for entry in self.binding.device.entries}
+        for index, sub in sorted(addresses):
+            if (index, sub) not in has and index not in MANDATORY:
+                return f"{index:04X}h:{sub:02X}"
+        return None
 
     def restorable(self, level: Level) -> Iterator[Address]:
         """Yield objects that a run may change, be it by a reset: read before, written after."""

@@ -9,6 +9,7 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.exchange import matches
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo.sdo_command import SEGMENT_BYTES
@@ -117,17 +118,25 @@ def upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> 
     _compare(upload_block(sdo, at, block), pattern(int(size)))
 
 
-def upload_same(sdo: SdoFrames, at: Address, block: str = "127") -> None:
+def upload_same(sdo: SdoFrames, at: Address, block: str = "127", crc: str = "") -> None:
     """Read in blocks, and in segments; it must be the same."""
-    _compare(upload_block(sdo, at, block), upload_segmented(sdo, at))
+    _compare(upload_block(sdo, at, block, crc), upload_segmented(sdo, at))
 
 
-def upload_block(sdo: SdoFrames, at: Address, block: str) -> bytes:
-    """Read in blocks with CRC whatever is there; return it."""
-    most = int(block)
-    sdo.say(bytes([0xA4, *_mux(at), most, 0, 0, 0]))
+def upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> bytes:
+    """Read in blocks whatever is there; return it.
+
+    Args:
+        sdo: the server.
+        at: the object.
+        block: segments of a block; `1,2`: of the first, and of each that follows.
+        crc: `without-crc`, or nothing.
+    """
+    most, following = int(block.split(",", maxsplit=1)[0]), int(block.rsplit(",", maxsplit=1)[-1])
+    sdo.say(bytes([0xA0 if crc else 0xA4, *_mux(at), most, 0, 0, 0]))
     answer = sdo.answer(f"C[2367]{multiplexer(at)}........")
-    checked, size = bool(answer[0] & 4), int.from_bytes(answer[4:], "little")
+    checked = bool(answer[0] & 4) and not crc
+    size = int.from_bytes(answer[4:], "little")
     sdo.say(bytes([0xA3, *bytes(7)]))
     data, number, last = b"", 0, False
     while not last:
@@ -138,8 +147,8 @@ def upload_block(sdo: SdoFrames, at: Address, block: str) -> bytes:
         if len(data) > MOST_BYTES:
             raise StepFailed(f"{len(data)} bytes, and still no last segment")
         if last or number == most:
-            sdo.say(bytes([0xA2, number, most, *bytes(5)]))
-            number = 0
+            sdo.say(bytes([0xA2, number, following, *bytes(5)]))
+            number, most = 0, following
     end = sdo.answer("[CD][159D]....0000000000")
     data = data[: len(data) - (end[0] >> 2 & 7)]
     wanted = crc_hqx(data, 0) if checked else 0
@@ -151,10 +160,9 @@ def upload_block(sdo: SdoFrames, at: Address, block: str) -> bytes:
     return data
 
 
-def remap(sdo: SdoFrames, comm: str, mapping: str, on: str, kind: str, *entries: str) -> None:
-    """Map objects by the procedure of CiA 301, and enable the PDO with a transmission type."""
-    head, body = int(comm, 16), int(mapping, 16)
-    cob_id = bytes.fromhex(on)
+def remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> None:
+    """Map objects by the procedure of CiA 301, and give the PDO its type and COB-ID."""
+    head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     off = cob_id[:3] + bytes([cob_id[3] | 0x80])
     sdo.write((head, 1), off)
     sdo.write((body, 0), b"\0")

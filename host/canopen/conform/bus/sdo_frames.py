@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
 from tickrig.wire.can import data_frame
@@ -70,6 +71,14 @@ class SdoFrames:
             last = start + SEGMENT_BYTES >= size
             head = toggle | (SEGMENT_BYTES - len(part) // 2) << 1 | last
             self.answer(f"{head:02X}{part:.<14}")
+
+    def read_other(self, at: Address, data: str) -> None:
+        """Read an object of at most 4 bytes; StepFailed if it holds what it must not."""
+        self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
+        head = f"{_sized(UPLOADED, len(data) // 2):02X}{multiplexer(at)}"
+        got = self.answer(f"{head}........")[4 : 4 + len(data) // 2]
+        if got == bytes.fromhex(data):
+            raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
 
     def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
         """Read an object; StepFailed unless it is refused with one of the codes."""

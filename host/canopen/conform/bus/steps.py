@@ -9,7 +9,7 @@ from typing import Any, Final
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.wire.can import CanFrame
 
 Stimulus = Callable[..., str]
@@ -64,6 +64,8 @@ class Player:
                 sdo.refuse_write(at, bytes.fromhex(data), codes)
             case {"read": at, "data": data}:
                 sdo.read(at, data)
+            case {"read": at, "not": data}:
+                sdo.read_other(at, data)
             case {"refuse read": at, "codes": codes}:
                 sdo.refuse_read(at, codes)
             case {"macro": [name, *words]}:
@@ -95,6 +97,9 @@ class Player:
         if self._stimulus is None:
             raise Disturbed("nobody is at the inputs")
         self._exchange.remark(" ".join(words))
-        answer = self._stimulus(*words)
-        self._exchange.excuse()
-        return answer
+        try:
+            return self._stimulus(*words)
+        except ValueError as error:
+            raise NotAllowed(f"nobody can do {' '.join(words)}: {error}") from error
+        finally:
+            self._exchange.excuse()

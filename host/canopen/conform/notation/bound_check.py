@@ -12,9 +12,11 @@ from tickrig.host.canopen.conform.notation.names import (
     NAME,
     Address,
     Names,
+    Unbound,
     resolve,
     resolve_address,
 )
+from tickrig.wire.canopen.sdo.sdo_command import SPECIFIER, ClientCommand
 
 TARGETS: Final = frozenset({"write", "read", "refuse write", "refuse read", "keep"})
 """Steps of an object; what their first word names is an address."""
@@ -25,9 +27,11 @@ MARGIN_US: Final = 2_000_000
 STIMULUS_MS: Final = 60_000
 """So long may the hand at the inputs take; a person is slow."""
 
-LONGEST_TRANSFER_MS: Final = 3_000
+LONGEST_TRANSFER_MS: Final = 2_000
 """So long may an object of a few bytes take."""
 
+BLOCK_ENDS: Final = 1
+"""Bit of a block download request that does not begin it."""
 RESETS: Final = ("000#81", "000#82")
 NMT: Final = "000"
 LSS: Final = "7E5"
@@ -48,6 +52,7 @@ class BoundCheck:
         check: as it is written down.
         steps: with numbers; an object is its index and sub-index.
         changed: objects that it writes.
+        read: objects that it reads, and that the node has to have.
         written: these, and those that the node must refuse to write, or may.
         questions: what a person is asked before it.
         can_ids: of the frames that it looks at.
@@ -58,6 +63,7 @@ class BoundCheck:
     check: Check
     steps: tuple[Mapping[str, Any], ...]
     changed: frozenset[Address]
+    read: frozenset[Address]
     written: frozenset[Address]
     questions: frozenset[str]
     can_ids: frozenset[str]
@@ -75,6 +81,7 @@ def bind_check(check: Check, names: Names) -> BoundCheck:
         check,
         steps,
         changed,
+        frozenset(step["read"] for step in steps if "read" in step),
         changed | refused,
         frozenset(question for step in steps for question in _questions(step, sync)),
         frozenset(text.partition("#")[0] for step in steps for text in _watched(step)),
@@ -101,7 +108,12 @@ def _bind(key: str, value: object, names: Names) -> object:
 def _bind_word(word: str, names: Names) -> object:
     """Bind a word of a macro: a name without attribute is an object."""
     match = NAME.fullmatch(word)
-    return resolve(word, names) if match is None or match[2] else names.address(match[1])
+    if match is None or match[3]:
+        return resolve(word, names)
+    try:
+        return names.address(match[1] or match[2])
+    except Unbound:
+        return resolve(word, names)
 
 
 def _longest_ms(step: Step) -> int:
@@ -131,8 +143,15 @@ def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
     if "macro" in step:
         yield from written_by(*step["macro"])
     can_id, _, data = str(step.get("send", "")).partition("#")
-    if can_id == request and len(data) >= 8 and data[0] in "23CD":
+    if can_id == request and len(data) >= 8 and _is_download(int(data[:2], 16)):
         yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
+
+
+def _is_download(command: int) -> bool:
+    """Return whether a request begins to write the object that it names."""
+    specifier = command & SPECIFIER
+    begins = specifier == ClientCommand.BLOCK_DOWNLOAD and not command & BLOCK_ENDS
+    return begins or specifier == ClientCommand.DOWNLOAD
 
 
 def _questions(step: Mapping[str, Any], sync: str) -> Iterator[str]:

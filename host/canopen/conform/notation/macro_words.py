@@ -9,6 +9,8 @@ from tickrig.host.canopen.conform.notation.names import Address
 
 DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
 MAP: Final = "map"
+TO_MAPPING: Final = 0x200
+"""A mapping parameter is so far behind its communication parameter."""
 
 PER_BYTE_US: Final = 2_500
 """What a byte of a transfer takes at most: two frames for seven, at 30 % of 125 kbit/s."""
@@ -24,9 +26,8 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
     if name in DOWNLOADS:
         return (words[0],)
     if name == MAP:
-        communication, mapping = int(words[0], 16), int(words[1], 16)
-        objects = words[4:]
-        entries = ((mapping, sub) for sub in range(len(objects) + 1))
+        communication = words[0][0]
+        entries = ((communication + TO_MAPPING, sub) for sub in range(len(words) - 2))
         return ((communication, 1), (communication, 2), *entries)
     return ()
 
@@ -37,8 +38,8 @@ def longest_ms(name: str, words: Sequence[Any]) -> int:
 
 
 def _transfer(words: Sequence[Any]) -> int:
-    size = int(words[1]) if len(words) > 1 else 0
-    return TRANSFER_MS + size * PER_BYTE_US // 1_000
+    """Return how long the pattern takes whose size is the second word."""
+    return TRANSFER_MS + int(words[1]) * PER_BYTE_US // 1_000
 
 
 _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
@@ -48,8 +49,8 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "segup": _transfer,
     "blkdn": _transfer,
     "blkup": _transfer,
-    "upload": _transfer,
-    "blockup": _transfer,
+    "upload": lambda words: TRANSFER_MS,
+    "blockup": lambda words: 2 * TRANSFER_MS,
     "fastscan": lambda words: 10_000,
     MAP: lambda words: TRANSFER_MS,
 }

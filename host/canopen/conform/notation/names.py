@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import Final, Protocol
 
-NAME: Final = re.compile(r"\$([a-z]\w*)(?:\.([a-z]+))?")
+NAME: Final = re.compile(r"\$(?:\{([a-z][a-z0-9_]*)\}|([a-z][a-z0-9_]*)(?:\.([a-z]+))?)")
+"""`$name`, `$name.attribute`, or `${name}` where a digit follows."""
 ADDRESS: Final = re.compile(r"([0-9A-F]{4}):([0-9A-F]{2})")
 
 Address = tuple[int, int]
@@ -48,14 +49,14 @@ def resolve(text: str, names: Names) -> str:
     """Replace all names in a text; Unbound if one has nothing."""
     if "$" not in text:
         return text
-    return NAME.sub(lambda match: names.text(match[1], match[2] or ""), text)
+    return NAME.sub(lambda match: names.text(match[1] or match[2], match[3] or ""), text)
 
 
 def resolve_address(target: str, names: Names) -> Address:
     """Return the address of `$name`, `1017:00` or `$tpdo.comm:01`."""
     match = NAME.fullmatch(target)
-    if match is not None:
-        return names.address(match[1])
+    if match is not None and not match[3]:
+        return names.address(match[1] or match[2])
     match = ADDRESS.fullmatch(resolve(target, names))
     if match is None:
         raise ValueError(f"{target!r} is no object like 1017:00 or $rw_u8")

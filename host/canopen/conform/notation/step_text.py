@@ -14,6 +14,9 @@ from typing import Final
 
 from tickrig.host.canopen.conform.check import Step
 
+FINALLY: Final = "finally "
+"""Begins a step that is done at the end, however the check went; it fails no check."""
+
 ANSWER_MS: Final = 1_000
 """How long is waited for an answer where a check says nothing: CiA 301 gives no time."""
 
@@ -24,6 +27,8 @@ def parse_step(line: str) -> Step:
     Raises:
         ValueError: it is none of the notation.
     """
+    if line.startswith(FINALLY):
+        return {**parse_step(line.removeprefix(FINALLY)), "finally": True}
     for pattern, make in _NOTATIONS:
         match = pattern.fullmatch(line)
         if match is not None:
@@ -82,6 +87,7 @@ _LINES: Final[tuple[tuple[str, Callable[..., Step]], ...]] = (
     (r"app: (.+)", lambda words: {"app": words.split()}),
     (r"macro (\w+)((?: \S+)*)", _macro),
     (r"write (\S+) (\S+)", lambda target, data: {"write": target, "data": data}),
+    (r"read (\S+) not (\S+)", lambda target, data: {"read": target, "not": data}),
     (r"read (\S+) (\S+)", lambda target, data: {"read": target, "data": data}),
     (r"refuse write (\S+) (\S+) (.+)", _refuse_write),
     (r"refuse read (\S+) (.+)", _refuse_read),

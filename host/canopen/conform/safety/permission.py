@@ -15,7 +15,6 @@ from tickrig.wire.canopen.sdo.sdo_command import (
     REQUEST_COB_ID,
     SPECIFIER,
     ClientCommand,
-    index_sub,
 )
 
 UPLOADS: Final = frozenset(
@@ -26,7 +25,6 @@ UPLOADS: Final = frozenset(
         ClientCommand.ABORT,
     }
 )
-DOWNLOADS: Final = frozenset({ClientCommand.DOWNLOAD, ClientCommand.BLOCK_DOWNLOAD})
 
 PROFILE: Final = 0x6000
 MANUFACTURER: Final = 0x2000
@@ -68,8 +66,6 @@ class Permission:
             self._check_nmt(frame.data)
         elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:
             raise NotAllowed("LSS may change the node-ID: --intrusive")
-        elif is_request and len(frame.data) > 3 and frame.data[0] & SPECIFIER in DOWNLOADS:
-            self.check_write(index_sub(frame.data)[0], refused=True)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
         """Let an object be written, or raise NotAllowed.
