@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
@@ -13,11 +14,13 @@ from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
 from tickrig.host.canopen.conform.check import Check
 from tickrig.host.canopen.conform.judge import Judge
 from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.objects.object_checks import object_checks
+from tickrig.host.canopen.conform.objects.object_steps import play_object_step
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.settings import describe_settings
-from tickrig.host.canopen.conform.subject import Subject, examine
+from tickrig.host.canopen.conform.subject.subject import Subject, examine
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.links.errors import LinkClosed
@@ -31,8 +34,6 @@ LISTEN_MS: Final = 1_000
 EXAMINE_US: Final = 120_000_000
 """So long may it take to read the node before the first check."""
 
-MakeChecks = Callable[[Subject], Iterable[Check]]
-
 
 class ConformRun:
     """Judges one node.
@@ -44,7 +45,6 @@ class ConformRun:
         device: what the EDS says of the node, None to ask the node itself.
         eds: the file that says it.
         source: the bus, as the user named it.
-        more: makes further checks of what was found, as those of each object.
         on_result: called with each result when it is there.
     """
 
@@ -57,11 +57,10 @@ class ConformRun:
         device: EdsDevice | None = None,
         eds: EdsFile | None = None,
         source: str = "",
-        more: MakeChecks = lambda subject: (),
         on_result: Callable[[Result], object] = lambda result: None,
     ) -> None:
         self._node_id, self._plan, self._source = node_id, plan, source
-        self._device, self._eds, self._more, self._on_result = device, eds, more, on_result
+        self._device, self._eds, self._on_result = device, eds, on_result
         self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm)
         self._exchange = Exchange(
             link,
@@ -73,7 +72,8 @@ class ConformRun:
         )
         self._client = SdoClient(self._exchange, node_id)
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
-        player = Player(self._exchange, node_id, plan.stimulus)
+        more = partial(play_object_step, self._client)
+        player = Player(self._exchange, node_id, plan.stimulus, more)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
         self._results: list[Result] = []
         self._subject: Subject | None = None
@@ -109,7 +109,7 @@ class ConformRun:
             self._block([*_suite()], str(error))
             return
         assert self._subject is not None
-        checks = [*_suite(), *self._more(self._subject)]
+        checks = [*_suite(), *self._object_checks()]
         self._judge_all([check for check in checks if self._plan.chooses(check)])
 
     def _examine(self) -> None:
@@ -118,6 +118,12 @@ class ConformRun:
             *(self._device, self._eds, self._exchange.others),
         )
         self._care.prepare(self._subject.restorable(self._plan.level))
+
+    def _object_checks(self) -> tuple[Check, ...]:
+        """Make the checks of each object of the EDS; without one there are none."""
+        if self._device is None:
+            return ()
+        return object_checks(self._device, self._node_id, allow=self._plan.allow)
 
     def _judge_all(self, checks: list[Check]) -> None:
         assert self._subject is not None

@@ -14,7 +14,7 @@ from tickrig.host.canopen.conform.notation.names import Unbound
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
-from tickrig.host.canopen.conform.subject import Subject
+from tickrig.host.canopen.conform.subject.subject import Subject
 from tickrig.host.canopen.conform.verdict import Outcome, Result, Verdict
 
 
@@ -63,7 +63,7 @@ class Judge:
                 return "needs somebody at the inputs of the device: --stimulus"
         try:
             bound = bind_check(check, subject.names)
-            if (missing := subject.missing(bound.changed | bound.read)) is not None:
+            if (missing := subject.missing(bound.used)) is not None:
                 return f"the node has no {missing}"
             for index, _ in sorted(bound.changed):
                 self._permission.check_write(index)

@@ -10,6 +10,7 @@ from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.check import Step
 from tickrig.wire.can import CanFrame
 
 Stimulus = Callable[..., str]
@@ -25,10 +26,17 @@ class Player:
         exchange: the bus.
         node_id: of the node, 1..127.
         stimulus: moves the inputs of the device, None if nobody can.
+        play_more: does a step that is none of the notation.
     """
 
-    def __init__(self, exchange: Exchange, node_id: int, stimulus: Stimulus | None) -> None:
-        self._exchange, self._stimulus = exchange, stimulus
+    def __init__(
+        self,
+        exchange: Exchange,
+        node_id: int,
+        stimulus: Stimulus | None,
+        play_more: Callable[[Step], object],
+    ) -> None:
+        self._exchange, self._stimulus, self._play_more = exchange, stimulus, play_more
         self._sdo = SdoFrames(exchange, node_id)
 
     def play(self, step: Mapping[str, Any]) -> None:
@@ -73,7 +81,7 @@ class Player:
             case {"keep": _}:
                 pass
             case _:
-                raise ValueError(f"unknown step {step}")
+                self._play_more(step)
 
     def _act(self, verb: str, *words: str) -> None:
         """Let somebody move the inputs, or compare the outputs, of the device."""

@@ -18,8 +18,11 @@ from tickrig.host.canopen.conform.notation.names import (
 )
 from tickrig.wire.canopen.sdo.sdo_command import SPECIFIER, ClientCommand
 
-TARGETS: Final = frozenset({"write", "read", "refuse write", "refuse read", "keep"})
+TARGETS: Final = frozenset(
+    {"write", "read", "refuse write", "refuse read", "keep", "holds", "refuse rewrite"}
+)
 """Steps of an object; what their first word names is an address."""
+REFUSED: Final = ("refuse write", "refuse rewrite")
 
 MARGIN_US: Final = 2_000_000
 """Beyond the sum of all waits: for what is sent, when the load has to be kept low."""
@@ -52,7 +55,7 @@ class BoundCheck:
         check: as it is written down.
         steps: with numbers; an object is its index and sub-index.
         changed: objects that it writes.
-        read: objects that it reads, and that the node has to have.
+        used: objects that the node has to have.
         written: these, and those that the node must refuse to write, or may.
         questions: what a person is asked before it.
         can_ids: of the frames that it looks at.
@@ -63,7 +66,7 @@ class BoundCheck:
     check: Check
     steps: tuple[Mapping[str, Any], ...]
     changed: frozenset[Address]
-    read: frozenset[Address]
+    used: frozenset[Address]
     written: frozenset[Address]
     questions: frozenset[str]
     can_ids: frozenset[str]
@@ -76,12 +79,12 @@ def bind_check(check: Check, names: Names) -> BoundCheck:
     steps = tuple(_bind_step(step, names) for step in check.steps)
     request, sync = resolve("$request", names), resolve("$sync", names)
     changed = frozenset(address for step in steps for address in _changed(step, request))
-    refused = frozenset(step["refuse write"] for step in steps if "refuse write" in step)
+    refused = frozenset(step[key] for step in steps for key in REFUSED if key in step)
     return BoundCheck(
         check,
         steps,
         changed,
-        frozenset(step["read"] for step in steps if "read" in step),
+        frozenset(address for step in steps for address in _used(step)),
         changed | refused,
         frozenset(question for step in steps for question in _questions(step, sync)),
         frozenset(text.partition("#")[0] for step in steps for text in _watched(step)),
@@ -137,14 +140,18 @@ def _resets(step: Step) -> bool:
 
 
 def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
-    for key in ("write", "keep"):
-        if key in step:
-            yield step[key]
+    yield from (step[key] for key in ("write", "keep") if key in step)
     if "macro" in step:
         yield from written_by(*step["macro"])
     can_id, _, data = str(step.get("send", "")).partition("#")
     if can_id == request and len(data) >= 8 and _is_download(int(data[:2], 16)):
         yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
+
+
+def _used(step: Mapping[str, Any]) -> Iterator[Address]:
+    yield from (step[key] for key in ("write", "keep", "read") if key in step)
+    if "macro" in step:
+        yield from (word for word in step["macro"] if isinstance(word, tuple) and word[1])
 
 
 def _is_download(command: int) -> bool:

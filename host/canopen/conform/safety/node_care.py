@@ -129,13 +129,14 @@ class NodeCare:
         except (SdoFailed, StepFailed):
             self._state.give_up()
 
-    def _tidy(self, touched: Iterable[Address] | None) -> None:
+    def _tidy(self, addresses: Iterable[Address] | None) -> None:
         self._client.abort()
         if self._level is Level.READ_ONLY:
+            self._exchange.wait(SETTLE_MS)
             self._client.upload(*DEVICE_TYPE)
             return
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        self._state.tidy(touched)
+        self._state.tidy(addresses)
         if self._has_errors():
             self._command(NmtCommand.RESET_COMMUNICATION)
             self._answers(RETURN_MS)

@@ -16,13 +16,12 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.can import Frames
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
-from tickrig.wire.instant import NEVER
 
 EDS: Final = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 
@@ -69,23 +68,6 @@ class Stimulus:
         return f"{int(module.read('do')) >> 8 * (int(name[2:]) - 1) & 0xFF:02X}"
 
 
-class Powered:
-    """A slave with a switch in its supply."""
-
-    def __init__(self, slave: CanopenSlave) -> None:
-        self.slave, self.on, self.tick_us = slave, True, slave.tick_us
-
-    @property
-    def due_us(self) -> int:
-        return self.slave.due_us if self.on else NEVER
-
-    def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        return self.slave.tick(now_us, rx) if self.on else ()
-
-    def reset(self) -> None:
-        self.slave.reset()
-
-
 class R1:
     """R1 and its bus.
 
@@ -100,17 +82,16 @@ class R1:
         device_type: int = 0x000F_0191,
     ) -> None:
         dictionary = make_dictionary(frozenset(needs))
-        dictionary[0x1000, 0].assign(device_type.to_bytes(4, "little"))
         self.slave: CanopenSlave = make_slave(dictionary, NODE_ID, application=application)
         self.wire = CanWire()
-        self.powered = Powered(self.slave)
+        self.powered = PoweredSlave(self.slave)
         self.rig = Rig(Station(self.powered, self.wire.end()))
         self.link = CanHost(self.rig, self.wire.end())
         self.rig.run_for(100_000)
+        dictionary[0x1000, 0].assign(device_type.to_bytes(4, "little"))
 
     def power(self, *, on: bool) -> None:
-        self.powered.on = on
-        self.slave.reset()
+        self.powered.switch(on=on)
 
     def values(self) -> dict[tuple[int, int], bytes]:
         """Return what all its objects hold."""

@@ -10,10 +10,10 @@ from tickrig.host.canopen.conform.binding.binding import Binding, bind
 from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.node_names import NodeNames
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
+from tickrig.host.canopen.conform.subject.node_names import NodeNames
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice

@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject, BoundPlace
 from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
 from tickrig.host.canopen.conform.notation.names import Address, Unbound
-from tickrig.host.canopen.conform.sample_values import sample_value
+from tickrig.host.canopen.conform.subject.sample_values import sample_value
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID

@@ -1,0 +1,1 @@
+"""The node under test: what it has, and what stands for the names in checks."""
