@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from heapq import heappop, heappush
 from typing import Final
 
-from tickrig.device.twin import Part, state_of
+from tickrig.device.twin import Part, restore, state_of
 from tickrig.wire.instant import NEVER
 
 Action = Callable[[int], None]
@@ -43,6 +43,10 @@ class EventQueue(Part):
     def __getstate__(self) -> object:
         """Return the state without what was forgotten: it need not be copied."""
         return state_of(self, {"_heap": sorted(filter(self._holds, self._heap))})
+
+    def __setstate__(self, state: object) -> None:
+        """Go on with what was copied."""
+        restore(self, state)
 
     def drop(self, key: Hashable) -> None:
         """Forget an action; one that is not there is no error."""

@@ -90,6 +90,7 @@ class Rig(Copyable):
         event_queue: what is to be done between ticks.
         stations: the devices, each on its port.
         acting_us: the time for which an action of the event_queue is being done, else None.
+        in_step: whether a step is being done: what is called back then cannot wait.
         now_us: time since the start of the rig.
         worst_late_us: by how much the worst step was late.
         late_ticks: how many steps began more than `LATE_US` late.
@@ -110,6 +111,7 @@ class Rig(Copyable):
         self._late: deque[tuple[int, int]] = deque(maxlen=LATE_KEPT)
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
+        self.in_step = False
         self.hosts: Listeners[Host] = Listeners()
         self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
@@ -137,7 +139,7 @@ class Rig(Copyable):
     def __getstate__(self) -> object:
         """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
         begun = {"_bridges": (), "_clock": VirtualClock(), "_jumps": not self._dense}
-        return state_of(self, {**begun, "acting_us": None})
+        return state_of(self, {**begun, "acting_us": None, "in_step": False})
 
     def __setstate__(self, state: object) -> None:
         """Go on as the rig that was copied; its ports know no devices yet."""
@@ -295,10 +297,14 @@ class Rig(Copyable):
 
     def _happen(self, next_us: int) -> None:
         """Do what is due next: all actions of that time, or else its tick."""
-        if self.event_queue.due_us <= next_us:
-            self._act(next_us)
-        else:
-            self._run(next_us)
+        outer, self.in_step = self.in_step, True
+        try:
+            if self.event_queue.due_us <= next_us:
+                self._act(next_us)
+            else:
+                self._run(next_us)
+        finally:
+            self.in_step = outer
 
     def _act(self, now_us: int) -> None:
         """Do what is due at `now_us`, before the tick of that time."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from types import FrameType
 from typing import Final
 
 from tickrig.emulators.rig.rig import Rig
@@ -41,17 +39,8 @@ class RigPassing:
             HostTimeError: it is the rig that has called, in the middle of a step.
         """
         timeout_us = LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
-        if not _in_a_step():
+        if not self._rig.in_step:
             return self._rig.run_until(done, timeout_us)
         if timeout_us > LOOK_US:
             raise HostTimeError("what is called back while time passes cannot wait itself")
         return done()
-
-
-def _in_a_step() -> bool:
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None:
-        if frame.f_code is Rig._happen.__code__:
-            return True
-        frame = frame.f_back
-    return False
