@@ -55,22 +55,70 @@ class ParallelBuildExt(build_ext):
         super().build_extensions()
 
 
+TAKEN = "_init(PyObject *self, PyObject *args, PyObject *kwds)\n"
+"""What calls the `__init__` of a class begins so in what mypyc 2.4 writes."""
+
 INIT = re.compile(
-    r"(\w+)_init\(PyObject \*self, PyObject \*args, PyObject \*kwds\)\n\{\n    return 0;\n\}"
+    rf"(\w+){re.escape(TAKEN)}\{{\n    return (?:0|\w+\(self, args, kwds\) != NULL \? 0 : -1);\n\}}"
 )
 
 
-def call_init(source: Path) -> None:
-    """Mend what mypyc 2.4 writes: nobody calls the `__init__` of a class with `serializable`."""
-    text = source.read_text()
+STATE = "(PyCFunction)CPyPickle_SetState,"
+"""What gives a copy its state in what mypyc 2.4 writes; it assigns, which frozen values refuse."""
 
-    def mended(found: re.Match[str]) -> str:
-        init = f"CPyPy_{found[1]}_____init__"
-        if f"PyObject *ret = {init}(self, args, kwds)" in text:  # its `__new__` calls it
+HEADER = '#include "__native_internal_tickrig.h"\n'
+
+SET_STATE = """
+static PyObject *set_state(PyObject *copy, PyObject *state)
+{
+    PyObject *name, *value;
+    Py_ssize_t place = 0;
+    if (!PyDict_Check(state))
+        return PyErr_Format(PyExc_TypeError, "%.80R is no state of this build", state);
+    while (PyDict_Next(state, &place, &name, &value))
+        if (PyObject_GenericSetAttr(copy, name, value) != 0)
+            return NULL;
+    Py_RETURN_NONE;
+}
+"""
+
+
+def mend(sources: list[Path]) -> None:
+    """Let what mypyc 2.4 writes call each `__init__`, and copy what is frozen.
+
+    Raises:
+        SystemExit: it writes something else.
+    """
+    texts = {source: source.read_text() for source in sources}
+    for change in (calling_init, setting_state):
+        mended = {source: change(text) for source, text in texts.items()}
+        if mended == texts:
+            raise SystemExit(f"this mypyc writes nothing that {change.__name__} in setup.py mends")
+        texts = mended
+    for source, text in texts.items():
+        source.write_text(text)
+
+
+def calling_init(text: str) -> str:
+    """Return a source in which each `__init__` is called, also of classes with `serializable`."""
+
+    def called(found: re.Match[str]) -> str:
+        init = f"CPyPy_{found[1]}_____init__(self, args, kwds)"
+        if init in text:  # here or in its `__new__`
             return found[0]
-        return found[0].replace("return 0;", f"return {init}(self, args, kwds) == NULL ? -1 : 0;")
+        return found[0].replace("return 0;", f"return {init} == NULL ? -1 : 0;")
 
-    source.write_text(INIT.sub(mended, text))
+    whole, known = INIT.subn(called, text)
+    if known != text.count(TAKEN):
+        raise SystemExit("this mypyc calls an __init__ in a way that setup.py does not know")
+    return whole
+
+
+def setting_state(text: str) -> str:
+    """Return a source in which a copy gets its state though it is frozen."""
+    if STATE not in text:
+        return text
+    return text.replace(STATE, "(PyCFunction)set_state,").replace(HEADER, HEADER + SET_STATE, 1)
 
 
 def compiled_modules() -> list[str]:
@@ -94,8 +142,7 @@ def extensions() -> list[Extension]:
         opt_level=os.environ.get("MYPYC_OPT_LEVEL", "2"),
         debug_level="0",
     )
-    for source in Path("build").glob("__native_*.c"):
-        call_init(source)
+    mend([*Path("build").glob("__native_*.c")])
     for extension in made:  # a product is rounded before it is added, whatever the processor can
         extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]
     return made

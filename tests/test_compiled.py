@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import importlib.util
 import os
+import pickle
 import subprocess
 import sys
 import tomllib
+from contextlib import nullcontext
+from enum import Enum
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
 import tickrig
+import tickrig.device
+import tickrig.host
+import tickrig.rtc
+import tickrig.testing
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.stack import make_slave
+from tickrig.device.horizon import Horizon
+from tickrig.device.physical import InputBank
+from tickrig.device.urg.parameters import UrgParameters
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
 from tickrig.wire.can import CanFrame
+from tickrig.wire.modbus.requests import Request
+from tickrig.wire.scip.command import Command
+from tickrig.wire.serial.uart import UartSetting
 
 ROOT: Final = Path(__file__).parents[1]
 TABLE: Final = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["tickrig"]
@@ -84,6 +98,133 @@ def history(seconds: int) -> str:
 
 def test_both_builds_do_the_same() -> None:
     assert history(3) == "4a0f71aba09b197fc5d78be7089e0f1b147d7ab9d1b47a2e74a970da97fa6a9c"
+
+
+KEPT: Final = {
+    *("CanopenSlave", "Dictionary", "EntryDescription", "InputSignal", "LineSplitter"),
+    *("OutputSignal", "Rh3Base", "Rig", "Station", "Urg"),
+}
+"""Public classes that nobody derives from where they are compiled (docs/compiled.md)."""
+
+
+def derivable(base: type) -> bool:
+    own: Any = type("Own", (base,), {})
+    try:
+        own.__new__(own)
+    except TypeError:
+        return False
+    return True
+
+
+def test_of_the_public_classes_users_derive_from_all_but_those_of_the_page() -> None:
+    doors = (tickrig, tickrig.device, tickrig.host, tickrig.rtc, tickrig.testing)
+    public = {name: getattr(door, name) for door in doors for name in dir(door)}
+    unlike = (Enum, tuple)  # made in other ways; CanFrame is a tuple
+    classes = {n: c for n, c in public.items() if isinstance(c, type) and not issubclass(c, unlike)}
+    assert {name for name, base in classes.items() if not derivable(base)} == (
+        KEPT if tickrig.compiled else set()
+    )
+    page = (ROOT / "docs" / "compiled.md").read_text("utf-8")
+    assert not [name for name in KEPT if f"`{name}`" not in page]
+
+
+def test_a_compiled_caller_does_not_see_what_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    station = Station(make_epos(6), CanWire().end())
+    monkeypatch.setattr("tickrig.emulators.rig.rig._next_tick_us", lambda *times: -1)
+    assert (station.wake_us(0) == -1) is not tickrig.compiled
+
+
+def test_a_compiled_object_has_the_attributes_that_its_class_declares() -> None:
+    with pytest.raises(AttributeError) if tickrig.compiled else nullcontext():
+        Rig().nickname = "mine"  # type: ignore[attr-defined] # a user's, by the way
+
+
+def test_types_are_checked_where_compiled_code_begins() -> None:
+    with pytest.raises(TypeError) if tickrig.compiled else nullcontext():
+        Horizon().until_us = "soon"  # type: ignore[assignment] # a user's mistake
+    assert type(UrgParameters(noise=1).noise) is (float if tickrig.compiled else int)
+
+
+def test_a_traceback_names_the_lines_of_the_sources() -> None:
+    with pytest.raises(ValueError, match="no input 'label'") as told:
+        InputBank().set("label", 1)
+    file = told.traceback[-1].frame.code.raw.co_filename
+    assert file.endswith("tickrig/device/physical.py") or not tickrig.compiled
+    assert Path(file).is_absolute() is not tickrig.compiled
+
+
+def test_a_profiler_sees_no_compiled_function() -> None:
+    seen: set[str] = set()
+    rig = Rig()
+    sys.setprofile(lambda frame, event, _: seen.add(frame.f_code.co_name))
+    try:
+        rig.run_for(1_000)
+    finally:
+        sys.setprofile(None)
+    assert ("run_to" in seen) is not tickrig.compiled
+
+
+FROZEN: Final = (CanFrame(5), UrgParameters(), Request(6), Command("VV"), UartSetting(9_600))
+"""Frozen values, of compiled modules and of others."""
+
+
+@pytest.mark.parametrize("value", FROZEN, ids=[type(value).__name__ for value in FROZEN])
+def test_frozen_values_are_pickled_and_copied(value: object) -> None:
+    for copied in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value), copy.copy(value)):
+        assert copied == value
+        assert type(copied) is type(value)
+
+
+@pytest.mark.skipif(not tickrig.compiled, reason="the pure classes leave that to pickle")
+def test_the_state_of_a_pure_object_is_refused() -> None:
+    with pytest.raises(TypeError, match="no state of this build"):
+        Horizon().__setstate__((None, {"until_us": 1}))  # type: ignore[attr-defined]
+
+
+def mended(text: str, tmp_path: Path) -> str:
+    """Let setup.py mend a file of C; return the file, or why it gave up."""
+    source = tmp_path / "a.c"
+    source.write_text(text)
+    code = f"import setup, pathlib; setup.mend([pathlib.Path({str(source)!r})])"
+    asked = [sys.executable, "-c", code, "--name"]
+    done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=False)
+    return source.read_text() if done.returncode == 0 else done.stderr.strip()
+
+
+INIT: Final = """
+static int
+A_init(PyObject *self, PyObject *args, PyObject *kwds)
+{
+    return 0;
+}
+"""
+STATE: Final = """#include "__native_internal_tickrig.h"
+{"__setstate__", (PyCFunction)CPyPickle_SetState, METH_O, NULL},
+"""
+
+
+def test_the_build_mends_what_mypyc_writes(tmp_path: Path) -> None:
+    whole = mended(STATE + INIT, tmp_path)
+    assert "return CPyPy_A_____init__(self, args, kwds) == NULL ? -1 : 0;" in whole
+    assert "(PyCFunction)set_state, METH_O" in whole
+    assert "static PyObject *set_state(" in whole
+
+
+@pytest.mark.parametrize(
+    ("written", "told"),
+    [
+        (STATE, "this mypyc writes nothing that calling_init in setup.py mends"),
+        (INIT, "this mypyc writes nothing that setting_state in setup.py mends"),
+        (
+            STATE + INIT.replace("return 0;", "return -1;"),
+            "this mypyc calls an __init__ in a way that setup.py does not know",
+        ),
+    ],
+)
+def test_the_build_ends_where_mypyc_writes_something_else(
+    written: str, told: str, tmp_path: Path
+) -> None:
+    assert mended(written, tmp_path).endswith(told)
 
 
 def test_a_source_tree_stays_pure_where_a_wheel_would_be_compiled(tmp_path: Path) -> None:

@@ -36,7 +36,8 @@ def state_of(machine: object, begun: Mapping[str, object] = NOTHING) -> Any:
     if not begun:
         return state
     if isinstance(state, tuple):
-        return state[0], {**state[1], **begun}
+        kept = {name: value for name, value in (state[0] or {}).items() if name not in begun}
+        return kept or None, {**state[1], **begun}
     return {**(state or {}), **begun}
 
 
@@ -89,16 +90,9 @@ class _Pickler(pickle.Pickler):
             self.shared.append(item)
         elif id(item) in self._known and item is not _shared:
             self.shared.append(self._known[id(item)])
-        elif _is_frozen_and_compiled(type(item)):  # `pickle` would assign to its fields
-            return copyreg.__newobj__, (type(item),), state_of(item), None, None, restore  # type: ignore[attr-defined]
         else:
             return NotImplemented
         return _shared, (len(self.shared) - 1,)
-
-
-def _is_frozen_and_compiled(kind: type) -> bool:
-    parameters = getattr(kind, "__dataclass_params__", None)
-    return parameters is not None and parameters.frozen and hasattr(kind, "__mypyc_attrs__")
 
 
 class _Unpickler(pickle.Unpickler):

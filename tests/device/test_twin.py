@@ -114,6 +114,16 @@ class Ear(Heard):
     __slots__ = ("count", "hear", "known")
 
 
+class Bat(Ear):
+    """Has slots and other attributes."""
+
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"hear": None, "echo": None}
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.echo: object = lambda: None
+
+
 class Tap:
     def __init__(self, part: Part) -> None:
         self.part, self.hear = part, lambda: None
@@ -122,7 +132,7 @@ class Tap:
         return itself, (self.part,)
 
 
-@pytest.mark.parametrize("made", [Heard, Ear])
+@pytest.mark.parametrize("made", [Heard, Ear, Bat])
 def test_a_twin_begins_without_callbacks_and_caches(made: type[Heard]) -> None:
     machine = made()
     other = twin(machine)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from threading import get_ident
-from typing import Any, Final
+from typing import Final
 
 from serial.serialutil import SerialException
 
-from tickrig.device.twin import Copyable
+from tickrig.device.twin import Copyable, restore
 from tickrig.emulators.rig.rig import Rig
 from tickrig.wire.instant import NEVER
 
@@ -34,9 +34,10 @@ class HostWaits(Copyable):
         self._thread, self._wrong_thread = get_ident(), ""
         self._looks, self._looked_us = 0, NEVER
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: object) -> None:
         """Go on in the thread in which it is copied."""
-        vars(self).update(state, _thread=get_ident())
+        restore(self, state)
+        self._thread = get_ident()
 
     def check_thread(self, name: str) -> None:
         """Raise SerialException, now and ever after, if a second thread uses a port.

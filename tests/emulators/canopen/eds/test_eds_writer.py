@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from inspect import getmembers, isdatadescriptor
 from pathlib import Path
 
 import pytest
@@ -40,7 +41,8 @@ NAMES = st.text(st.characters(exclude_categories=["C", "Z"]), max_size=8)
 
 
 def rows(dictionary: Dictionary) -> list[tuple[object, ...]]:
-    described = [name for name in EntryDescription.__slots__ if name != "has_default"]
+    names = [name for name, _ in getmembers(EntryDescription, isdatadescriptor)]
+    described = [name for name in names if name[0] != "_" and name != "has_default"]
     return [tuple(getattr(entry, name) for name in described) for entry in dictionary.description]
 
 

@@ -30,11 +30,19 @@ OUTPUTS = {
 class LabelBank(QuantityBank):
     """Inputs, one of which takes a text."""
 
+    label = ""
+
     def check(self, name: str, value: float | str) -> Any:
         return str(value) if name == "label" else super().check(name, value)
 
+    def set(self, name: str, value: float | str) -> None:
+        if name == "label":
+            self.label, self.changed = str(value), True
+        else:
+            super().set(name, value)
+
     def __getitem__(self, name: str) -> Any:
-        return super().__getitem__(name)
+        return self.label if name == "label" else super().__getitem__(name)
 
 
 class Meter(Copyable):
