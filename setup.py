@@ -136,7 +136,7 @@ def extensions() -> list[Extension]:
     from mypyc.build import mypycify  # noqa: PLC0415 - only where something is compiled
 
     made = mypycify(
-        compiled_modules(),
+        ["--follow-imports=silent", *compiled_modules()],  # what others import may be missing here
         group_name="tickrig",  # of the library that mypyc puts beside the package
         multi_file=True,  # so that all cores compile
         opt_level=os.environ.get("MYPYC_OPT_LEVEL", "2"),
@@ -148,9 +148,12 @@ def extensions() -> list[Extension]:
     return made
 
 
+NEEDED = ["mypy[mypyc]>=2.4,<2.5", "crcmod-plus>=2.2"]
+"""What compiles, and what compiled modules import of others."""
+
 COMPILE = os.environ.get("TICKRIG_COMPILE") == "1"
 setup(
     cmdclass={"sdist": LinkingSdist, "build_ext": ParallelBuildExt},
-    setup_requires=["mypy[mypyc]>=2.4,<2.5"] if COMPILE else [],
+    setup_requires=NEEDED if COMPILE else [],
     ext_modules=extensions() if COMPILE else [],
 )

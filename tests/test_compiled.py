@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import hashlib
 import importlib.util
@@ -64,6 +65,20 @@ def test_what_is_left_out_would_be_compiled_otherwise_and_has_a_reason() -> None
 
 def test_the_pure_floors_are_compiled() -> None:
     assert {"wire/**/*.py", "device/**/*.py"} <= set(ROOMS)
+
+
+def imported(path: Path) -> set[str]:
+    """Return the top-level names that a module imports."""
+    nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+    froms = {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    return {name.partition(".")[0] for name in froms | plain}
+
+
+def test_what_compiled_modules_import_of_others_is_there_when_they_are_compiled() -> None:
+    files = [ROOT / name.removeprefix("tickrig.").replace(".", "/") for name in compiled_modules()]
+    names = set().union(*(imported(file.with_suffix(".py")) for file in files))
+    assert names - sys.stdlib_module_names - {"tickrig"} == {"crcmod"}  # NEEDED in setup.py
 
 
 def test_an_installation_is_compiled_whole_or_not_at_all() -> None:
