@@ -14,11 +14,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 from tickrig.device.servo.parameters import MotorParameters
 from tickrig.device.twin import Immutable
 
-STEP_S = 0.001
+STEP_S: Final = 0.001
 
 Row = tuple[float, float, float, float]  # of current, speed, third input, torque
 Matrix = list[list[float]]

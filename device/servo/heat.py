@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from tickrig.device.servo.parameters import PowerStage, ServoParameters
 from tickrig.device.servo.thermal import Temperatures, ThermalModel
 from tickrig.device.twin import Part
@@ -49,7 +51,7 @@ class I2t(Part):
         return rate == 0.0 or self.reduced
 
 
-DERATING_K = 15.0  # the limit falls to 0 over these last kelvins below the hottest
+DERATING_K: Final = 15.0  # the limit falls to 0 over these last kelvins below the hottest
 
 
 def derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
@@ -62,7 +64,7 @@ def derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
     return limit_a * min(max(left, 0.0), 1.0)
 
 
-AGES_S = 1e9  # after this all temperatures stand still
+AGES_S: Final = 1e9  # after this all temperatures stand still
 
 
 class Heat(Part):
@@ -81,17 +83,17 @@ class Heat(Part):
         self._thermal, self.i2t = ThermalModel(parameters.motor), I2t(parameters.stage)
         self._winding_max_c = parameters.motor.winding_max_c
         self.since_us, self.ambient_c = 0, ambient_c
-        self.temperatures = Temperatures(ambient_c, ambient_c)
+        self.temperatures: Temperatures = (ambient_c, ambient_c)
 
     @property
     def limit_a(self) -> float:
         """Current that may flow now."""
-        return self._limit_at(self.temperatures.winding_c)
+        return self._limit_at(self.temperatures[0])
 
     @property
     def resistance_ohm(self) -> float:
         """Resistance of the winding."""
-        return self._thermal.resistance_ohm(self.temperatures.winding_c)
+        return self._thermal.resistance_ohm(self.temperatures[0])
 
     def pass_time(self, now_us: int, square_a2s: float) -> None:
         """Let time pass with an integral of the squared current, A^2 s."""
@@ -107,8 +109,8 @@ class Heat(Part):
 
     def bears(self, current_a: float) -> bool:
         """Return whether a current may flow for ever and changes no limit."""
-        last = self._after(AGES_S, current_a**2).winding_c
-        hottest = max(last, self.temperatures.winding_c)
+        last, _ = self._after(AGES_S, current_a**2)
+        hottest = max(last, self.temperatures[0])
         return self.i2t.settled(current_a) and abs(current_a) <= self._limit_at(hottest)
 
     def _after(self, seconds: float, square_a2: float) -> Temperatures:

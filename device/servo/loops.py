@@ -48,10 +48,8 @@ class Loops(Part):
     @property
     def gains(self) -> tuple[float, float, float, float, float, float]:
         """For `RunAhead`: rad a count; gains of position, integral, error, speed, friction."""
-        return (
-            *(self._rad, self._position, self._integral),
-            *(self._proportional, self._viscous, self._dry),
-        )
+        proportional, viscous, dry = self._proportional, self._viscous, self._dry
+        return self._rad, self._position, self._integral, proportional, viscous, dry
 
     def follow(
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp, pi
+from typing import Final
 
 from tickrig.device.servo.discretisation import STEP_S, Row, discretise
 from tickrig.device.servo.parameters import ServoParameters
@@ -27,7 +28,7 @@ class Losses:
     square_a2s: float = 0.0
 
 
-BREAKAWAY = 1.02  # static friction by dry friction; it ends a creep, and makes no jump
+BREAKAWAY: Final = 1.02  # static friction by dry friction; it ends a creep, and makes no jump
 
 
 class Plant(Part):
@@ -90,10 +91,8 @@ class Plant(Part):
     def constants(self) -> tuple[float, float, float, float]:
         """Torque constant, inductance, viscous friction, counts in a radian."""
         motor = self._motor
-        return (
-            *(motor.torque_constant_nm_a, motor.inductance_h, motor.viscous_nm_s),
-            self._counts_per_rad,
-        )
+        k, el, b = motor.torque_constant_nm_a, motor.inductance_h, motor.viscous_nm_s
+        return k, el, b, self._counts_per_rad
 
     def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
         """Take another inertia or resistance; the speed stays."""

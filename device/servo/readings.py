@@ -93,12 +93,12 @@ class Readings(ServoSettings):
     @property
     def winding_c(self) -> float:
         """Temperature of the winding."""
-        return self._temperatures().winding_c
+        return self._temperatures()[0]
 
     @property
     def housing_c(self) -> float:
         """Temperature of the housing."""
-        return self._temperatures().housing_c
+        return self._temperatures()[1]
 
     def _temperatures(self) -> Temperatures:
         if self.resting:

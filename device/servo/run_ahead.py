@@ -2,66 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import copysign, floor
+from math import floor
 
 from tickrig.device.servo.discretisation import STEP_S
 from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.plant import BREAKAWAY, Plant
-from tickrig.device.twin import Immutable
+from tickrig.device.twin import Part
 
-Demands = Sequence[tuple[float, float]]
+Demands = list[tuple[float, float]]
 """Position in counts and velocity in counts/s, for each step."""
 
+Bounds = tuple[float, float, float, float, float, float]
+"""Where a run ends: before a step that would lead out of these bounds.
 
-@dataclass(frozen=True, slots=True)
-class Bounds(Immutable):
-    """Where a run ends: before a step that would lead out of these bounds.
+Largest current that is demanded, A; largest voltage at the winding, V; lowest and highest
+position, counts; largest distance from the demanded position, counts; velocity, counts/s, up to
+which the motor stands: it may not stand while it is demanded to turn faster.
+"""
 
-    Attributes:
-        current_a: largest current that is demanded.
-        voltage_v: largest voltage at the winding.
-        counts: lowest and highest position.
-        error: largest distance from the demanded position, counts.
-        standstill: velocity, counts/s, up to which the motor stands; it may not stand while
-            it is demanded to turn faster.
-    """
-
-    current_a: float
-    voltage_v: float
-    counts: tuple[float, float]
-    error: float
-    standstill: float
+Four = tuple[float, float, float, float]
 
 
-@dataclass(slots=True)
-class RunAhead:
+class RunAhead(Part):
     """Where a servo is after some steps.
 
     Attributes:
         steps: how many there are.
         counts: what the encoder says.
-        position: of the motor, counts.
-        speed_rad_s: of the motor.
-        current_a: in the winding.
-        integral_a: of the velocity loop.
-        electrical_j: what came out of the power stage, since the start.
-        copper_j: heat of the winding.
-        friction_j: heat of friction.
-        square_a2s: integral of the squared current.
+        motion: position of the motor, counts; its speed, rad/s; current in the winding, A;
+            integral of the velocity loop, A.
+        losses: what came out of the power stage, since the start, J; heat of the winding, J;
+            heat of friction, J; integral of the squared current, A^2 s.
     """
 
-    steps: int
-    counts: int
-    position: float
-    speed_rad_s: float
-    current_a: float
-    integral_a: float
-    electrical_j: float
-    copper_j: float
-    friction_j: float
-    square_a2s: float
+    __slots__ = ("counts", "losses", "motion", "steps")
+
+    def __init__(self, steps: int, counts: int, motion: Four, losses: Four) -> None:
+        self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
 
 
 def work_out(
@@ -86,14 +63,10 @@ def work_out(
     r, load, blocked = plant.resistance_ohm, plant.load_nm, plant.blocked
     low, high = plant.friction_nm
     low_breakaway, high_breakaway = low * BREAKAWAY, high * BREAKAWAY
-    most_a, most_v, window, slow = (
-        *(bounds.current_a, bounds.voltage_v, bounds.error, bounds.standstill),
-    )
-    (counts, lost_counts), (first, last) = encoder, bounds.counts
+    (counts, lost_counts), (most_a, most_v, first, last, window, slow) = encoder, bounds
     losses = plant.losses
-    electrical, copper, rubbed, squares = (
-        *(losses.electrical_j, losses.copper_j, losses.friction_j, losses.square_a2s),
-    )
+    electrical, copper = losses.electrical_j, losses.copper_j
+    rubbed, squares = losses.friction_j, losses.square_a2s
     angle, w, i, integral = plant.position, plant.speed_rad_s, plant.current_a, loops.integral_a
     steps = 0
     for position, velocity in demands:
@@ -105,7 +78,7 @@ def work_out(
         led = integral + integral_gain * error
         current = led + proportional * error + viscous * wanted
         if wanted != 0.0:
-            current += copysign(dry, wanted)
+            current += dry if wanted > 0.0 else -dry  # `copysign` is a call of Python
         current += 0.0  # no acceleration is fed forward
         if w == 0.0 or blocked or not -most_a <= current <= most_a:
             break
@@ -124,7 +97,7 @@ def work_out(
         way = a0 * i + a1 * w + a2 * current + a3 * (load + friction)
         ahead = angle + way * per_rad
         seen = floor(ahead - lost_counts + 0.5)
-        turns = abs(velocity) <= slow or abs(round(speed * per_rad)) > slow
+        turns = -slow <= velocity <= slow or abs(round(speed * per_rad)) > slow
         follows = turns and -window <= position - seen <= window
         if not (follows and first <= seen <= last and speed):
             break
@@ -137,7 +110,4 @@ def work_out(
         rubbed += b * (w * w + w * speed + speed * speed) / 3 * STEP_S - friction * way
         angle, w, i, integral, counts = ahead, speed, current, led, seen
         steps += 1
-    return RunAhead(
-        *(steps, counts, angle, w, i, integral),
-        *(electrical, copper, rubbed, squares),
-    )
+    return RunAhead(steps, counts, (angle, w, i, integral), (electrical, copper, rubbed, squares))

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from enum import Enum
 from math import floor
+from typing import Final
 
 from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import Plant
 from tickrig.device.servo.readings import Readings
-from tickrig.device.servo.run_ahead import Bounds, Demands, RunAhead, work_out
+from tickrig.device.servo.run_ahead import Demands, RunAhead, work_out
 
-STEP_US = 1_000
-SLOW_US = 20_000  # between two looks at heat and overload
-RESISTANCE_STEP = 0.005  # how far the resistance may be off before it is followed
+STEP_US: Final = 1_000
+SLOW_US: Final = 20_000  # between two looks at heat and overload
+RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
 
 
 class Demand(Enum):
@@ -123,17 +124,16 @@ class Servo(Readings):
             error: the same.
             standstill: the same.
         """
-        bounds = Bounds(self._limit_a, self._limit_v, counts, error, standstill)
+        first, last = counts
+        bounds = (self._limit_a, self._limit_v, first, last, error, standstill)
         encoder = self.counts, self._lost_counts
         return work_out(self._plant, self._loops, encoder, demands, bounds)
 
     def follow(self, run: RunAhead, position: float, velocity: float) -> None:
         """Make the steps of a run, then have a position as `drive_position` does."""
         plant, losses = self._plant, self._plant.losses
-        plant.position, plant.speed_rad_s = run.position, run.speed_rad_s
-        plant.current_a, self._loops.integral_a = run.current_a, run.integral_a
-        losses.electrical_j, losses.copper_j = run.electrical_j, run.copper_j
-        losses.friction_j, losses.square_a2s = run.friction_j, run.square_a2s
+        plant.position, plant.speed_rad_s, plant.current_a, self._loops.integral_a = run.motion
+        losses.electrical_j, losses.copper_j, losses.friction_j, losses.square_a2s = run.losses
         self.counts, self.current_limited = run.counts, False
         self.now_us += run.steps * STEP_US
         self._values = (position, velocity, 0.0)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import expm1, sqrt
+from typing import Final
 
 from tickrig.device.servo.parameters import MotorParameters
-from tickrig.device.twin import Immutable, Part
+from tickrig.device.twin import Part
 
-COPPER_PER_K = 0.0039  # growth of the resistance of copper, of its value at 25 degC
-HOTTEST_C = 1_000.0  # no motor is left beyond this, and no model
+COPPER_PER_K: Final = 0.0039  # growth of the resistance of copper, of its value at 25 degC
+HOTTEST_C: Final = 1_000.0  # no motor is left beyond this, and no model
 
 
-@dataclass(frozen=True, slots=True)
-class Temperatures(Immutable):
-    """Temperatures of a motor, degC."""
-
-    winding_c: float
-    housing_c: float
+Temperatures = tuple[float, float]
+"""Of the winding and the housing of a motor, degC."""
 
 
 class ThermalModel(Part):
@@ -52,23 +48,23 @@ class ThermalModel(Part):
             square_a2: mean square of the current meanwhile, A^2.
             ambient_c: temperature of the air.
         """
-        motor, (winding, housing) = self._motor, self._capacities
+        motor, (winding, housing), (winding_c, housing_c) = self._motor, self._capacities, start
         slope = motor.resistance_ohm * COPPER_PER_K * square_a2
         across, out = 1 / motor.winding_housing_k_w, 1 / motor.housing_ambient_k_w
         a, b = (slope - across) / winding, across / winding
         c, d = across / housing, -(across + out) / housing
         # rates of change now, then each mode of the system grows or fades by itself
-        flow = across * (start.winding_c - start.housing_c)
-        heat = square_a2 * self.resistance_ohm(start.winding_c)
+        flow = across * (winding_c - housing_c)
+        heat = square_a2 * self.resistance_ohm(winding_c)
         dw = (heat - flow) / winding
-        dh = (flow - out * (start.housing_c - ambient_c)) / housing
+        dh = (flow - out * (housing_c - ambient_c)) / housing
         middle, spread = (a + d) / 2, sqrt(((a - d) / 2) ** 2 + b * c)
         slow, fast = _span(middle + spread, seconds), _span(middle - spread, seconds)
         mean, half = (slow + fast) / 2, (slow - fast) / (2 * spread)
         tilt = (a - d) / 2
-        return Temperatures(
-            min(start.winding_c + mean * dw + half * (tilt * dw + b * dh), HOTTEST_C),
-            min(start.housing_c + mean * dh + half * (c * dw - tilt * dh), HOTTEST_C),
+        return (
+            min(winding_c + mean * dw + half * (tilt * dw + b * dh), HOTTEST_C),
+            min(housing_c + mean * dh + half * (c * dw - tilt * dh), HOTTEST_C),
         )
 
 

@@ -239,7 +239,7 @@ class CanopenSlave(Copyable):
         if due_us < self.due_us:
             self.due_us = due_us
         elif before == self.due_us and self._powered:
-            self.due_us = min(self._dues)
+            self.due_us = self._first_due()
 
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
@@ -335,7 +335,14 @@ class CanopenSlave(Copyable):
                     self._run_due(now_us, slot)
                     return
         if self._powered:
-            self.due_us = min([dues[slot] for slot in asking]) if asking else NEVER
+            self.due_us = self._first_due()
+
+    def _first_due(self) -> int:
+        """Return when the first of the services is due that have ever asked for a tick."""
+        dues, first_us = self._dues, NEVER
+        for slot in self._asking:
+            first_us = min(first_us, dues[slot])
+        return first_us
 
 
 @lru_cache

@@ -123,8 +123,9 @@ class Mode(Part):
 
     def take(self, demand: Clamped) -> float:
         """Return what is left of a demand; the statusword shows whether a limit cut it."""
-        self.limited |= demand.clamped
-        return demand.value
+        value, clamped = demand
+        self.limited |= clamped
+        return value
 
     def target_velocity(self, offset: int = 0) -> float:
         """Return 60FFh and an offset in counts per second, within the limits."""

@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from tickrig.device.canopen.ds402.motion.axis import Axis
 from tickrig.device.canopen.ds402.motion.reference import Control
 from tickrig.device.canopen.ds402.motion.switches import Switches
 from tickrig.device.canopen.ds402.objects.error_codes import ErrorCode
 from tickrig.device.twin import Part
 
-
-class Clamped(NamedTuple):
-    """A demand within the limits.
-
-    Attributes:
-        value: the demand, or the limit that is nearest to it.
-        clamped: whether that is another value than was demanded.
-    """
-
-    value: float
-    clamped: bool
+Clamped = tuple[float, bool]
+"""A demand, or the limit that is nearest to it, and whether that is another value."""
 
 
 class Limits(Part):
@@ -41,7 +30,8 @@ class Limits(Part):
 
     def position(self, counts: float) -> Clamped:
         """Clamp a position to the software limits."""
-        return _clamp(counts, *self._axis.ends)
+        low, high = self._axis.ends
+        return _clamp(counts, low, high)
 
     def current(self, wanted_a: float) -> Clamped:
         """Clamp a current to the torque limits of both directions."""
@@ -79,4 +69,4 @@ class Limits(Part):
 
 def _clamp(wanted: float, low: float, high: float) -> Clamped:
     value = max(low, min(high, wanted))
-    return Clamped(value, value != wanted)
+    return value, value != wanted
