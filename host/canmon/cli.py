@@ -18,6 +18,10 @@ VERBS: Final = {
     "top": (f"{HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
     "check": (f"{HERE}.check:command", "Hold traffic against rules."),
+    "conform": (
+        f"{HERE}.conform:command",
+        "Judge one CANopen node, clause by clause.",
+    ),
     "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
     "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
     "send": (f"{HERE}.send:command", "Send frames on BUS."),
@@ -46,6 +50,7 @@ def main() -> None:
     canmon top run.log                            all identifiers in a table
     canmon nodes can0 --eds 3=drive.eds           all nodes
     canmon check run.log --no-emcy --nodes 3,5    exit status 1 if a rule is broken
+    canmon conform can0 --node 5 --eds drive.eds  is this a CANopen node?
     canmon tui can0                               all there is on one screen
 
     \b

@@ -31,6 +31,7 @@ class PathType(click.Path):
 
 
 PATH: Final = PathType()
+VERSION: Final = __version__
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from tickrig.wire.can import Frames
 
 TICK_US: Final = 1_000
 
 
+@runtime_checkable
 class Slave(Protocol):
     """A CANopen slave as a machine: frames in with the time, frames out.
 

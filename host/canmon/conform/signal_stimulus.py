@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
+from tickrig.host.control.client import ControlRefused
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import Setting, parse_setting
 from tickrig.wire.canopen.datatypes import DataType
@@ -18,10 +19,17 @@ class SignalStimulus(ABC):
     """Takes the words of a check, and sets, reads and switches by name."""
 
     def __call__(self, *words: str) -> str:
-        """Do it, and return what was read; Disturbed if it cannot be done."""
+        """Do it, and return what was read.
+
+        Raises:
+            NotAllowed: the device has nothing of the kind.
+            Disturbed: it has, and it could not be done.
+        """
         try:
             return self._act(*words)
-        except (OSError, ValueError, KeyError, FieldError) as error:
+        except (ControlRefused, KeyError) as error:
+            raise NotAllowed(f"{' '.join(words)}: {one_line(str(error))}") from None
+        except (OSError, ValueError, FieldError) as error:
             text = getattr(error, "strerror", None) or str(error) or type(error).__name__
             raise Disturbed(f"{' '.join(words)}: {one_line(text)}") from None
 
@@ -34,12 +42,20 @@ class SignalStimulus(ABC):
                 signal = signal_name(name)
                 return _hex(self.get(signal), self.unit(signal))
             case ("emergency", code, *_):
-                self.set("emergency", int(code, 16))
+                self._set_emergency(int(code, 16))
+            case ("emergency-clear", *_):
+                self._set_emergency(0)
             case ("power", ("on" | "off") as state):
                 self.switch(on=state == "on")
             case _:
-                raise ValueError("an emulated device has no such input")
+                raise NotAllowed(f"{' '.join(words)}: the device has nothing of the kind")
         return ""
+
+    def _set_emergency(self, code: int) -> None:
+        """Let an error come or go: there is one at a time."""
+        if code and self.get("emergency"):
+            raise NotAllowed("a second error at once: the device takes one by hand")
+        self.set("emergency", code)
 
     @abstractmethod
     def set(self, name: str, value: Setting) -> None:

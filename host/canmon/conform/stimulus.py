@@ -12,7 +12,7 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.canopen.conform.plan import Stimulus
 from tickrig.host.cli.refused import Refused, refused_at
 from tickrig.host.control.client import ControlClient
@@ -22,6 +22,8 @@ from tickrig.host.text.values import Setting
 
 OPERATOR: Final = "ask"
 CONTROL: Final = "control:"
+CANNOT: Final = 77
+"""Exit status by which a command says that it has no such input, as in test suites of C."""
 PATIENCE_S: Final = 30
 """A command that moves an input is done by then."""
 
@@ -57,7 +59,7 @@ def ask_operator(*words: str) -> str:
     if words[0] == "output":
         return str(click.prompt(f"What is {text}, in hex", err=True))
     if not click.confirm(f"Now: {text}. Done?", default=True, err=True):
-        raise Disturbed(f"{text}: the operator did not do it")
+        raise NotAllowed(f"{text}: the operator cannot do it")
     return ""
 
 
@@ -72,8 +74,13 @@ class CommandStimulus:
         self._words = words
 
     def __call__(self, *words: str) -> str:
-        """Call it; return the first line that it prints, Disturbed unless it ends with 0."""
-        told = " ".join([*self._words, *words])
+        """Call it, and return the first line that it prints.
+
+        Raises:
+            NotAllowed: it ends with `CANNOT`.
+            Disturbed: it cannot be run, does not end, or ends with another status than 0.
+        """
+        line = " ".join([*self._words, *words])
         try:
             ended = subprocess.run(
                 [*self._words, *words],
@@ -83,13 +90,15 @@ class CommandStimulus:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise Disturbed(f"{told}: not done within {PATIENCE_S} s") from None
+            raise Disturbed(f"{line}: not done within {PATIENCE_S} s") from None
         except OSError as error:
-            raise Disturbed(f"{told}: {error.strerror}") from None
+            raise Disturbed(f"{line}: {error.strerror}") from None
+        if ended.returncode == CANNOT:
+            raise NotAllowed(f"{line}: the command has nothing of the kind")
         if ended.returncode:
             said = ended.stderr.decode("utf-8", "replace").strip().splitlines()
             why = f": {one_line(said[-1])}" if said else ""
-            raise Disturbed(f"{told}: exit status {ended.returncode}{why}")
+            raise Disturbed(f"{line}: exit status {ended.returncode}{why}")
         return next(iter(ended.stdout.decode("utf-8", "replace").splitlines()), "").strip()
 
 

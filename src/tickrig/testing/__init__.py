@@ -4,12 +4,18 @@ from tickrig._lazy import lazy
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from tickrig.emulators.testing.conformance.conformance import conformance as conformance
+    from tickrig.emulators.testing.conformance.pytest_suite import (
+        conformance_tests as conformance_tests,
+    )
     from tickrig.emulators.testing.properties import strategies as strategies
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
+            "tickrig.emulators.testing.conformance.conformance": ("conformance",),
+            "tickrig.emulators.testing.conformance.pytest_suite": ("conformance_tests",),
             "tickrig.emulators.testing.properties": ("strategies",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
         },

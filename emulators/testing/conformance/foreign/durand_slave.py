@@ -46,12 +46,17 @@ class DurandSlave:
     @property
     def due_us(self) -> int:
         """When it boots, or something of its scheduler is due."""
-        return 0 if self.node is None else self._scheduler.due_us
+        return 0 if self.node is None or self._actions else self._scheduler.due_us
 
     def reset(self) -> None:
         """Forget the node; another one is made in the next tick."""
         self.node = None
         self._scheduler, self._network = _Scheduler(), _Network()
+        self._actions: list[Callable[[Node], object]] = []
+
+    def act(self, action: Callable[[Node], object]) -> None:
+        """Let its application do something at the beginning of the next tick; it has booted."""
+        self._actions.append(action)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Do what is due, then hand over what arrived."""
@@ -59,6 +64,9 @@ class DurandSlave:
             self._scheduler.run(now_us)
             if self.node is None:
                 self.node = self._make(self._network)
+            for action in self._actions:
+                action(self.node)
+            self._actions.clear()
             for frame in rx:
                 self._network.take(frame)
         return self._network.taken()
@@ -131,9 +139,10 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
         return entry
 
     def cancel(self, entry: Entry) -> None:
-        """Do not call it; ValueError if it was called already."""
-        self._entries.remove(entry)
-        self._entries.sort()
+        """Do not call it, if it was not called already."""
+        if entry in self._entries:
+            self._entries.remove(entry)
+            self._entries.sort()
 
     def run(self, now_us: int) -> None:
         """Call what is due, each at its time."""

@@ -40,7 +40,7 @@ class LocalNodeSlave:
     @property
     def due_us(self) -> int:
         """When it boots, or its next periodic frame is due."""
-        if not self._booted:
+        if not self._booted or self._network.has_sent:
             return 0
         return min((task.due_us for task in self._network.tasks), default=NEVER)
 
@@ -73,6 +73,11 @@ class _Network(canopen.Network):
         super().__init__()
         self._slave, self._sent = slave, list[CanFrame]()
         self.tasks: list[_Periodic] = []
+
+    @property
+    def has_sent(self) -> bool:
+        """Whether something is to be sent."""
+        return bool(self._sent)
 
     def take(self, frame: CanFrame) -> None:
         """Hand a frame to who listens to it, as the library's listener does."""

@@ -7,7 +7,8 @@ import pytest
 
 from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus
 from tickrig.host.canmon.conform.stimulus import CommandStimulus, open_stimulus
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
+from tickrig.host.control.client import ControlRefused
 from tickrig.host.text.values import Setting
 
 
@@ -43,13 +44,18 @@ class Board(SignalStimulus):
     """A device with an input, an object and a supply."""
 
     def __init__(self) -> None:
-        self.values: dict[str, Setting] = {"0x6000:1": 0, "0x2007": "short", "di1": 0}
+        self.values: dict[str, Setting] = {
+            "0x6000:1": 0,
+            "0x2007": "short",
+            "di1": 0,
+            "emergency": 0,
+        }
         self.units = {"0x6000:1": "UNSIGNED16", "0x2007": "VISIBLE_STRING"}
         self.on = True
 
     def set(self, name: str, value: Setting) -> None:
-        if name not in (*self.values, "emergency"):
-            raise ValueError(f"no input {name}")
+        if name not in self.values:
+            raise ControlRefused(f"no input {name}")
         self.values[name] = value
 
     def get(self, name: str) -> Setting:
@@ -76,6 +82,10 @@ def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
     board = Board()
     board("emergency", "5000", "01")
     assert board.values["emergency"] == 0x5000
+    with pytest.raises(NotAllowed, match="a second error at once"):
+        board("emergency", "3100", "01")
+    board("emergency-clear", "5000")
+    assert board.values["emergency"] == 0
     board("power", "off")
     assert not board.on
     board("power", "on")
@@ -88,9 +98,19 @@ def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
         ("input", "7000:01", "01"),
         ("output", "nosuch"),
         ("power", "half"),
-        ("input", "6000:01", "x"),
+        ("node-id", "FF"),
     ],
 )
-def test_what_a_device_has_not_disturbs_the_check(words: tuple[str, ...]) -> None:
-    with pytest.raises(Disturbed, match=" ".join(words)):
+def test_what_a_device_has_not_is_not_applicable(words: tuple[str, ...]) -> None:
+    with pytest.raises(NotAllowed, match=" ".join(words)):
         Board()(*words)
+
+
+def test_what_a_device_does_not_do_disturbs_the_check() -> None:
+    with pytest.raises(Disturbed, match="input 6000:01 x"):
+        Board()("input", "6000:01", "x")
+
+
+def test_a_command_says_that_it_has_no_such_input(tmp_path: Path) -> None:
+    with pytest.raises(NotAllowed, match="has nothing of the kind"):
+        command(tmp_path, "import sys; sys.exit(77)")("node-id", "FF")

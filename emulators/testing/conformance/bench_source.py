@@ -1,0 +1,75 @@
+"""A node on a bench in virtual time, as the tester finds it."""
+
+from __future__ import annotations
+
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.testing.bench.bench_device import BenchDevice
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.modes.mode import BenchMode
+from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
+from tickrig.emulators.testing.bench.mounts import BusMount
+from tickrig.emulators.testing.conformance.bench_stimulus import BenchStimulus
+from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_writer import write_eds
+
+BOOT_US = 100_000
+"""All nodes have booted by then."""
+
+
+def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") -> ConformSource:
+    """Return where the nodes of a bench are; some time passes on it.
+
+    Args:
+        mode: of the bench; its time is virtual.
+        node_id: of the node whose bus it is; that of the first node if nobody says it.
+        name: of the bench, for people.
+
+    Raises:
+        ValueError: it is in another mode, has no CANopen node, or none of this node-ID.
+    """
+    if not isinstance(mode, VirtualMode):
+        raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
+    mode.run_for(BOOT_US)
+    buses = mode.act(_slaves)
+    nodes = {slave.node_id: (bus, each) for bus in buses for each, slave in buses[bus].items()}
+    if not nodes:
+        raise ValueError(f"{name or 'the bench'} has no CANopen node")
+    if node_id is not None and node_id not in nodes:
+        known = ", ".join(map(str, sorted(nodes)))
+        raise ValueError(f"{name or 'the bench'} has no node {node_id}; its nodes: {known}")
+    bus = nodes[min(nodes) if node_id is None else node_id][0]
+    slaves = buses[bus]
+    return ConformSource(
+        mode.act(lambda rig: CanHost(rig.rig, _mount(rig, bus).open_end())),
+        name or bus,
+        "a rig in virtual time",
+        mode.act(lambda rig: _mount(rig, bus).wire.bit_rate),
+        virtual=True,
+        nodes={number: nodes[number][1] for number in sorted(nodes) if nodes[number][0] == bus},
+        eds={slave.node_id: eds_of(slave, f"{each}.eds") for each, slave in slaves.items()},
+        stimulus=lambda number: BenchStimulus(
+            BenchDevice(mode, nodes[number][1]), slaves[nodes[number][1]]
+        ),
+    )
+
+
+def eds_of(slave: CanopenSlave, name: str) -> EdsFile:
+    """Return what the EDS of a slave of ours would say."""
+    return EdsFile(name, write_eds(slave.dictionary.description))
+
+
+def _slaves(rig: BenchRig) -> dict[str, dict[str, CanopenSlave]]:
+    """Return the slaves on each CAN bus, by their names."""
+    return {
+        mount.name: {name: node.slave for name, node in mount.nodes.items()}
+        for mount in rig.state.mounts.values()
+        if isinstance(mount, BusMount)
+    }
+
+
+def _mount(rig: BenchRig, bus: str) -> BusMount:
+    mount = rig.state.mounts[bus]
+    assert isinstance(mount, BusMount)
+    return mount

@@ -1,0 +1,148 @@
+"""The conformance tester as a pytest suite: one test a check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.errors import BenchBlocked
+from tickrig.emulators.testing.conformance.bench_source import eds_of
+from tickrig.emulators.testing.conformance.conformance import Node, conformance
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.objects.object_checks import object_checks
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.report.evidence import cut
+from tickrig.host.canopen.conform.report.hints import hint
+from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.eds import open_eds
+from tickrig.host.monitor.views.conform_frames import decoded_frames
+from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+
+MOST_LINES: Final = 60
+ANY_NODE_ID: Final = 1
+"""Names of checks do not depend on the node-ID."""
+
+Test = Callable[..., None]
+
+
+def conformance_tests(
+    node: str | Callable[[], Node],
+    *,
+    eds: Path | str | None = None,
+    level: str = "intrusive",
+    only: str | Iterable[str] = (),
+    **options: Any,
+) -> Test:
+    """Return a test function for pytest, which has a parameter for each check.
+
+    The checks of one function are judged in one run, when the first of them is asked for, and
+    only those that pytest has selected. A check that is not applicable is skipped; one that
+    could not be judged is blocked, which is no failure of the device.
+
+    Args:
+        node: makes what is judged, as `conformance` takes it; or the name of a device of the
+            fixture `bench`, which then is judged check by check, each on a fresh bench.
+        eds: its EDS, DCF or XDD; its objects have tests of their own.
+        level: `read-only`, `communication` or `intrusive`.
+        only: groups or ids of checks, with * and ?; all unless given.
+        options: further arguments of `conformance`.
+
+    Raises:
+        ValueError: the level is none.
+        OSError: the EDS cannot be read.
+
+    >>> from tickrig.device import make_epos
+    >>> test_drive = conformance_tests(lambda: make_epos(5), only="NMT")
+    """
+    options |= {"eds": eds, "level": level}
+    patterns = (only,) if isinstance(only, str) else tuple(only)
+    plan = Plan(Level[level.upper().replace("-", "_")], patterns)
+    known = _eds(node, eds)
+    objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
+    suite = [check for group in read_suite() for check in group.checks]
+    names = [check.id for check in (*suite, *objects) if plan.chooses(check)]
+    parametrised = pytest.mark.parametrize("check_id", names)
+    if isinstance(node, str):
+        return parametrised(_test_on_bench(node, options))
+    return parametrised(_Run(node, options).test())
+
+
+def _eds(node: str | Callable[[], Node], eds: Path | str | None) -> EdsFile | None:
+    """Return what is known of a node before it is asked."""
+    if eds is not None:
+        return open_eds(Path(eds))
+    made = None if isinstance(node, str) else node()
+    return eds_of(made, "slave.eds") if isinstance(made, CanopenSlave) else None
+
+
+def _test_on_bench(name: str, options: dict[str, Any]) -> Test:
+    def test(bench: Bench, check_id: str) -> None:
+        __tracebackhide__ = True
+        report = conformance(bench[name], only=check_id, **options)
+        _judge(report, check_id)
+
+    return test
+
+
+class _Run:
+    """The run of the selected checks, made when the first one asks for it."""
+
+    def __init__(self, make: Callable[[], Node], options: dict[str, Any]) -> None:
+        self._make, self._options = make, options
+        self._reports: dict[frozenset[str], Report] = {}
+
+    def test(self) -> Test:
+        """Return the test function."""
+
+        def test(request: pytest.FixtureRequest, check_id: str) -> None:
+            __tracebackhide__ = True
+            _judge(self._report(request.node, check_id), check_id)
+
+        return test
+
+    def _report(self, item: pytest.Function, check_id: str) -> Report:
+        wanted = frozenset(_selected(item)) or frozenset({check_id})
+        if wanted not in self._reports:
+            made = conformance(self._make(), only=sorted(wanted), **self._options)
+            self._reports[wanted] = made
+        return self._reports[wanted]
+
+
+def _selected(item: pytest.Function) -> Iterable[str]:
+    """Yield the checks of this function that pytest was told to run."""
+    for each in item.session.items:
+        if isinstance(each, pytest.Function) and each.function is item.function:
+            yield str(each.callspec.params["check_id"])
+
+
+def _judge(report: Report, check_id: str) -> None:
+    """Pass, fail, skip or be blocked, as a check was."""
+    __tracebackhide__ = True
+    result = next((one for one in report.results if one.check.id == check_id), None)
+    if result is None:
+        raise BenchBlocked(report.aborted or f"{check_id} was not judged")
+    verdict, reason = result.outcome.verdict, result.outcome.reason
+    match verdict:
+        case Verdict.FAIL:
+            pytest.fail(_text(result, report.node_id), pytrace=False)
+        case Verdict.NOT_APPLICABLE:
+            pytest.skip(reason)
+        case Verdict.INCONCLUSIVE | Verdict.BLOCKED:
+            raise BenchBlocked(f"{verdict}: {reason}")
+        case _:
+            return
+
+
+def _text(result: Result, node_id: int) -> str:
+    check = result.check
+    frames = cut(decoded_frames({})(result.outcome.evidence), MOST_LINES)
+    where = [f"look at {text}"] if (text := hint(result)) else []
+    head = f"{check.id}: {check.title}"
+    return "\n".join([head, check.source, result.outcome.reason, *frames, *where])

@@ -1,0 +1,200 @@
+"""One call of `canmon conform`: opens, asks, judges, tells."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+import click
+
+from tickrig.host.canmon.conform.chosen import chosen
+from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
+from tickrig.host.canmon.conform.consent import Consent, Progress
+from tickrig.host.canmon.conform.nodes_heard import LISTEN_US, listed, nodes_heard
+from tickrig.host.canmon.conform.report_files import check_files, write_files
+from tickrig.host.canmon.conform.stimulus import open_stimulus
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.report.report_json import report_json
+from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import Report
+from tickrig.host.canopen.eds import open_eds
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.options import VERSION
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.start import INTERRUPTED
+from tickrig.host.monitor.views.conform_frames import decoded_frames
+from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
+
+FILES: Final = ("html", "junit", "badge", "write_baseline")
+BUS_FAILED: Final = 3
+
+
+class Conformance:
+    """One call.
+
+    Args:
+        word: SOURCE; None where the options name a bus.
+        bus: what the options say of a bus.
+        options: the others, by name.
+
+    Raises:
+        Refused: something that was asked for cannot be; nothing was sent.
+    """
+
+    def __init__(self, word: str | None, bus: BusOptions, options: dict[str, Any]) -> None:
+        self._word, self._bus, self._options = word, bus, options
+        self._files: dict[str, Path] = {
+            f"--{name.replace('_', '-')}": options[name] for name in FILES if options[name]
+        }
+        check_files(self._files)
+        chosen(options["only"])
+        self._baseline = _read_baseline(options["baseline"])
+        self._allow = frozenset(map(_index, options["allow"]))
+        self._level = Level[options["level"].upper().replace("-", "_")]
+        self._stimulus = open_stimulus(options["stimulus"]) if options["stimulus"] else None
+        self._eds: Path | None = options["eds"]
+        if self._eds is not None:
+            _read_eds(self._eds)
+
+    def run(self) -> int:
+        """Do it; return the exit status."""
+        node_id: int | None = self._options["node"]
+        with ExitStack() as held:
+            source = open_conform_source(self._word, node_id, self._bus)
+            held.callback(source.close)
+            if node_id is None:
+                _say_who_is_there(source)
+            report = self._judge(source, node_id)
+        return INTERRUPTED if report is None else self._show(report)
+
+    def _judge(self, source: ConformSource, node_id: int) -> Report | None:
+        """Return the report; None if it was ended before it had begun."""
+        consent = Consent(yes=self._options["yes"], virtual=source.virtual)
+        plan = self._plan(source, node_id, consent)
+        progress = Progress(shown=sys.stderr.isatty())
+        eds = _read_eds(self._eds) if self._eds else source.eds.get(node_id)
+        judged: list[Report] = []
+        with until_interrupted():
+            if not source.virtual and self._level > Level.READ_ONLY:
+                heard = nodes_heard(source.link)
+                heard.pop(node_id, None)
+                consent.begin(node_id, self._level, heard)
+            run = ConformRun(
+                *(source.link, node_id, plan),
+                device=None if eds is None else read_device(eds),
+                eds=eds,
+                source=source.name,
+                on_result=progress.take,
+            )
+            source.watch(run.disturb)
+            judged.append(run.run())
+        progress.end()
+        return _completed(judged[0], source, eds) if judged else None
+
+    def _plan(self, source: ConformSource, node_id: int, consent: Consent) -> Plan:
+        options, stimulus = self._options, self._stimulus
+        if stimulus is None and source.stimulus is not None:
+            stimulus = source.stimulus(node_id)
+        return Plan(
+            level=self._level,
+            only=tuple(options["only"]),
+            allow=self._allow,
+            bit_rate=source.bit_rate,
+            max_load=options["max_load"] / 100,
+            seed=options["seed"],
+            stimulus=stimulus,
+            confirm=consent.confirm,
+        )
+
+    def _show(self, report: Report) -> int:
+        """Write all that was asked for; return the exit status."""
+        eds = {} if self._eds is None else {report.node_id: self._eds}
+        with until_unread():
+            if self._options["as_json"]:
+                click.echo(report_json(report, self._baseline), nl=False)
+            else:
+                show = decoded_frames(eds)
+                text = text_report(report, self._baseline, show, self._again(report))
+                click.echo(text, nl=False)
+        written = write_files(report, self._files, self._baseline, decoded_frames(eds))
+        if report.aborted:
+            return INTERRUPTED if report.aborted == "interrupted" else BUS_FAILED
+        status = self._baseline.exit_status(report)
+        return status if written or status else BUS_FAILED
+
+    def _again(self, report: Report) -> str:
+        """Return the command that judges the node again."""
+        words = ["canmon", "conform", *([self._word] if self._word else []), *self._bus.arguments()]
+        words += ["--node", str(report.node_id), f"--{report.level.word}"]
+        words += ["--eds", str(self._eds)] if self._options["eds"] else []
+        words += ["--stimulus", self._options["stimulus"]] if self._options["stimulus"] else []
+        words += [word for index in self._options["allow"] for word in ("--allow", index)]
+        return shlex.join(words)
+
+
+def _say_who_is_there(source: ConformSource) -> NoReturn:
+    """Say which nodes there are, for who did not name one."""
+    if source.virtual:
+        nodes = ", ".join(f"{node_id} ({name})" for node_id, name in source.nodes.items())
+        raise Refused(f"--node is missing; nodes of {source.name}: {nodes}")
+    heard: dict[int, int] = {}
+    with until_interrupted():
+        heard.update(nodes_heard(source.link))
+    what = listed(heard) or "nobody"
+    span = f"heard within {LISTEN_US / 1e6:.1f} s: {what}"
+    raise Refused(f"--node is missing; {span} (who says nothing by itself is not heard)")
+
+
+def _completed(report: Report, source: ConformSource, eds: EdsFile | None) -> Report:
+    """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
+    settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
+    if eds is None:
+        return replace(report, settings=settings)
+    settings["EDS"] = Path(eds.name).name
+    wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
+    return replace(report, settings=settings, findings=(*wrong, *report.findings))
+
+
+def _read_baseline(path: Path | None) -> Baseline:
+    if path is None:
+        return NONE_KNOWN
+    try:
+        return Baseline.read(path)
+    except OSError as error:
+        refuse_path("--baseline", error)
+    except ValueError as error:
+        raise Refused(f"--baseline {error}") from None
+
+
+def _read_eds(path: Path) -> EdsFile:
+    try:
+        file = open_eds(path)
+        if not read_device(file).entries:
+            raise EdsError(file.errors)
+    except OSError as error:
+        refuse_path("--eds", error)
+    except EdsError as error:
+        raise Refused(f"--eds {error}") from None
+    return file
+
+
+def _index(word: str) -> int:
+    """Read an index, as 6200h or 0x6200."""
+    digits = word.lower().removeprefix("0x").removesuffix("h")
+    try:
+        index = int(digits, 16)
+    except ValueError:
+        index = -1
+    if not 0x1000 <= index <= 0xFFFF:
+        raise Refused(f"--allow {word!r} is no index as 6200h")
+    return index

@@ -1,0 +1,125 @@
+"""The verb `conform`: judge one CANopen node, clause by clause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+LEVELS: Final = ("read-only", "communication", "intrusive")
+"""In the order of `Level`."""
+
+
+def _complete_only(
+    context: click.Context, parameter: click.Parameter, begun: str
+) -> list[CompletionItem]:
+    from click.shell_completion import CompletionItem  # noqa: PLC0415 - only at a TAB
+
+    with loading():
+        from tickrig.host.canopen.conform.notation.suite import read_suite  # noqa: PLC0415
+
+    names = [
+        (name, title)
+        for group in read_suite()
+        for name, title in [(group.name, group.title), *((c.id, c.title) for c in group.checks)]
+    ]
+    return [CompletionItem(name, help=title) for name, title in names if name.startswith(begun)]
+
+
+_levels: Final[Decorator] = add_options(
+    click.option("--read-only", "level", flag_value=LEVELS[0], default=LEVELS[0], help="Default."),
+    click.option("--communication", "level", flag_value=LEVELS[1], help="NMT, SYNC, PDO, writes."),
+    click.option("--intrusive", "level", flag_value=LEVELS[2], help="Reset, LSS, store, restore."),
+)
+_choice: Final[Decorator] = add_options(
+    click.option("--node", type=click.IntRange(1, 127), metavar="N", help="Node-ID, 1 to 127."),
+    click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node."),
+    _levels,
+    click.option("--stimulus", metavar="CMD", help="Moves inputs: a command, a socket, or ask."),
+    click.option("--allow", multiple=True, metavar="INDEX", help="May be written, as 6200h."),
+    click.option(
+        "--max-load",
+        type=click.FloatRange(0, 100, min_open=True),
+        default=30,
+        metavar="PERCENT",
+        help="Of the bus, by this tester; 30.",
+    ),
+    click.option("--yes", is_flag=True, help="Ask nothing."),
+    click.option(
+        "--only",
+        multiple=True,
+        metavar="GROUP|ID",
+        shell_complete=_complete_only,
+        help="As NMT, SDO-03, PR-*.",
+    ),
+    click.option("--list", "lists", is_flag=True, help="List the checks; judge nothing."),
+    click.option("--seed", type=click.IntRange(0), default=0, metavar="N", help="Of chance; 0."),
+)
+_reports: Final[Decorator] = add_options(
+    click.option("--json", "as_json", is_flag=True, help="JSON instead of text."),
+    click.option("--junit", type=PATH, metavar="FILE", help="JUnit, for CI."),
+    click.option("--html", type=PATH, metavar="FILE", help="One page with all frames."),
+    click.option("--badge", type=PATH, metavar="FILE", help="SVG for a README."),
+    click.option("--baseline", type=PATH, metavar="FILE", help="Failures that are known."),
+    click.option("--write-baseline", type=PATH, metavar="FILE", help="Write those of this run."),
+)
+
+
+@click.command(cls=BusCommand)
+@click.argument("source", required=False)
+@_choice
+@_reports
+@bus_options
+@click.pass_context
+def command(context: click.Context, /, source: str | None, **options: Any) -> None:
+    """Judge one CANopen node, clause by clause.
+
+    The node is a black box: what counts is what it says on its bus.
+
+    SOURCE is a bus, or a rig file in virtual time. Without --node it says which
+    nodes are heard. By default the node is only read: --communication and
+    --intrusive do more, restore what they changed, and ask first (--yes). What
+    could move something, objects 6000h to 9FFFh, is written with --allow only.
+
+    \b
+    canmon conform can0 --node 5 --eds drive.eds
+    canmon conform can0 --node 5 --eds drive.eds --communication --html report.html
+    canmon conform bench.toml --node 5 --intrusive --junit out.xml
+    canmon conform can0 --node 5 --communication --yes --baseline known.txt
+    canmon conform udp --node 5 --intrusive --stimulus control:/tmp/5.ctl
+    canmon conform --list --only NMT
+
+    \b
+    --stimulus CMD is called as CMD input 6000:01 01, CMD output 6200:01,
+    CMD emergency 5000 01, CMD power off; exit status 77: it has no such input.
+    control:PATH is the control socket of an emulator, ask a person here.
+
+    \b
+    Exit status  0 all pass      3 the bus failed, or a report could not be written
+                 1 a failure     4 something was inconclusive or blocked
+                 2 usage         5 nothing was judged
+    """  # noqa: D301 - click wants the backspace
+    bus = BusOptions(**{name: options.pop(name) for name in BusOptions.__dataclass_fields__})
+    if options["lists"]:
+        _list(options["only"])
+        return
+    from tickrig.host.canmon.conform.conformance import Conformance  # noqa: PLC0415 - slow
+
+    context.exit(Conformance(source, bus, options).run())
+
+
+def _list(only: Sequence[str]) -> None:
+    from tickrig.host.canmon.conform.chosen import chosen  # noqa: PLC0415 - slow
+
+    with until_unread():
+        for check in chosen(only):
+            click.echo(f"{check.id:<8}{check.level.word:<15}{check.title}")

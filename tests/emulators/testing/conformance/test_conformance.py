@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from tests.emulators.testing.conformance.stacks import R1_EDS, durand, local_node, ours
+from tickrig.device import make_epos
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.conformance.conformance import conformance
+from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
+from tickrig.host.canopen.conform.report.report_json import report_json
+from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.wire.can import CanFrame, Frames
+
+NMT = "NMT-0[345]"
+
+
+@pytest.mark.parametrize("make", [ours, local_node, durand])
+def test_any_stack_is_judged_in_virtual_time(make: Callable[[], Slave]) -> None:
+    report = conformance(make(), node_id=5, eds=R1_EDS, only=NMT)
+    assert [result.outcome.verdict for result in report.results] == [Verdict.PASS] * 3
+
+
+def test_a_slave_of_ours_tells_of_itself() -> None:
+    report = conformance(make_epos(7), only=NMT)
+    assert (report.node_id, report.exit_status) == (7, 0)
+
+
+def test_a_device_of_a_bench_is_judged_beside_others() -> None:
+    with Bench(left=make_epos(1), right=make_epos(2)) as bench:
+        report = conformance(bench["right"], only=NMT)
+        assert (report.node_id, report.exit_status) == (2, 0)
+        assert bench["left"].get("state") == "Pre-operational"
+
+
+def test_a_bare_callable_is_judged() -> None:
+    def make() -> SlaveCall:
+        def call(now_us: int, frames: Frames) -> Frames:
+            asked = [frame for frame in frames if frame.can_id == 0x603]
+            answer = bytes.fromhex("8000100000000206")
+            return tuple(CanFrame(0x583, answer) for _ in asked)
+
+        return call
+
+    report = conformance(make, node_id=3, only="NMT-03")
+    assert [result.outcome.verdict for result in report.results] == [Verdict.BLOCKED]
+
+
+def test_the_same_slave_gives_the_same_bytes() -> None:
+    first, again = (report_json(conformance(ours(), only=NMT)) for _ in range(2))
+    assert first == again
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="level 'careful' is none of read-only"):
+        conformance(make_epos(5), level="careful")
+    with pytest.raises(ValueError, match=r"node_id is 1\.\.127, not None"):
+        conformance(local_node())
+    with pytest.raises(OSError, match=r"nosuch\.eds"):
+        conformance(make_epos(5), eds="nosuch.eds")
+    with Bench(make_epos(5), mode="real") as bench, pytest.raises(ValueError, match="virtual time"):
+        conformance(bench)

@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree.ElementTree import parse
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.host.canmon.cli import main
+
+RIG = """\
+[device.board]
+type = "{eds}"
+node_id = 5
+"""
+EDS = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
+NMT = ("--communication", "--only", "NMT-0[345]")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> str:
+    path = tmp_path / "bench.toml"
+    path.write_text(RIG.format(eds=EDS))
+    return str(path)
+
+
+def conform(*words: str) -> Result:
+    return CliRunner().invoke(main, ["conform", *words])
+
+
+def test_a_rig_in_virtual_time_is_judged_without_a_question(rig: str) -> None:
+    result = conform(rig, "--node", "5", *NMT)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-1] == "3 checks: 3 pass"
+    assert "\r" not in result.output, "no progress in a pipe"
+
+
+def test_all_reports_are_written_at_once(rig: str, tmp_path: Path) -> None:
+    names = ("html", "junit", "badge", "write-baseline")
+    files = {name: tmp_path / name for name in names}
+    words = [word for name, path in files.items() for word in (f"--{name}", str(path))]
+    assert conform(rig, "--node", "5", *NMT, *words).exit_code == 0
+    assert "Enter Pre-operational" in files["html"].read_text("utf-8")
+    assert "start, node 5" in files["html"].read_text("utf-8"), "frames are decoded"
+    assert len(parse(files["junit"]).findall("testsuite/testcase")) == 3
+    assert "3 of 3 pass" in files["badge"].read_text()
+    assert files["write-baseline"].read_text().startswith("# known failures")
+
+
+def test_json_is_the_same_each_time_and_says_what_was_run(rig: str) -> None:
+    first, again = (conform(rig, "--node", "5", *NMT, "--json").stdout for _ in range(2))
+    assert first == again
+    said = json.loads(first)
+    assert said["settings"]["adapter"] == "a rig in virtual time"
+    assert said["settings"]["EDS"] == "r1.eds"
+    assert [check["verdict"] for check in said["checks"]] == ["pass"] * 3
+
+
+def test_a_node_without_power_is_blocked_not_failed(tmp_path: Path) -> None:
+    path = tmp_path / "bench.toml"
+    path.write_text(RIG.format(eds=EDS) + '[fault]\nboard = "power_off@50ms"\n')
+    result = conform(str(path), "--node", "5", *NMT)
+    assert result.exit_code == 4, result.output
+    assert "BLOCKED" in result.stdout
+
+
+def test_without_a_node_it_says_who_is_there(rig: str) -> None:
+    result = conform(rig)
+    assert result.exit_code == 2
+    assert result.stderr.endswith(f"--node is missing; nodes of {rig}: 5 (board)\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("--node", "7"), "has no node 7; its nodes: 5"),
+        (("--node", "5", "--eds", "nosuch.eds"), "--eds nosuch.eds: No such file"),
+        (("--node", "5", "--only", "NTM"), "--only NTM: no such group or check; did you mean"),
+        (("--node", "5", "--allow", "600"), "--allow '600' is no index as 6200h"),
+        (("--node", "5", "--html", "/nosuch/x.html"), "--html /nosuch/x.html: no directory"),
+        (("--node", "5", "--badge", "/"), "--badge /: it is a directory"),
+        (("--node", "5", "--baseline", "/nosuch"), "--baseline /nosuch: No such file"),
+        (("--node", "5", "--stimulus", "nosuch-command x"), "'nosuch-command': no such command"),
+        (("--node", "5", "--stimulus", "'"), "--stimulus: No closing quotation"),
+        (("--node", "5", "--stimulus", "control:/nosuch"), "--stimulus /nosuch: No such file"),
+        (("--node", "5", "--stimulus", "ask"), "--stimulus ask wants somebody at a terminal"),
+        (("--node", "0"), "0 is not in the range 1<=x<=127"),
+        (("--node", "5", "--max-load", "0"), "0 is not in the range 0<x<=100"),
+        (("--node", "5", "--junit", "/tmp/a", "--html", "/tmp/a"), "cannot go into one file"),
+    ],
+)
+def test_what_cannot_be_is_told_before_the_run(rig: str, words: tuple[str, ...], why: str) -> None:
+    result = conform(rig, *words)
+    assert result.exit_code == 2, result.output
+    assert why in result.stderr
+    assert not result.stdout
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("run.log", "is no bus: a log holds what was said, and answers nothing"),
+        ("-", "is no bus: a log holds"),
+        ("serial:/dev/ttyUSB0,rrc", "is no whole CAN bus"),
+        ("can0,123:7FF", "is no whole CAN bus"),
+        ("nosuch.toml", "rig nosuch.toml: No such file"),
+    ],
+)
+def test_what_answers_nothing_is_no_source(source: str, why: str) -> None:
+    result = conform(source, "--node", "5")
+    assert result.exit_code == 2, result.output
+    assert why in result.stderr
+
+
+def test_no_source_at_all_is_told() -> None:
+    assert "no SOURCE: name a bus as can0" in conform("--node", "5").stderr
+
+
+def test_a_full_disk_is_told_and_the_verdict_is_shown(rig: str) -> None:
+    result = conform(rig, "--node", "5", *NMT, "--html", "/dev/full")
+    assert result.exit_code == 3
+    assert "Error: --html /dev/full: No space left on device" in result.stderr
+    assert "3 checks: 3 pass" in result.stdout
+
+
+def test_the_list_names_checks_and_their_levels() -> None:
+    result = conform("--list", "--only", "NMT-03")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("NMT-03  communication  Start remote node")
+
+
+def test_names_of_checks_are_completed() -> None:
+    from click.shell_completion import BashComplete  # noqa: PLC0415 - only here
+
+    complete = BashComplete(main, {}, "canmon", "_CANMON_COMPLETE")
+    found = complete.get_completions(["conform", "can0", "--only"], "NMT-0")
+    assert "NMT-03" in [item.value for item in found]
