@@ -24,6 +24,8 @@ MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER: Final = range(0x2000, 0x6000)
 IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 SERIAL_NUMBER: Final = 4
+LSS_ADDRESS: Final = frozenset({1, 2, 3, SERIAL_NUMBER})
+"""Sub-indices of 1018h by which LSS selects a node (CiA 305)."""
 DUMMY_TYPES: Final = range(1, 8)
 VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
 MAPPABLE: Final = Access.TPDO | Access.RPDO
@@ -113,7 +115,8 @@ def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
     for key, area in (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00))):
         yield f"{key}={sum(index in area for index in table.objects)}"
     yield from ("SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=1")
-    yield from ("DynamicChannelsSupported=0", "GroupMessaging=0", "LSS_Supported=1", "")
+    yield from ("DynamicChannelsSupported=0", "GroupMessaging=0")
+    yield from (f"LSS_Supported={int(numbers.keys() >= LSS_ADDRESS)}", "")
     yield from ("[DummyUsage]", *(f"Dummy{kind:04d}=1" for kind in DUMMY_TYPES), "")
     if comments := list(_comments(table)):
         yield from ("[Comments]", f"Lines={len(comments)}")
@@ -192,12 +195,26 @@ def _object(
         yield from _variable(title, ObjectCode.VAR, entry, values)
 
 
+def entry_lines(entry: EntryDescription) -> list[str]:
+    """Return the section of one sub-index.
+
+    Raises:
+        ValueError: a name or an access that an EDS cannot hold.
+
+    >>> from tickrig.wire.canopen.eds.object_table import RO, DataType
+    >>> entry_lines(EntryDescription(0x2000, 1, "x", DataType.UNSIGNED8, RO))[:2]
+    ['[2000sub1]', 'ParameterName=x']
+    """
+    title = f"{entry.index:04X}sub{entry.sub:X}"
+    return list(_variable(title, ObjectCode.VAR, entry, None))[:-1]
+
+
 def _variable(
     title: str, code: ObjectCode, entry: EntryDescription, values: Mapping[int, bytes] | None
 ) -> Iterator[str]:
     kind = entry.data_type
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
-    yield from (f"DataType=0x{kind:04X}", f"AccessType={_access_type(entry)}")
+    yield from (f"DataType=0x{kind:04X}", f"AccessType={access_type(entry)}")
     yield f"PDOMapping={int(bool(entry.access & MAPPABLE))}"
     yield f"DefaultValue={_default(entry) or ''}"
     if values is not None:
@@ -210,7 +227,16 @@ def _variable(
     yield ""
 
 
-def _access_type(entry: EntryDescription) -> str:
+def access_type(entry: EntryDescription) -> str:
+    """Return the AccessType of an entry.
+
+    Raises:
+        ValueError: no word of CiA 306 says it.
+
+    >>> from tickrig.wire.canopen.eds.object_table import RWW, DataType
+    >>> access_type(EntryDescription(0x6040, 0, "Controlword", DataType.UNSIGNED16, RWW))
+    'rww'
+    """
     mappable = entry.access & MAPPABLE
     name = ACCESS_TYPES.get(entry.access & ~MAPPABLE, "")
     if name == "rw" and mappable in (Access.TPDO, Access.RPDO):

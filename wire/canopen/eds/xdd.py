@@ -288,6 +288,8 @@ class _Parameters:
                     yield key, child.attributes.get("value", ""), child.line
                 case "allowedValues":
                     yield from _limits(child)
+                case "label":
+                    yield "ParameterName", " ".join(child.text.split()), child.line
                 case _:
                     yield from self._data_type(child)
 

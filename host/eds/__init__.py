@@ -1,0 +1,1 @@
+"""EDS files held against rules, mended, compared and shown."""

@@ -1,0 +1,49 @@
+"""All findings of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
+
+from tickrig.host.eds import (
+    head_rules,
+    list_rules,
+    object_rules,
+    pdo_rules,
+    profile_rules,
+    text_rules,
+    value_rules,
+)
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.rule import RuleFinding, Severity
+
+CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
+    value_rules.of_reader,
+    value_rules.stray_lines,
+    *(text_rules.encoding, text_rules.line_ends, text_rules.titles, text_rules.keywords),
+    text_rules.comments,
+    *(head_rules.sections, head_rules.file_info, head_rules.device_info, head_rules.counts),
+    *(head_rules.features, head_rules.dummy_usage, head_rules.comment_lines),
+    head_rules.commissioning,
+    list_rules.lists,
+    *(object_rules.names, object_rules.kinds, object_rules.sub_numbers, object_rules.sub_zeros),
+    *(value_rules.numbers, value_rules.limits),
+    *(pdo_rules.cob_ids, pdo_rules.halves, pdo_rules.mappings),
+    *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
+)
+UNREADABLE: Final = frozenset({"xml", "no-objects"})
+"""Where one of these is found, what else is missing goes without saying."""
+
+
+def check(document: Document) -> list[RuleFinding]:
+    """Return all findings of a file, by line."""
+    found = list(dict.fromkeys(one for rule in CHECKS for one in rule(document)))
+    if document.file.is_xml and any(one.rule.name in UNREADABLE for one in found):
+        found = [one for one in found if one.rule.name in UNREADABLE]
+    return sorted(found, key=lambda one: one.line)
+
+
+def failing(findings: Iterable[RuleFinding], *, strict: bool = False) -> list[RuleFinding]:
+    """Return those that make a check fail: errors, and with `strict` warnings."""
+    count = (Severity.ERROR, Severity.WARNING) if strict else (Severity.ERROR,)
+    return [one for one in findings if one.rule.severity in count]

@@ -1,0 +1,120 @@
+"""An EDS as the bytes of its lines, and as the device that the reader sees in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.eds.rules import RULES
+from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text, encoding_of
+from tickrig.wire.canopen.eds.eds_lines import EdsLine
+
+BOM: Final = "\ufeff"
+_END: Final = re.compile(r"(\r\n|\r|\n)")
+DCF_ENDINGS: Final = (".dcf", ".xdc")
+
+
+class Document:
+    """A file, both ways.
+
+    Args:
+        name: what findings call it.
+        data: the whole file.
+
+    Attributes:
+        name: likewise.
+        encoding: by its name in Python.
+        has_bom: whether a byte order mark stands before it.
+        texts: the lines as they stand there, without their ends.
+        ends: what ends each of them, empty for the last one.
+        file: its sections.
+        device: what they describe.
+        rows: the entries of the device by index and sub-index.
+    """
+
+    def __init__(self, name: str, data: bytes) -> None:
+        self.name, self.encoding = name, encoding_of(data)
+        text = data.decode(self.encoding, self._lossless)
+        self.has_bom = text.startswith(BOM)
+        parts = _END.split(text.removeprefix(BOM))
+        self.texts, self.ends = parts[::2], [*parts[1::2], ""]
+        self.file = EdsFile(name, decode_text(data))
+        self.device = read_device(self.file)
+        self.rows = {(row.index, row.sub): row for row in self.device.entries}
+        self._keywords: dict[tuple[str, str], EdsLine] = {}
+        for line in self.file.lines:
+            if line.is_keyword:
+                self._keywords.setdefault((line.section, line.key.lower()), line)
+        self._blocks = self._read_blocks()
+        self._subs: dict[int, list[int]] = {}
+        for _, index, sub in self.file.objects():
+            if sub is not None:
+                self._subs.setdefault(index, []).append(sub)
+
+    @property
+    def _lossless(self) -> str:
+        return "replace" if self.encoding.startswith("utf-16") else "surrogateescape"
+
+    @property
+    def is_dcf(self) -> bool:
+        """Whether it is of one node: its name says so, or that it has a node-ID."""
+        ending = self.name.lower().endswith(DCF_ENDINGS)
+        return ending or "DeviceComissioning" in self.file.sections
+
+    def keyword(self, section: str, key: str) -> EdsLine | None:
+        """Return the line that gives a keyword its value, None without one."""
+        return self._keywords.get((section, key.lower()))
+
+    def subs(self, index: int) -> list[int]:
+        """Return the sub-indices that have sections of their own."""
+        return self._subs.get(index, [])
+
+    def found(
+        self, rule: str, text: str, section: str = "", line: int | str = "", *edits: Edit
+    ) -> RuleFinding:
+        """Make a finding.
+
+        Args:
+            rule: its name.
+            text: what came, and what was allowed.
+            section: where; empty for the file as a whole.
+            line: its number, or the keyword that stands in it; the section's if left out.
+            edits: what mends it.
+        """
+        number = line if isinstance(line, int) else self.file.line(section, line)
+        kept = () if self.file.is_xml else edits
+        return RuleFinding(RULES[rule], self.name, number, section, text, kept)
+
+    def with_value(self, line: EdsLine, value: str) -> Edit:
+        """Return the edit that gives a keyword another value; blanks and comment stay."""
+        text = self.texts[line.number - 1]
+        begin = text.index("=") + 1
+        at = text.index(line.value, begin) if line.value in text[begin:] else begin
+        return Edit(line.number, lines=(text[:at] + value + text[at + len(line.value) :],))
+
+    def comment_out(self, number: int) -> Edit:
+        """Return the edit that makes a line a comment."""
+        return Edit(number, lines=(f";{self.texts[number - 1]}",))
+
+    def add_to(self, section: str, texts: Iterable[str]) -> Edit:
+        """Return the edit that puts lines at the end of a section."""
+        numbers = [line.number for line in self._blocks.get(section, ()) if line.content]
+        return Edit(max(numbers, default=0), Place.AFTER, tuple(texts))
+
+    def lines_of(self, section: str) -> list[EdsLine]:
+        """Return the keywords of a section, of the first one of that name."""
+        return [line for line in self._blocks.get(section, ()) if line.is_keyword]
+
+    def _read_blocks(self) -> dict[str, list[EdsLine]]:
+        """Return the lines of each section, as far as its first title goes."""
+        blocks: dict[str, list[EdsLine]] = {}
+        block: list[EdsLine] = blocks.setdefault("", [])
+        for line in self.file.lines:
+            if line.title:
+                known = line.section in blocks
+                block = [] if known else blocks.setdefault(line.section, [])
+            block.append(line)
+        return blocks

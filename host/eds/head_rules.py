@@ -1,0 +1,173 @@
+"""Rules over the head of a file: FileInfo, DeviceInfo, DummyUsage, Comments, commissioning."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import PurePath
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.known_keys import DEVICE_INFO, FILE_INFO, FLAGS, NAMES, OF_DCF
+from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+
+NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
+DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
+TIME: Final = re.compile(r"[0-9]{1,2}:[0-9]{2} ?[AP]M", re.ASCII | re.IGNORECASE)
+FORMS: Final = {
+    **dict.fromkeys(("CreationDate", "ModificationDate"), (DATE, "mm-dd-yyyy")),
+    **dict.fromkeys(("CreationTime", "ModificationTime"), (TIME, "hh:mmAM or hh:mmPM")),
+    "EDSVersion": (re.compile(r"[34]\.[0-9]"), "3.0 or 4.0"),
+}
+MOST_GRANULARITY: Final = 64
+DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
+DUMMY_TYPES: Final = range(1, 0x20)
+PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
+IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
+
+
+def number(document: Document, section: str, key: str) -> int | None:
+    """Return the number of a keyword; None where there is none."""
+    try:
+        return parse_number(plain_numbers(document.file.value(section, key)))
+    except ValueError:
+        return None
+
+
+def sections(document: Document) -> Iterator[RuleFinding]:
+    """Find sections that every tool wants, and that are not there."""
+    for title in NEEDED:
+        if title not in document.file.sections and not document.file.is_xml:
+            last = len(document.texts)
+            first = "SupportedObjects=0" if title == "MandatoryObjects" else f"{NAMES[0]}="
+            edit = Edit(last, Place.AFTER, ("", f"[{title}]", first))
+            yield document.found("section-missing", f"[{title}] is missing", "", 0, edit)
+
+
+def file_info(document: Document) -> Iterator[RuleFinding]:
+    """Judge [FileInfo]."""
+    if document.file.is_xml:
+        return
+    file = document.file
+    for key in FILE_INFO:
+        if not file.has("FileInfo", key):
+            what = f"{key} is missing"
+            yield document.found("file-info-missing", what, "FileInfo", key)
+    for key, (form, wanted) in FORMS.items():
+        text = file.value("FileInfo", key)
+        if text and not form.fullmatch(text):
+            what = f"{key}={shorten(text)} is not {wanted}"
+            yield document.found("file-info-form", what, "FileInfo", key)
+    said, name = file.value("FileInfo", "FileName"), PurePath(document.name).name
+    if said and said.lower() != name.lower():
+        what = f"FileName={shorten(said)}, the file is {shorten(name)}"
+        yield document.found("file-name", what, "FileInfo", "FileName")
+
+
+def device_info(document: Document) -> Iterator[RuleFinding]:
+    """Judge [DeviceInfo] by itself."""
+    file, title = document.file, "DeviceInfo"
+    if title not in file.sections:
+        return
+    for key in DEVICE_INFO:
+        if not file.has(title, key):
+            value = "" if key in NAMES else "0"
+            edit = document.add_to(title, [f"{key}={value}"])
+            what = f"{key} is missing: {value or 'none'} is taken"
+            if not file.is_xml:
+                yield document.found("device-info-missing", what, title, key, edit)
+    for key in FLAGS:
+        if number(document, title, key) not in (None, 0, 1):
+            what = f"{key}={shorten(file.value(title, key))} is not 0 or 1"
+            yield document.found("flag", what, title, key)
+    granularity = number(document, title, "Granularity")
+    if granularity is not None and not 0 <= granularity <= MOST_GRANULARITY:
+        what = f"Granularity={granularity} is not in 0..{MOST_GRANULARITY}"
+        yield document.found("granularity", what, title, "Granularity")
+    if not document.device.info.bit_rates:
+        yield document.found("bit-rate-none", "no BaudRate_... is 1", title)
+
+
+def counts(document: Document) -> Iterator[RuleFinding]:
+    """Hold the numbers of [DeviceInfo] against the objects."""
+    title = "DeviceInfo"
+    if number(document, title, "CompactPDO"):
+        return
+    for key, area in PDO_AREAS:
+        present = sum(index in area for index in document.device.objects)
+        said, line = number(document, title, key), document.keyword(title, key)
+        if said is not None and line is not None and said != present:
+            what = f"{key}={said}, but there are {present} of {area[0]:X}h to {area[-1]:X}h"
+            edit = document.with_value(line, str(present)) if not document.file.is_xml else None
+            yield document.found("pdo-count", what, title, key, *([edit] if edit else []))
+    for key, sub in IDENTITY:
+        row, said = document.rows.get((0x1018, sub)), number(document, title, key)
+        if row is None or not row.has_default or not said:
+            continue
+        value = int.from_bytes(row.default, "little")
+        if value and value != said:
+            what = f"{key}=0x{said:X}, but 1018h:{sub:02X} is 0x{value:X}"
+            yield document.found("identity", what, title, key)
+
+
+def features(document: Document) -> Iterator[RuleFinding]:
+    """Hold what [DeviceInfo] promises against the objects that it needs."""
+    title, rows = "DeviceInfo", document.rows
+    if number(document, title, "LSS_Supported") and any(
+        (0x1018, sub) not in rows for sub in (2, 4)
+    ):
+        what = "LSS_Supported=1, but 1018h has no sub-indices 1 to 4"
+        yield document.found("lss-identity", what, title, "LSS_Supported")
+    if number(document, title, "SimpleBootUpMaster") and (0x1F80, 0) not in rows:
+        what = "SimpleBootUpMaster=1, but there is no 1F80h"
+        yield document.found("boot-up-master", what, title, "SimpleBootUpMaster")
+    channels = number(document, title, "DynamicChannelsSupported")
+    if channels and "DynamicChannels" not in document.file.sections and not document.file.is_xml:
+        what = f"DynamicChannelsSupported={channels}, but there is no [DynamicChannels]"
+        yield document.found("dynamic-channels", what, title, "DynamicChannelsSupported")
+
+
+def dummy_usage(document: Document) -> Iterator[RuleFinding]:
+    """Judge [DummyUsage]."""
+    for line in document.lines_of("DummyUsage"):
+        match = DUMMY.fullmatch(line.key.lower())
+        if match is None or int(match[1], 16) not in DUMMY_TYPES or line.value not in ("0", "1"):
+            what = f"{shorten(line.content)} is not Dummy0001=0 to Dummy001F=1"
+            yield document.found("dummy-usage", what, "DummyUsage", line.number)
+
+
+def comment_lines(document: Document) -> Iterator[RuleFinding]:
+    """Count the lines of [Comments]."""
+    lines = document.lines_of("Comments")
+    numbers = {line.key.lower() for line in lines if line.key.lower() != "lines"}
+    head = document.keyword("Comments", "Lines")
+    if head is None or document.file.is_xml:
+        return
+    said = number(document, "Comments", "Lines")
+    if said != len(numbers):
+        wanted = {f"line{at}" for at in range(1, len(numbers) + 1)}
+        edits = (document.with_value(head, str(len(numbers))),) if numbers == wanted else ()
+        what = f"Lines={shorten(head.value)}, but there are {len(numbers)}"
+        yield document.found("comment-lines", what, "Comments", "Lines", *edits)
+
+
+def commissioning(document: Document) -> Iterator[RuleFinding]:
+    """Find what a DCF has and this one has not, and the other way round."""
+    file, title = document.file, "DeviceComissioning"
+    if document.name.lower().endswith(".dcf") and title not in file.sections:
+        yield document.found("commissioning-missing", f"the DCF has no [{title}]")
+    if document.name.lower().endswith(".eds") and title in file.sections:
+        yield document.found("dcf-section", f"[{title}] stands in an EDS", title)
+    if document.is_dcf:
+        return
+    for line in () if file.is_xml else file.lines:
+        kept = line.is_keyword and object_section(line.section) is not None
+        if kept and line.key.lower() in _DCF_KEYS:
+            what = f"{line.key} stands in an EDS"
+            yield document.found("dcf-key", what, line.section, line.number)
+
+
+_DCF_KEYS: Final = frozenset(key.lower() for key in OF_DCF)

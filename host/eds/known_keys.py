@@ -1,0 +1,72 @@
+"""Which sections and keywords CiA 306 knows, and how it spells them."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
+
+FILE_INFO: Final = (
+    *("FileName", "FileVersion", "FileRevision", "EDSVersion", "Description", "CreationTime"),
+    *("CreationDate", "CreatedBy", "ModificationTime", "ModificationDate", "ModifiedBy"),
+)
+FLAGS: Final = (
+    *(f"BaudRate_{kbit}" for kbit in BIT_RATES_KBIT),
+    *("SimpleBootUpMaster", "SimpleBootUpSlave", "GroupMessaging", "LSS_Supported"),
+)
+NUMBERS: Final = (
+    *("VendorNumber", "ProductNumber", "RevisionNumber", "NrOfRXPDO", "NrOfTXPDO"),
+    *("Granularity", "DynamicChannelsSupported"),
+)
+NAMES: Final = ("VendorName", "ProductName", "OrderCode")
+DEVICE_INFO: Final = (*NAMES, *NUMBERS, *FLAGS)
+OPTIONAL_INFO: Final = ("CompactPDO", "NG_Slave", "NrOfNG_MonitoredNodes", "NG_Master")
+COMMISSIONING: Final = (
+    *("NodeID", "NodeName", "Baudrate", "NetNumber", "NetworkName", "CANopenManager"),
+    *("LSS_SerialNumber", "NodeRefd", "NetRefd"),
+)
+ENTRY: Final = (
+    *("ParameterName", "ObjectType", "DataType", "AccessType", "PDOMapping", "DefaultValue"),
+    *("LowLimit", "HighLimit", "SubNumber", "CompactSubObj", "ObjFlags", "SubExtObj"),
+    *("InvertedSRAD", "UniqueID", "StorageLocation"),
+)
+OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
+OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
+"""Not of CiA 306; our reader, and in part the canopen library, take them."""
+
+_LIST: Final = re.compile(r"SupportedObjects|NrOfEntries|[0-9]+", re.IGNORECASE)
+KEYS: Final = {
+    "Comments": re.compile(r"Lines|Line[0-9]+", re.IGNORECASE),
+    "DummyUsage": re.compile(r"Dummy[0-9A-F]{4}", re.IGNORECASE),
+    **dict.fromkeys(("MandatoryObjects", "OptionalObjects", "ManufacturerObjects"), _LIST),
+}
+"""What the keywords of sections with numbered ones look like."""
+
+SECTION: Final = re.compile(
+    r"[0-9A-F]{4}(sub[0-9A-F]{1,2}|Name|Value|Denotation|ObjectLinks)?"
+    r"|[0-9A-F]{1,3}(sub[01])?|M[0-9]+.*|Tool[0-9]+",
+    re.IGNORECASE,
+)
+"""Sections beside those with names of their own: objects, data types, modules, tools."""
+
+
+def _spelled(*names: str) -> dict[str, str]:
+    return {name.lower(): name for name in names}
+
+
+_BY_SECTION: Final = {
+    "FileInfo": _spelled(*FILE_INFO, "LastEDS"),
+    "DeviceInfo": _spelled(*DEVICE_INFO, *OPTIONAL_INFO),
+    "DeviceComissioning": _spelled(*COMMISSIONING),
+    **{section: _spelled("SupportedObjects", "Lines") for section in KEYS},
+}
+_OBJECT: Final = _spelled(*ENTRY, *OF_DCF, *OURS)
+
+
+def keys_of(section: str) -> dict[str, str] | None:
+    """Return the keywords of a section by their lower case; None where any may stand."""
+    if object_section(section) is not None:
+        return _OBJECT
+    return _BY_SECTION.get(section)

@@ -1,0 +1,162 @@
+"""Rules over the three lists of objects: each object in one, numbered from 1 on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.eds.eds_lines import EdsLine
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+
+MANDATORY: Final = "MandatoryObjects"
+OPTIONAL: Final = "OptionalObjects"
+MANUFACTURER: Final = "ManufacturerObjects"
+LISTS: Final = (MANDATORY, OPTIONAL, MANUFACTURER)
+ALWAYS_MANDATORY: Final = (0x1000, 0x1001, 0x1018)
+MANUFACTURER_AREA: Final = range(0x2000, 0x6000)
+INDICES: Final = range(0x1000, 0x10000)
+
+
+class ObjectList:
+    """One list.
+
+    Attributes:
+        title: of its section.
+        entries: index by line, in their order; None for what is none.
+    """
+
+    def __init__(self, document: Document, title: str) -> None:
+        self.title = title
+        self.entries: list[tuple[EdsLine, int | None]] = []
+        for line in document.lines_of(title):
+            if line.key.isdecimal() and line.key.isascii() and line.value:
+                self.entries.append((line, _index(line.value)))
+
+    @property
+    def indices(self) -> list[int]:
+        """Those that are indices."""
+        return [index for _, index in self.entries if index is not None]
+
+
+def _index(text: str) -> int | None:
+    try:
+        number = parse_number(plain_numbers(text))
+    except ValueError:
+        return None
+    return number if 0 <= number <= 0xFFFF else None
+
+
+def home(index: int) -> str:
+    """Return the list that an object belongs to.
+
+    >>> home(0x1018), home(0x2000), home(0x6000)
+    ('MandatoryObjects', 'ManufacturerObjects', 'OptionalObjects')
+    """
+    if index in ALWAYS_MANDATORY:
+        return MANDATORY
+    return MANUFACTURER if index in MANUFACTURER_AREA else OPTIONAL
+
+
+def lists(document: Document) -> Iterator[RuleFinding]:
+    """Judge the three lists; each finding mends its list as a whole."""
+    if document.file.is_xml:
+        return
+    found = [ObjectList(document, title) for title in LISTS]
+    present = {
+        index for _, index, sub in document.file.objects() if sub is None and index in INDICES
+    }
+    listed = {index for each in found for index in each.indices}
+    for index in sorted(present - listed):
+        title = home(index)
+        what = f"{index:04X}h is in no list, {title} was expected"
+        edits = _mended(document, found, title, present)
+        yield document.found("list-missing", what, f"{index:04X}", "", *edits)
+    seen: set[int] = set()
+    for each in found:
+        yield from _judge(document, each, found, present, seen)
+
+
+def _judge(
+    document: Document,
+    each: ObjectList,
+    found: list[ObjectList],
+    present: set[int],
+    seen: set[int],
+) -> Iterator[RuleFinding]:
+    edits = _mended(document, found, each.title, present)
+    for rule, what, line in _faults(document, each, present, seen):
+        yield document.found(rule, what, each.title, line, *edits)
+
+
+def _faults(
+    document: Document, each: ObjectList, present: set[int], seen: set[int]
+) -> Iterator[tuple[str, str, int | str]]:
+    """Give rule, text and line of each fault of a list."""
+    if each.title not in document.file.sections:
+        return
+    for line, index in each.entries:
+        if index is None or index not in INDICES:
+            yield "list-entry", f"{shorten(line.content)} is no index", line.number
+            continue
+        if index not in present:
+            yield "list-extra", f"{index:04X}h has no section", line.number
+        elif index in seen:
+            yield "list-doubled", f"{index:04X}h is listed twice", line.number
+        elif _is_wrong(each.title, index):
+            what = f"{index:04X}h is in {each.title}, {home(index)} was expected"
+            yield "list-wrong", what, line.number
+        seen.add(index)
+    numbers = [int(line.key) for line, _ in each.entries]
+    if sorted(numbers) != list(range(1, len(numbers) + 1)):
+        yield "list-gap", f"its numbers are not 1 to {len(numbers)}", ""
+    said = document.file.value(each.title, "SupportedObjects")
+    if _index(said) != len(numbers):
+        what = f"SupportedObjects={shorten(said)}, but {len(numbers)} are listed"
+        yield "list-count", what, "SupportedObjects"
+
+
+def _is_wrong(title: str, index: int) -> bool:
+    """Return whether an object is in the wrong list; profiles have mandatory ones of their own."""
+    if title == MANDATORY:
+        return home(index) == MANUFACTURER
+    return title != home(index)
+
+
+def _mended(
+    document: Document, found: list[ObjectList], title: str, present: set[int]
+) -> tuple[Edit, ...]:
+    """Return the edits that make a list right; that of another list comes with its own finding."""
+    each = next(one for one in found if one.title == title)
+    if title not in document.file.sections:
+        return (Edit(len(document.texts), Place.AFTER, ("", f"[{title}]", "SupportedObjects=0")),)
+    listed = {index for one in found for index in one.indices if not _is_wrong(one.title, index)}
+    wanted = list(
+        dict.fromkeys(
+            index for index in each.indices if index in present and not _is_wrong(title, index)
+        )
+    )
+    earlier = {index for one in found[: found.index(each)] for index in one.indices}
+    wanted = [index for index in wanted if index not in earlier or home(index) == title]
+    wanted += sorted(index for index in present - listed if home(index) == title)
+    return tuple(_rewritten(document, each, wanted))
+
+
+def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Iterator[Edit]:
+    """Give the edits of those lines of a list that change."""
+    lines = [line for line, _ in each.entries]
+    for at, index in enumerate(wanted[: len(lines)]):
+        if (lines[at].key, each.entries[at][1]) != (str(at + 1), index):
+            yield Edit(lines[at].number, lines=(f"{at + 1}=0x{index:04X}",))
+    for line in lines[len(wanted) :]:
+        yield Edit(line.number)
+    added = [f"{at}=0x{index:04X}" for at, index in enumerate(wanted, 1) if at > len(lines)]
+    head = document.keyword(each.title, "SupportedObjects")
+    if head is None:
+        added.insert(0, f"SupportedObjects={len(wanted)}")
+    elif _index(head.value) != len(wanted):
+        yield document.with_value(head, str(len(wanted)))
+    if added:
+        yield document.add_to(each.title, added)

@@ -1,0 +1,126 @@
+"""Rules over the sections of objects: what each has to say, and how many sub-indices it has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.head_rules import number
+from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import COUNTS
+from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES, entry_lines
+from tickrig.wire.canopen.eds.object_table import Access
+
+LONGEST_NAME: Final = 241
+STRUCTURE: Final = 0xFF
+"""The sub-index that tells the structure of an object (CiA 301, 7.4.3)."""
+OF_ELEMENTS: Final = (
+    *("DataType", "AccessType", "PDOMapping", "DefaultValue", "LowLimit", "HighLimit"),
+)
+
+
+def names(document: Document) -> Iterator[RuleFinding]:
+    """Judge the names of objects and entries."""
+    for section, _, _ in document.file.objects():
+        name = document.file.value(section, "ParameterName")
+        if len(name) > LONGEST_NAME:
+            what = f"ParameterName has {len(name)} characters, {LONGEST_NAME} were allowed"
+            yield document.found("name-length", what, section, "ParameterName")
+        elif not name and document.file.has(section, "ParameterName"):
+            what = "ParameterName is empty"
+            yield document.found("name-empty", what, section, "ParameterName")
+
+
+def kinds(document: Document) -> Iterator[RuleFinding]:
+    """Find objects that do not say what they are, and entries that may or may not be mapped."""
+    file = document.file
+    for section, index, sub in file.objects():
+        described = document.device.objects.get(index)
+        if described is None or file.is_xml:
+            continue
+        composed = sub is None and described.code not in VARIABLES
+        if composed and not file.has(section, "ObjectType"):
+            line = f"ObjectType=0x{described.code:X}"
+            what = f"ObjectType is missing, and there are sub-indices: {line} is taken"
+            edit = document.add_to(section, [line])
+            yield document.found("object-type-missing", what, section, "", edit)
+        if not composed and file.has(section, "DataType") and not file.has(section, "PDOMapping"):
+            what = "PDOMapping is missing: 0 is taken"
+            yield document.found("pdo-mapping-missing", what, section)
+
+
+def sub_numbers(document: Document) -> Iterator[RuleFinding]:
+    """Hold SubNumber against the sub-indices that are there."""
+    file = document.file
+    for section, index, sub in file.objects():
+        described = document.device.objects.get(index)
+        if sub is not None or described is None or number(document, section, "CompactSubObj"):
+            continue
+        present, line = len(document.subs(index)), document.keyword(section, "SubNumber")
+        said = number(document, section, "SubNumber")
+        if line is None and present:
+            what = f"SubNumber is missing, there are {present} sub-indices"
+            edit = document.add_to(section, [f"SubNumber={present}"])
+            yield document.found("sub-number", what, section, "", edit)
+        elif line is not None and said not in (present, None):
+            what = f"SubNumber={said}, but there are {present} sub-indices"
+            edits = () if file.is_xml else (document.with_value(line, str(present)),)
+            yield document.found("sub-number", what, section, "SubNumber", *edits)
+
+
+def sub_zeros(document: Document) -> Iterator[RuleFinding]:
+    """Judge the sub-index 0 of arrays and records."""
+    for index, described in document.device.objects.items():
+        if described.code in VARIABLES:
+            continue
+        head, row = f"{index:04X}", document.rows.get((index, 0))
+        if row is None:
+            yield document.found("sub0-missing", "there is no sub-index 0", head)
+            continue
+        section = f"{head}sub0"
+        if row.data_type is not DataType.UNSIGNED8:
+            what = f"its DataType is {row.data_type.name}, UNSIGNED8 was allowed"
+            yield document.found("sub0-type", what, section, "DataType")
+        elif row.has_default and index not in COUNTS and Access.WRITE not in row.access:
+            yield from _highest(document, index, section, row.default[0])
+
+
+def _highest(document: Document, index: int, section: str, said: int) -> Iterator[RuleFinding]:
+    subs = [sub for at, sub in document.rows if at == index and sub != STRUCTURE]
+    line = document.keyword(section, "DefaultValue")
+    if said == max(subs) or section not in document.file.sections:
+        return
+    what = f"its default is {said}, the highest sub-index is {max(subs)}"
+    edits: tuple[Edit, ...] = ()
+    if line is not None and not document.file.is_xml:
+        edits = (document.with_value(line, str(max(subs))),)
+    yield document.found("sub0-value", what, section, "DefaultValue", *edits)
+
+
+def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
+    """Return what writes each entry of a compact object as a section of its own."""
+    place = object_section(section)
+    if place is None or document.file.is_xml:
+        return ()
+    index, _ = place
+    rows = [row for (at, _), row in sorted(document.rows.items()) if at == index]
+    edits = [
+        Edit(line.number)
+        for key in (*OF_ELEMENTS, "SubNumber")
+        if (line := document.keyword(section, key)) is not None
+    ]
+    for beside in (f"{section}Name", f"{section}Value"):
+        lines = document.lines_of(beside)
+        edits += [Edit(line.number) for line in lines]
+        if beside in document.file.sections:
+            edits.append(Edit(document.file.line(beside)))
+    count = document.keyword(section, "CompactSubObj")
+    if count is not None:
+        edits.append(Edit(count.number, lines=(f"SubNumber={len(rows)}",)))
+    told = set(document.subs(index))
+    texts = [text for row in rows if row.sub not in told for text in ("", *entry_lines(row))]
+    after = document.add_to(section, texts)
+    return (*edits, Edit(after.line, Place.AFTER, after.lines))

@@ -1,0 +1,148 @@
+"""Rules over PDOs and COB-IDs, with the defaults of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.head_rules import number
+from tickrig.host.eds.rule import RuleFinding
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+
+RPDO: Final = range(0x1400, 0x1600)
+TPDO: Final = range(0x1800, 0x1A00)
+MAPPING: Final = 0x200
+INVALID: Final = 1 << 31
+EXTENDED: Final = 1 << 29
+IDS: Final = 0x7FF
+UPPER_BITS: Final = 0x1FFF_F800
+MOST_BITS: Final = 64
+MOST_MAPPED: Final = 64
+LOWEST_NODE: Final = 1
+HIGHEST_NODE: Final = 127
+RESTRICTED: Final = (
+    *(range(0x080), range(0x101, 0x181), range(0x581, 0x600), range(0x601, 0x680)),
+    *(range(0x6E0, 0x700), range(0x701, 0x800)),
+)
+SYNC: Final = 0x1005
+EMCY: Final = 0x1014
+NODE: Final = 5
+"""The node-ID for which CAN-IDs are compared."""
+
+
+def cob_ids(document: Document) -> Iterator[RuleFinding]:
+    """Judge the COB-IDs of PDOs, SYNC and EMCY."""
+    taken: dict[int, str] = {}
+    for row in document.rows.values():
+        is_pdo = row.sub == 1 and (row.index in RPDO or row.index in TPDO)
+        if not is_pdo and (row.index not in (SYNC, EMCY) or row.sub):
+            continue
+        if row.data_type is DataType.UNSIGNED32 and row.has_default:
+            yield from _cob_id(document, row, is_pdo, taken)
+
+
+def _cob_id(
+    document: Document, row: EntryDescription, is_pdo: bool, taken: dict[int, str]
+) -> Iterator[RuleFinding]:
+    place = _section(document, row)
+    values = [
+        int.from_bytes(row.power_on_data(node), "little") for node in (LOWEST_NODE, HIGHEST_NODE)
+    ]
+    if values[0] & (EXTENDED | (INVALID if is_pdo or row.index == EMCY else 0)):
+        return
+    if values[1] & UPPER_BITS:
+        what = f"0x{values[1]:08X} of node {HIGHEST_NODE} has no CAN-ID of 11 bits"
+        yield document.found("cob-id-range", what, place, "DefaultValue")
+        return
+    ids = [value & IDS for value in values]
+    if is_pdo and any(can_id in area for can_id in ids for area in RESTRICTED):
+        what = f"CAN-ID 0x{ids[0]:03X} to 0x{ids[1]:03X} of nodes 1 to 127 is restricted"
+        yield document.found("cob-id-restricted", what, place, "DefaultValue")
+    own = int.from_bytes(row.power_on_data(NODE), "little") & IDS
+    who = f"{row.index:04X}h:{row.sub:02X}"
+    if own in taken:
+        what = f"CAN-ID 0x{own:03X} of node {NODE} is that of {taken[own]}, too"
+        yield document.found("cob-id-unique", what, place, "DefaultValue")
+    taken.setdefault(own, who)
+
+
+def halves(document: Document) -> Iterator[RuleFinding]:
+    """Find PDOs that lack their parameter or their mapping."""
+    objects = document.device.objects
+    if number(document, "DeviceInfo", "CompactPDO"):
+        return
+    for index in objects:
+        if (index in RPDO or index in TPDO) and index + MAPPING not in objects:
+            what = f"there is no mapping {index + MAPPING:04X}h"
+            yield document.found("pdo-half", what, f"{index:04X}")
+        parameter = index - MAPPING
+        if (parameter in RPDO or parameter in TPDO) and parameter not in objects:
+            what = f"there is no communication parameter {parameter:04X}h"
+            yield document.found("pdo-half", what, f"{index:04X}")
+
+
+def mappings(document: Document) -> Iterator[RuleFinding]:
+    """Judge what is mapped by default."""
+    for index in document.device.objects:
+        if index - MAPPING in RPDO:
+            yield from _mapping(document, index, Access.RPDO)
+        elif index - MAPPING in TPDO:
+            yield from _mapping(document, index, Access.TPDO)
+
+
+def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFinding]:
+    rows = [row for (at, sub), row in sorted(document.rows.items()) if at == index and sub]
+    head = document.rows.get((index, 0))
+    in_use = [row for row in rows if any(row.default)]
+    count = len(in_use)
+    if head is not None and head.has_default and head.data_type.is_integer:
+        count = int.from_bytes(head.default, "little")
+    if count > MOST_MAPPED:  # an MPDO, or none
+        if count not in (254, 255):
+            what = f"{count} objects are mapped, {MOST_MAPPED} were allowed"
+            yield document.found("mapping-count", what, f"{index:04X}sub0", "DefaultValue")
+        return
+    if head is not None and count > len(rows):
+        what = f"{count} objects are mapped, but there are {len(rows)} sub-indices"
+        yield document.found("mapping-count", what, f"{index:04X}sub0", "DefaultValue")
+    bits = 0
+    for row in rows[:count]:
+        value = int.from_bytes(row.default, "little")
+        bits += value & 0xFF
+        if row.has_default:
+            yield from _mapped(document, row, value, way)
+    if bits > MOST_BITS:
+        what = f"{bits} bits are mapped, {MOST_BITS} were allowed"
+        yield document.found("pdo-length", what, f"{index:04X}")
+
+
+def _mapped(
+    document: Document, row: EntryDescription, value: int, way: Access
+) -> Iterator[RuleFinding]:
+    """Judge one object that is mapped."""
+    index, sub, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
+    place, what = _section(document, row), f"{index:04X}h:{sub:02X}"
+    if index < 0x20:  # a dummy
+        return
+    target = document.rows.get((index, sub))
+    if target is None:
+        yield document.found("mapped-missing", f"{what} is not there", place, "DefaultValue")
+        return
+    if target.data_type.bits not in (0, bits):
+        text = f"{what} is mapped with {bits} bits, it has {target.data_type.bits}"
+        yield document.found("mapped-length", text, place, "DefaultValue")
+    if not target.access & (Access.TPDO | Access.RPDO):
+        text = f"{what} is mapped, its PDOMapping is 0"
+        yield document.found("mapped-mappable", text, place, "DefaultValue")
+    elif way not in target.access:
+        name = "an RPDO" if way is Access.RPDO else "a TPDO"
+        text = f"{what} is mapped into {name}, which its AccessType does not allow"
+        yield document.found("mapped-direction", text, place, "DefaultValue")
+
+
+def _section(document: Document, row: EntryDescription) -> str:
+    """Return the section that an entry is described in."""
+    section = f"{row.index:04X}sub{row.sub:X}"
+    return section if section in document.file.sections else f"{row.index:04X}"

@@ -1,0 +1,142 @@
+"""All rules of `canmon eds check`: name, clause, what breaks, what to do."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.eds.rule import Rule, Severity
+
+PRACTICE: Final = "practice"
+FILE_INFO: Final = "CiA 306-1, [FileInfo]"
+DEVICE_INFO: Final = "CiA 306-1, [DeviceInfo]"
+LISTS: Final = "CiA 306-1, lists of objects"
+VALUES: Final = "CiA 306-1, interpretation of values"
+OBJECT: Final = "CiA 306-1 4.6.3"
+OBJECT_KEYS: Final = "CiA 306-1 4.6.3.2"
+DICTIONARY: Final = "CiA 301 7.4"
+RPDO_MAPPING: Final = "CiA 301 7.5.2.36 and 7.5.2.38"
+PDO_PARAMETER: Final = "CiA 301 7.5.2.35 and 7.5.2.37"
+RESTRICTED: Final = "CiA 301, restricted CAN-IDs"
+
+_ERRORS: Final = (
+    ("utf-16", PRACTICE, "nearly every reader sees noise", "write it as ASCII or UTF-8"),
+    ("line-ends", PRACTICE, "most readers see one long line", "end lines with CR LF or LF"),
+    (
+        "xml",
+        "CiA 311",
+        "it cannot be read",
+        "give an XDD with a CANopenObjectList, without DOCTYPE",
+    ),
+    ("no-objects", OBJECT, "there is no device", "describe its objects"),
+    ("no-keyword", "CiA 306-1, structure", "parsers stop here, or skip it", "KEY=VALUE or ; text"),
+    ("doubled-section", PRACTICE, "parsers refuse it, or take either", "merge the sections"),
+    ("doubled-key", PRACTICE, "parsers refuse it, or take either", "keep one"),
+    ("section-missing", "CiA 306-1, structure", "tools refuse the file", "add it"),
+    ("list-count", LISTS, "tools stop early or refuse the list", "count its entries"),
+    ("list-gap", LISTS, "tools stop at the gap", "number the entries from 1 on"),
+    ("list-missing", LISTS, "tools that follow the lists do not see it", "add it to its list"),
+    ("list-extra", LISTS, "tools refuse the file", "describe the object, or take it off the list"),
+    ("list-entry", LISTS, "tools refuse the list", "give an index, as 0x1018"),
+    ("object-type", OBJECT_KEYS, "tools refuse the object", "0x7 VAR, 0x8 ARRAY, 0x9 RECORD, ..."),
+    ("data-type-missing", OBJECT_KEYS, "tools refuse the object", "add DataType, as 0x0007"),
+    ("access-missing", OBJECT_KEYS, "tools refuse the object", "add AccessType"),
+    ("access-form", OBJECT_KEYS, "tools refuse the object", "ro, wo, rw, rwr, rww or const"),
+    ("name-missing", OBJECT_KEYS, "tools refuse the object", "add ParameterName"),
+    ("empty-value", VALUES, "tools refuse the file", "give it a value, or leave it out"),
+    ("no-number", VALUES, "tools refuse the file", "write a number"),
+    ("number-form", VALUES, "tools refuse the number", "write 10, 0xA or 012, and nothing else"),
+    ("sub-number", OBJECT_KEYS, "tools lose sub-indices or refuse them", "count the sub-indices"),
+    ("sub-orphan", OBJECT, "tools refuse or lose it", "describe the object as well"),
+    ("sub0-missing", DICTIONARY, "nobody can read how many there are", "describe sub-index 0"),
+    ("sub0-type", DICTIONARY, "tools read another length", "make it an UNSIGNED8"),
+    ("default-value", VALUES, "tools refuse it, or the device has another", "fit it to DataType"),
+    ("limit-order", OBJECT_KEYS, "no value is allowed", "exchange LowLimit and HighLimit"),
+    ("mandatory-missing", "CiA 301 7.5.2", "it is no CANopen device", "add 1000h, 1001h and 1018h"),
+    (
+        "communication-type",
+        "CiA 301 7.5.2",
+        "hosts send another length",
+        "take the type of CiA 301",
+    ),
+    ("communication-kind", "CiA 301 7.5.2", "hosts address other sub-indices", "as CiA 301 has it"),
+    ("cob-id-range", PDO_PARAMETER, "no CAN-ID has so many bits", "give 11 bits, or set bit 29"),
+    ("pdo-length", RPDO_MAPPING, "such a PDO cannot be sent", "map at most 64 bits"),
+    ("mapped-missing", RPDO_MAPPING, "the device refuses its own default", "map what is there"),
+    (
+        "mapped-length",
+        RPDO_MAPPING,
+        "PDOs are taken apart wrongly",
+        "give the length of the object",
+    ),
+)
+_WARNINGS: Final = (
+    ("bom", PRACTICE, "the first section has another name for some", "leave the mark out"),
+    ("control-character", PRACTICE, "some readers end at it", "leave it out"),
+    ("section-form", OBJECT, "case-sensitive readers miss it", "write it as CiA 306 does"),
+    ("inline-comment", PRACTICE, "readers take it for the value", "give it a line of its own"),
+    ("device-info-missing", DEVICE_INFO, "tools guess, or refuse", "add it"),
+    ("bit-rate-none", DEVICE_INFO, "tools offer none", "set what it supports to 1"),
+    ("granularity", DEVICE_INFO, "tools map what it refuses", "0 to 64; 8 for whole bytes"),
+    ("flag", DEVICE_INFO, "tools differ in what is true", "write 0 or 1"),
+    ("pdo-count", DEVICE_INFO, "tools show too many or too few", "count the PDO parameters"),
+    ("identity", DEVICE_INFO, "masters refuse the node", "give 1018h and DeviceInfo one number"),
+    ("dynamic-channels", "CiA 302-4", "tools look for segments", "add [DynamicChannels], or 0"),
+    ("dummy-usage", "CiA 306-1, [DummyUsage]", "tools skip it", "Dummy0001=0 or =1, by data type"),
+    ("comment-lines", "CiA 306-1, [Comments]", "tools lose comments", "count the lines"),
+    ("commissioning-missing", "CiA 306-1, DCF", "it is of no node", "add [DeviceComissioning]"),
+    ("dcf-key", "CiA 306-1, DCF", "EDS readers skip it, or take it", "DefaultValue, or a DCF"),
+    ("dcf-section", "CiA 306-1, DCF", "EDS readers skip it", "name the file .dcf"),
+    ("node-id", "CiA 301 7.2", "no node has it", "1 to 127"),
+    ("list-wrong", LISTS, "tools show it elsewhere", "by its index: 2000h to 5FFFh manufacturer's"),
+    ("list-doubled", LISTS, "tools count it twice", "list it once"),
+    ("object-type-missing", OBJECT_KEYS, "it counts as VAR: sub-indices are lost", "add it"),
+    ("data-type-unknown", DICTIONARY, "tools take bytes, or refuse it", "take one of CiA 301"),
+    ("name-length", OBJECT_KEYS, "tools cut it off", "at most 241 characters"),
+    ("compact-record", OBJECT, "tools refuse it, or see one entry", "describe each entry"),
+    ("sub0-value", DICTIONARY, "tools read too many or too few", "the highest sub-index"),
+    ("leading-zero", VALUES, "it is octal for some, decimal for others", "write 0x or no 0"),
+    ("nodeid-form", VALUES, "tools find no node-ID, or fail", "$NODEID+0x180"),
+    ("boolean-value", DICTIONARY, "tools differ in what is true", "write 0 or 1"),
+    ("text-value", DICTIONARY, "the bytes depend on the reader", "ASCII in a VISIBLE_STRING"),
+    ("factor", PRACTICE, "readers divide by it", "a number that is not 0"),
+    ("default-limits", OBJECT_KEYS, "the device refuses its own default", "mend one of them"),
+    ("limit-value", OBJECT_KEYS, "tools fail, or take no limit", "a number of its DataType"),
+    ("limit-range", OBJECT_KEYS, "tools fail, or take no limit", "a number of its DataType"),
+    ("communication-access", "CiA 301 7.5.2", "hosts write, or fail to read", "as CiA 301 has it"),
+    ("cob-id-restricted", RESTRICTED, "it clashes with a service", "another CAN-ID, or set bit 31"),
+    ("cob-id-unique", RESTRICTED, "one CAN-ID means two things", "another CAN-ID, or set bit 31"),
+    ("pdo-half", PDO_PARAMETER, "hosts cannot take the PDO apart", "parameter and mapping"),
+    ("mapping-count", RPDO_MAPPING, "hosts map what is not there", "at most its sub-indices"),
+    ("mapped-mappable", RPDO_MAPPING, "tools refuse the default", "PDOMapping=1"),
+    ("mapped-direction", RPDO_MAPPING, "tools refuse the default", "AccessType that goes that way"),
+    ("profile-objects", "CiA 401, CiA 402-2, 1000h", "masters fail", "add them, or mend 1000h"),
+    ("lss-identity", "CiA 305", "the node cannot be selected", "1018h with four numbers, or 0"),
+    ("boot-up-master", "CiA 302-2 1F80h", "it cannot be configured", "add 1F80h, or 0"),
+    ("error-control", "CiA 301 7.2.8", "nobody notices that it is lost", "add 1017h"),
+)
+_NOTES: Final = (
+    ("non-ascii", PRACTICE, "other letters in other readers", "ASCII"),
+    ("mixed-line-ends", PRACTICE, "nothing", "one kind"),
+    ("hash-comment", PRACTICE, "it is a keyword for some", "begin with ;"),
+    ("key-case", PRACTICE, "case-sensitive readers miss it", "write it as CiA 306 does"),
+    ("unknown-key", PRACTICE, "tools skip it", "leave it, if it is the vendor's own"),
+    ("unknown-section", PRACTICE, "tools skip it", "leave it, if it is the vendor's own"),
+    ("file-info-missing", FILE_INFO, "tools show nothing", "add it"),
+    ("file-info-form", FILE_INFO, "tools show it as it is", "mm-dd-yyyy, hh:mmAM, EDSVersion=4.0"),
+    ("file-name", FILE_INFO, "people look for another file", "the name of the file"),
+    ("name-empty", OBJECT_KEYS, "tools show nothing", "give it a name"),
+    ("pdo-mapping-missing", OBJECT_KEYS, "it counts as 0", "add PDOMapping=0"),
+    ("limit-type", OBJECT_KEYS, "tools skip it", "limits are for numbers"),
+    ("profile-none", "CiA 301 7.5.2.1", "masters see no profile", "name the profile in 1000h"),
+)
+
+RULES: Final = {
+    name: Rule(name, severity, clause, breaks, fix)
+    for severity, rules in (
+        (Severity.ERROR, _ERRORS),
+        (Severity.WARNING, _WARNINGS),
+        (Severity.NOTE, _NOTES),
+    )
+    for name, clause, breaks, fix in rules
+}
+"""By name, errors first."""

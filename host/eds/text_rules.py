@@ -1,0 +1,116 @@
+"""Rules over the text: encoding, line ends, titles, keywords, comments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.known_keys import KEYS, SECTION, keys_of
+from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
+
+_CONTROLS: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+_PLAIN: Final = re.compile(
+    r"\[[0-9A-Fa-f]{1,4}(sub(0|[1-9A-Fa-f][0-9A-Fa-f]?)|Name|Value|Denotation|ObjectLinks)?\]"
+    r"|\[(M[0-9]|Tool).*\]"
+)
+_INLINE: Final = re.compile(r"\s+;.*$")
+
+
+def encoding(document: Document) -> Iterator[RuleFinding]:
+    """Find what the bytes of the file are not: ASCII without a mark."""
+    edit = Edit(0, Place.ENCODING)
+    if document.encoding.startswith("utf-16"):
+        yield document.found("utf-16", "the file is UTF-16, ASCII was allowed", "", 0, edit)
+    elif document.has_bom and not document.file.is_xml:
+        yield document.found("bom", "a byte order mark stands before the file", "", 0, edit)
+    if document.file.is_xml:
+        return
+    for number, text in enumerate(document.texts, 1):
+        if not text.isascii():
+            what = f"{shorten(text.strip())!r} has letters beyond ASCII"
+            yield document.found("non-ascii", what, "", number)
+        if _CONTROLS.search(text):
+            clean = Edit(number, lines=(_CONTROLS.sub("", text),))
+            what = "a control character stands in the line"
+            yield document.found("control-character", what, "", number, clean)
+
+
+def line_ends(document: Document) -> Iterator[RuleFinding]:
+    """Find lines that end with CR alone, and files of several minds."""
+    ends = set(document.ends) - {""}
+    if document.file.is_xml:
+        return
+    if "\r" in ends:
+        first = document.ends.index("\r") + 1
+        edit = Edit(0, Place.LINE_ENDS)
+        yield document.found("line-ends", "the line ends with CR alone", "", first, edit)
+    elif len(ends) > 1:
+        other = document.ends.index("\n" if document.ends[0] == "\r\n" else "\r\n") + 1
+        yield document.found("mixed-line-ends", "CR LF and LF end lines here", "", other)
+
+
+def titles(document: Document) -> Iterator[RuleFinding]:
+    """Find titles that are written in another way, and sections that nobody knows."""
+    for line in document.file.lines:
+        if not line.title or document.file.is_xml:
+            continue
+        if line.section in KNOWN_SECTIONS.values() or SECTION.fullmatch(line.section):
+            yield from _title(document, line)
+        else:
+            what = f"[{shorten(line.section)}] is no section of CiA 306"
+            yield document.found("unknown-section", what, "", line.number)
+
+
+def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
+    """Judge the title of a section that is known; hexadecimal digits have either case."""
+    wanted = f"[{line.section}]"
+    named = line.section in KNOWN_SECTIONS.values()
+    plain = not named and _PLAIN.fullmatch(line.content)
+    if line.content != wanted and not plain:
+        edit = Edit(line.number, lines=(wanted,))
+        what = f"{shorten(line.content)} stands for {wanted}"
+        yield document.found("section-form", what, "", line.number, edit)
+
+
+def keywords(document: Document) -> Iterator[RuleFinding]:
+    """Find keywords that nobody knows, or that are spelled in another case."""
+    if document.file.is_xml:
+        return
+    for line in document.file.lines:
+        known = keys_of(line.section)
+        if not line.is_keyword or not line.key or known is None:
+            continue
+        spelled = known.get(line.key.lower())
+        if spelled is None:
+            if not _numbered(line.section, line.key):
+                what = f"{shorten(line.key)} is no keyword of CiA 306 here"
+                yield document.found("unknown-key", what, line.section, line.number)
+        elif spelled != line.key:
+            what = f"{line.key} stands for {spelled}"
+            yield document.found("key-case", what, line.section, line.number)
+
+
+def _numbered(section: str, key: str) -> bool:
+    """Return whether a keyword is one of a list, as `Line3`, `Dummy0001` or `12`."""
+    pattern = KEYS.get(section)
+    return pattern is not None and pattern.fullmatch(key) is not None
+
+
+def comments(document: Document) -> Iterator[RuleFinding]:
+    """Find comments that some readers take for something else."""
+    for line in () if document.file.is_xml else document.file.lines:
+        text = line.text.strip()
+        if text.startswith("#"):
+            what = f"{shorten(text)!r} begins with #"
+            yield document.found("hash-comment", what, line.section, line.number)
+        elif line.content and text != line.content:
+            raw = document.texts[line.number - 1]
+            match = _INLINE.search(raw)
+            if match:
+                alone = Edit(line.number, lines=(match[0].strip(), raw[: match.start()]))
+                what = f"a comment stands behind {shorten(line.content)!r}"
+                yield document.found("inline-comment", what, line.section, line.number, alone)

@@ -1,0 +1,242 @@
+"""Rules over values: numbers, node-IDs, defaults, limits; and what mends those of the reader."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from tickrig.host.eds.document import Document
+from tickrig.host.eds.object_rules import compact_edits
+from tickrig.host.eds.rule import Edit, RuleFinding
+from tickrig.host.eds.rules import RULES
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS, TRUE_WORDS
+from tickrig.wire.canopen.eds.eds_file import Finding, shorten
+from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
+from tickrig.wire.canopen.eds.eds_value import parse_limit, plain_numbers
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+
+OCTAL: Final = re.compile(r"0+[0-7]*[1-7][0-7]*", re.ASCII)
+NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
+NUMBERS: Final = ("ObjectType", "DataType", "PDOMapping", "SubNumber", "CompactSubObj")
+VALUES: Final = ("DefaultValue", "LowLimit", "HighLimit", "ParameterValue")
+
+
+def numbers(document: Document) -> Iterator[RuleFinding]:
+    """Find numbers that are octal for some readers and decimal for others, and odd node-IDs."""
+    for section, index, sub in document.file.objects():
+        row = document.rows.get((index, sub or 0))
+        values = VALUES if row is not None and row.data_type.is_integer else ()
+        for key in (*NUMBERS, *values):
+            line = document.keyword(section, key)
+            if line is None:
+                continue
+            if OCTAL.fullmatch(line.value):
+                yield _leading_zero(document, section, line)
+            elif key in VALUES and "nodeid" in line.value.lower():
+                yield from _node_id(document, section, line)
+
+
+def _leading_zero(document: Document, section: str, line: EdsLine) -> RuleFinding:
+    value = int(line.value, 8)
+    same = value == int(line.value)
+    what = f"{line.content} is {value} in octal, {int(line.value)} in decimal"
+    edits = (document.with_value(line, str(value)),) if same and not document.file.is_xml else ()
+    return document.found("leading-zero", what, section, line.number, *edits)
+
+
+def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFinding]:
+    """Judge what the node-ID is added to; blanks are left to the author."""
+    plain = line.value.replace(" ", "")
+    if NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
+        return
+    terms = plain.upper().split("+")
+    others = [term for term in terms if term not in ("$NODEID", "NODEID")]
+    edits: tuple[Edit, ...] = ()
+    if len(others) == len(terms) - 1 and len(terms) <= 2 and not document.file.is_xml:
+        number = "".join(f"+{plain_numbers(other.replace('0X', '0x'))}" for other in others)
+        edits = (document.with_value(line, f"$NODEID{number}"),)
+    what = f"{shorten(line.content)} is not $NODEID or $NODEID+NUMBER"
+    yield document.found("nodeid-form", what, section, line.number, *edits)
+
+
+def limits(document: Document) -> Iterator[RuleFinding]:
+    """Hold defaults against limits, and limits against the data type."""
+    for row in document.rows.values():
+        section = f"{row.index:04X}"
+        if section not in document.file.sections or document.subs(row.index):
+            section = f"{section}sub{row.sub:X}"
+        for key in ("LowLimit", "HighLimit"):
+            if text := document.file.value(section, key):
+                yield from _limit(document, section, key, text, row)
+        yield from _default(document, section, row)
+
+
+def _limit(
+    document: Document, section: str, key: str, text: str, row: EntryDescription
+) -> Iterator[RuleFinding]:
+    kind = row.data_type
+    if not kind.is_integer and kind not in (DataType.REAL32, DataType.REAL64):
+        what = f"{key}={shorten(text)} of a {kind.name}"
+        yield document.found("limit-type", what, section, key)
+    elif kind.is_integer and kind is not DataType.BOOLEAN:
+        try:
+            limit = parse_limit(kind, plain_numbers(text))
+        except (ValueError, OverflowError):
+            return
+        lowest = -(1 << kind.bits - 1) if kind.signed else 0
+        if limit is not None and not lowest <= limit < lowest + (1 << kind.bits):
+            what = f"{key}={shorten(text)} is no {kind.name}"
+            yield document.found("limit-range", what, section, key)
+
+
+def _default(document: Document, section: str, row: EntryDescription) -> Iterator[RuleFinding]:
+    value = row.data_type.decode(row.default) if row.has_default else None
+    if not isinstance(value, int | float) or row.relative:
+        return
+    low, high = row.low, row.high
+    if (low is not None and value < low) or (high is not None and value > high):
+        what = f"the default {value} is not in {_text(low)}..{_text(high)}"
+        yield document.found("default-limits", what, section, "DefaultValue")
+
+
+def _text(limit: int | float | None) -> str:
+    return "" if limit is None else str(limit)
+
+
+def of_reader(document: Document) -> Iterator[RuleFinding]:
+    """Give what the reader found, with what mends it."""
+    file = document.file
+    by_line = {line.number: line for line in file.lines}
+    for finding in (*file.errors, *file.warnings):
+        line, mend = by_line.get(finding.line), _MENDS.get(finding.rule)
+        edits: tuple[Edit, ...] = ()
+        if mend is not None and line is not None and not file.is_xml:
+            edits = mend(document, finding, line)
+        text = finding.reason
+        yield RuleFinding(
+            RULES[finding.rule], document.name, finding.line, finding.section, text, edits
+        )
+
+
+def _plain(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    return (document.with_value(line, plain_numbers(line.value)),)
+
+
+def _word(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Mend a PDOMapping that is a word."""
+    if line.key.lower() == "pdomapping" and line.value.lower() in TRUE_WORDS:
+        return (document.with_value(line, "1"),)
+    return ()
+
+
+def _access(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    known = LONE_LETTERS.get(line.value.lower())
+    return (document.with_value(line, known),) if known else ()
+
+
+def _empty(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Give an empty keyword the value that it counts as; what a DataType is nobody knows."""
+    if line.key.lower() == "datatype" and not line.section.endswith("sub0"):
+        return ()
+    taken = finding.reason.rpartition(": ")[2].partition(" ")[0]
+    return (document.with_value(line, taken),)
+
+
+def _type_of_sub0(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    if finding.section.endswith("sub0"):
+        return (document.add_to(finding.section, ["DataType=0x0005"]),)
+    return ()
+
+
+def _kind(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Write the kind that is taken, where it has sub-indices."""
+    place = object_section(finding.section)
+    described = document.device.objects.get(place[0]) if place is not None else None
+    if described is None or not document.subs(place[0] if place else 0):
+        return ()
+    return (document.with_value(line, f"0x{described.code:X}"),)
+
+
+def _comment(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    return (document.comment_out(line.number),)
+
+
+def _doubled_key(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Drop a keyword that says the same again; which of two values is meant nobody knows."""
+    first = document.keyword(line.section, line.key)
+    same = first is not None and first.value == line.value
+    return (Edit(line.number),) if same else ()
+
+
+def _doubled_section(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Move keywords to the first section, and the title out; unless they contradict it."""
+    moved: list[str] = []
+    edits = [Edit(line.number)]
+    for other in document.file.lines[line.number :]:
+        if other.title:
+            break
+        if other.is_keyword and other.key:
+            first = document.keyword(line.section, other.key)
+            if first is not None and first.number != other.number and first.value != other.value:
+                return ()
+            edits.append(Edit(other.number))
+            if first is None or first.number == other.number:
+                moved.append(document.texts[other.number - 1])
+    if moved:
+        edits.append(document.add_to(line.section, moved))
+    return tuple(edits)
+
+
+def _compact(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    return compact_edits(document, finding.section)
+
+
+_MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]]] = {
+    "number-form": _plain,
+    "no-number": _word,
+    "access-form": _access,
+    "empty-value": _empty,
+    "data-type-missing": _type_of_sub0,
+    "object-type": _kind,
+    "no-keyword": _comment,
+    "doubled-key": _doubled_key,
+    "doubled-section": _doubled_section,
+    "compact-record": _compact,
+}
+
+
+def stray_lines(document: Document) -> Iterator[RuleFinding]:
+    """Find lines that say nothing, and what is there twice, where the reader does not look."""
+    seen: set[tuple[str, str]] = set()
+    for line in () if document.file.is_xml else document.file.lines:
+        if line.title:
+            again = (line.section, "") in seen and not describes_device(line.section)
+            seen.add((line.section, ""))
+            if again:
+                finding = Finding(document.name, line.section, "", line.number)
+                edits = _doubled_section(document, finding, line)
+                what = "is there twice: of each keyword the first is taken"
+                yield document.found("doubled-section", what, line.section, line.number, *edits)
+        elif line.content and not describes_device(line.section):
+            yield from _stray(document, line, seen)
+        elif line.content and not line.section and line.is_keyword and line.key:
+            what = f"{shorten(line.content)!r} stands before the first section"
+            edit = document.comment_out(line.number)
+            yield document.found("no-keyword", what, "", line.number, edit)
+
+
+def _stray(document: Document, line: EdsLine, seen: set[tuple[str, str]]) -> Iterator[RuleFinding]:
+    if not line.is_keyword or not line.key:
+        what = f"{shorten(line.content)!r} is no keyword with a value"
+        edit = document.comment_out(line.number)
+        yield document.found("no-keyword", what, line.section, line.number, edit)
+    elif (line.section, line.key.lower()) in seen:
+        finding = Finding(document.name, line.section, "", line.number)
+        edits = _doubled_key(document, finding, line)
+        yield document.found(
+            "doubled-key", f"{line.key} is there twice", line.section, line.number, *edits
+        )
+    else:
+        seen.add((line.section, line.key.lower()))
