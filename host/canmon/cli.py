@@ -22,6 +22,7 @@ VERBS: Final = {
         f"{HERE}.conform:command",
         "Judge one CANopen node, clause by clause.",
     ),
+    "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
     "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
     "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
     "send": (f"{HERE}.send:command", "Send frames on BUS."),

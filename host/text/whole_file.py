@@ -49,13 +49,13 @@ def check_writable(folder: Path) -> None:
             beside.unlink(missing_ok=True)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Replace a file when its text is on the disk; what is no file, as a pipe, is written to.
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Replace a file when its content is on the disk; what is no file, as a pipe, is written to.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`.
     """
-    data = text.encode("utf-8", "backslashreplace")
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     try:
         place = path.resolve()
         if place.exists() and not place.is_file():

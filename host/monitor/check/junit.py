@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, Protocol
 from xml.sax.saxutils import escape, quoteattr
-
-from tickrig.host.monitor.check.rule import Finding
 
 CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
 """Characters that XML does not have."""
 
 
-def junit(suite: str, names: Sequence[str], findings: Iterable[Finding], unjudged: str = "") -> str:
+class Judged(Protocol):
+    """What a report needs of a finding, beside its text in one line."""
+
+    @property
+    def rule(self) -> str:
+        """Name of the rule."""
+        ...
+
+    @property
+    def text(self) -> str:
+        """What is wrong, in words."""
+        ...
+
+
+def junit(suite: str, names: Sequence[str], findings: Iterable[Judged], unjudged: str = "") -> str:
     """Return the report.
 
     Args:
@@ -21,7 +33,7 @@ def junit(suite: str, names: Sequence[str], findings: Iterable[Finding], unjudge
         findings: in their order.
         unjudged: why rules without a finding cannot be said to hold; empty if they can.
     """
-    by_rule: dict[str, list[Finding]] = {name: [] for name in names}
+    by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:
         by_rule[finding.rule].append(finding)
     failures = sum(bool(found) for found in by_rule.values())
@@ -33,7 +45,7 @@ def junit(suite: str, names: Sequence[str], findings: Iterable[Finding], unjudge
     return "\n".join([*lines, "</testsuite>", "</testsuites>", ""])
 
 
-def _case(suite: str, name: str, found: Sequence[Finding], unjudged: str) -> str:
+def _case(suite: str, name: str, found: Sequence[Judged], unjudged: str) -> str:
     head = f"<testcase classname={_attribute(suite)} name={_attribute(name)}"
     if not found:
         error = f"><error message={_attribute(unjudged)}/></testcase>"

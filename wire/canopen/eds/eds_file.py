@@ -211,7 +211,7 @@ class EdsFile:
             section[key] = line.value
             self._places[line.section, key] = line.number
         elif line.section and describes_device(line.section):
-            reason = f"{line.key} is there twice: {shorten(section[key])} is taken"
+            reason = f"{shorten(line.key)} is there twice: {shorten(section[key])} is taken"
             self._warn_at(line, reason, "doubled-key")
 
     def _skip(self, line: EdsLine) -> None:

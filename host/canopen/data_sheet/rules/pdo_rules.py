@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.head_rules import number
-from tickrig.host.eds.rule import RuleFinding
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 

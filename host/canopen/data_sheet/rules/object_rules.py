@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.head_rules import number
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import COUNTS
 from tickrig.wire.canopen.eds.eds_lines import object_section
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES, entry_lines
-from tickrig.wire.canopen.eds.object_table import Access
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 LONGEST_NAME: Final = 241
 STRUCTURE: Final = 0xFF
@@ -100,10 +100,18 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
     yield document.found("sub0-value", what, section, "DefaultValue", *edits)
 
 
+def _section_of(row: EntryDescription) -> Iterator[str]:
+    """Give the section of an entry; without a default where it has none."""
+    yield ""
+    for line in entry_lines(row):
+        yield "DefaultValue=" if line.startswith("DefaultValue=") and not row.has_default else line
+
+
 def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     """Return what writes each entry of a compact object as a section of its own."""
     place = object_section(section)
-    if place is None or document.file.is_xml:
+    known = all(document.file.value(section, key) for key in ("DataType", "AccessType"))
+    if place is None or document.file.is_xml or not known:
         return ()
     index, _ = place
     rows = [row for (at, _), row in sorted(document.rows.items()) if at == index]
@@ -121,6 +129,6 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     if count is not None:
         edits.append(Edit(count.number, lines=(f"SubNumber={len(rows)}",)))
     told = set(document.subs(index))
-    texts = [text for row in rows if row.sub not in told for text in ("", *entry_lines(row))]
+    texts = [text for row in rows if row.sub not in told for text in _section_of(row)]
     after = document.add_to(section, texts)
     return (*edits, Edit(after.line, Place.AFTER, after.lines))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers

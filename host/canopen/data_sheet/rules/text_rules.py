@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.known_keys import KEYS, SECTION, keys_of
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rules.known_keys import KEYS, SECTION, keys_of
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
 
@@ -90,7 +90,7 @@ def keywords(document: Document) -> Iterator[RuleFinding]:
                 what = f"{shorten(line.key)} is no keyword of CiA 306 here"
                 yield document.found("unknown-key", what, line.section, line.number)
         elif spelled != line.key:
-            what = f"{line.key} stands for {spelled}"
+            what = f"{shorten(line.key)} stands for {spelled}"
             yield document.found("key-case", what, line.section, line.number)
 
 

@@ -7,9 +7,15 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.known_keys import DEVICE_INFO, FILE_INFO, FLAGS, NAMES, OF_DCF
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rules.known_keys import (
+    DEVICE_INFO,
+    FILE_INFO,
+    FLAGS,
+    NAMES,
+    OF_DCF,
+)
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import object_section
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.eds.rule import Rule, Severity
+from tickrig.host.canopen.data_sheet.rule import Rule, Severity
 
 PRACTICE: Final = "practice"
 FILE_INFO: Final = "CiA 306-1, [FileInfo]"

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
-from tickrig.host.eds.rules import RULES
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text, encoding_of
+from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text, encoding_of, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine
 
 BOM: Final = "\ufeff"
@@ -26,6 +26,7 @@ class Document:
 
     Attributes:
         name: likewise.
+        data: likewise.
         encoding: by its name in Python.
         has_bom: whether a byte order mark stands before it.
         texts: the lines as they stand there, without their ends.
@@ -36,7 +37,7 @@ class Document:
     """
 
     def __init__(self, name: str, data: bytes) -> None:
-        self.name, self.encoding = name, encoding_of(data)
+        self.name, self.data, self.encoding = name, data, encoding_of(data)
         text = data.decode(self.encoding, self._lossless)
         self.has_bom = text.startswith(BOM)
         parts = _END.split(text.removeprefix(BOM))
@@ -86,7 +87,14 @@ class Document:
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
-        return RuleFinding(RULES[rule], self.name, number, section, text, kept)
+        return RuleFinding(RULES[rule], self.name, number, shorten(section), text, kept)
+
+    def changes(self, edits: Iterable[Edit]) -> bool:
+        """Return whether edits would leave another file."""
+        return any(
+            place is not Place.REPLACE or lines != (self.texts[line - 1],)
+            for line, place, lines in edits
+        )
 
     def with_value(self, line: EdsLine, value: str) -> Edit:
         """Return the edit that gives a keyword another value; blanks and comment stay."""

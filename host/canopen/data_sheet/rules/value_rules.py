@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import takewhile
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.object_rules import compact_edits
-from tickrig.host.eds.rule import Edit, RuleFinding
-from tickrig.host.eds.rules import RULES
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import Edit, RuleFinding
+from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS, TRUE_WORDS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
-from tickrig.wire.canopen.eds.eds_value import parse_limit, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import NODE_IDS, parse_limit, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 OCTAL: Final = re.compile(r"0+[0-7]*[1-7][0-7]*", re.ASCII)
@@ -41,7 +42,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
 def _leading_zero(document: Document, section: str, line: EdsLine) -> RuleFinding:
     value = int(line.value, 8)
     same = value == int(line.value)
-    what = f"{line.content} is {value} in octal, {int(line.value)} in decimal"
+    what = f"{shorten(line.content)} is {value} in octal, {int(line.value)} in decimal"
     edits = (document.with_value(line, str(value)),) if same and not document.file.is_xml else ()
     return document.found("leading-zero", what, section, line.number, *edits)
 
@@ -52,11 +53,11 @@ def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFi
     if NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
     terms = plain.upper().split("+")
-    others = [term for term in terms if term not in ("$NODEID", "NODEID")]
+    others = [plain_numbers(term.replace("0X", "0x")) for term in terms if term not in NODE_IDS]
+    mended = "+".join(("$NODEID", *others))
     edits: tuple[Edit, ...] = ()
-    if len(others) == len(terms) - 1 and len(terms) <= 2 and not document.file.is_xml:
-        number = "".join(f"+{plain_numbers(other.replace('0X', '0x'))}" for other in others)
-        edits = (document.with_value(line, f"$NODEID{number}"),)
+    if len(others) == len(terms) - 1 and NODE_ID.fullmatch(mended) and not document.file.is_xml:
+        edits = (document.with_value(line, mended),)
     what = f"{shorten(line.content)} is not $NODEID or $NODEID+NUMBER"
     yield document.found("nodeid-form", what, section, line.number, *edits)
 
@@ -160,7 +161,14 @@ def _kind(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ..
 
 
 def _comment(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    return (document.comment_out(line.number),)
+    """Make the line a comment; before the first section, where one is told, all such lines."""
+    lines = [line]
+    if not line.section:
+        before = takewhile(lambda other: not other.title, document.file.lines)
+        lines = [
+            other for other in before if other.content and not (other.is_keyword and other.key)
+        ]
+    return tuple(document.comment_out(other.number) for other in lines)
 
 
 def _doubled_key(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -236,7 +244,7 @@ def _stray(document: Document, line: EdsLine, seen: set[tuple[str, str]]) -> Ite
         finding = Finding(document.name, line.section, "", line.number)
         edits = _doubled_key(document, finding, line)
         yield document.found(
-            "doubled-key", f"{line.key} is there twice", line.section, line.number, *edits
+            "doubled-key", f"{shorten(line.key)} is there twice", line.section, line.number, *edits
         )
     else:
         seen.add((line.section, line.key.lower()))

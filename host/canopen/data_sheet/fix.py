@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
-from tickrig.host.eds.check import check, failing
-from tickrig.host.eds.document import BOM, Document
-from tickrig.host.eds.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.check import check, failing
+from tickrig.host.canopen.data_sheet.document import BOM, Document
+from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
 
 MOST_PASSES: Final = 50
 
@@ -34,7 +34,7 @@ def fix(document: Document) -> Fixed:
     left = failing(check(document), strict=True)
     for _ in range(MOST_PASSES):
         plan = _Plan()
-        taken = [one for one in left if one.edits and plan.take(one.edits)]
+        taken = [one for one in left if document.changes(one.edits) and plan.take(one.edits)]
         if not taken:
             break
         mended += (replace(one, line=_origin(origins, one.line)) for one in taken)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from tickrig.host.eds import (
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
+from tickrig.host.canopen.data_sheet.rules import (
     head_rules,
     list_rules,
     object_rules,
@@ -14,8 +16,6 @@ from tickrig.host.eds import (
     text_rules,
     value_rules,
 )
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.rule import RuleFinding, Severity
 
 CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     value_rules.of_reader,

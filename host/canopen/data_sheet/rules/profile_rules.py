@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.rule import RuleFinding
-from tickrig.host.eds.standard_objects import StandardObject, standard_object
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.host.canopen.data_sheet.rules.standard_objects import StandardObject, standard_object
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from tickrig.host.eds.document import Document
-from tickrig.host.eds.known_keys import FLAGS, NUMBERS
-from tickrig.host.eds.notation import access_text, default_text, limit_text, rates_text
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.notation import (
+    access_text,
+    default_text,
+    limit_text,
+    rates_text,
+)
+from tickrig.host.canopen.data_sheet.rules.known_keys import FLAGS, NUMBERS
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 

@@ -1,0 +1,117 @@
+"""The verb `eds check`: all findings of files."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import click
+
+from tickrig.host.canmon.eds.eds_files import read_document
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.data_sheet.check import check, failing
+from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
+from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.check.junit import junit
+from tickrig.host.text.whole_file import check_file, write_whole
+
+FOUND: Final = 1
+"""Exit status where a finding counts."""
+
+
+class Case(NamedTuple):
+    """A finding for the report: its rule, and the line that tells it."""
+
+    rule: str
+    text: str
+
+    def __str__(self) -> str:
+        """Return the line."""
+        return self.text
+
+
+@click.command()
+@click.argument("file", nargs=-1, required=True, type=PATH)
+@click.option("--strict", is_flag=True, help="Warnings count, too.")
+@click.option("--json", "as_json", is_flag=True, help="Findings as JSON, one a line.")
+@click.option("--junit", "report", type=PATH, metavar="FILE", help="Write a JUnit report.")
+def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | None) -> None:
+    """Tell all that is wrong in EDS files; exit status 1 if there is an error.
+
+    A finding is a line: file, line, severity, rule, what came and what was allowed,
+    what to do, and the clause that says so. Notes never count; warnings do with
+    --strict.
+
+    \b
+    canmon eds check drive.eds
+    canmon eds check *.eds *.xdd --strict --junit eds.xml
+    canmon eds check drive.eds --json | jq .rule
+    """  # noqa: D301 - click wants the backspace
+    _check_report(report)
+    documents = [read_document(path) for path in file]
+    counted: list[RuleFinding] = []
+    tally: Counter[str] = Counter()
+    for document in documents:
+        found = check(document)
+        counted += failing(found, strict=strict)
+        tally.update(one.rule.severity.value for one in found)
+        with until_unread():
+            for one in found:
+                click.echo(finding_json(one) if as_json else str(one))
+    _write(report, file, counted)
+    click.echo(_summary(len(documents), tally), err=True)
+    if counted:
+        click.get_current_context().exit(FOUND)
+
+
+def _summary(files: int, tally: Counter[str]) -> str:
+    counts = ", ".join(_counted(tally[each.value], each.value) for each in Severity)
+    return f"{_counted(files, 'file')}: {counts}"
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def finding_json(one: RuleFinding) -> str:
+    """Write a finding as an object."""
+    said = {
+        "v": 1,
+        "file": one.file,
+        "line": one.line,
+        "severity": one.rule.severity.value,
+        "rule": one.rule.name,
+        "section": one.section,
+        "text": one.text,
+        "breaks": one.rule.breaks,
+        "fix": one.rule.fix,
+        "clause": one.rule.clause,
+        "mended_by_fix": bool(one.edits),
+    }
+    return json.dumps(said, ensure_ascii=False)
+
+
+def _check_report(report: Path | None) -> None:
+    """See before the run whether the report could be written."""
+    if report is not None:
+        try:
+            check_file(report, "--junit")
+        except ValueError as error:
+            raise Refused(str(error)) from None
+
+
+def _write(report: Path | None, files: Sequence[Path], counted: Sequence[RuleFinding]) -> None:
+    """Write a test case for each rule of each file."""
+    if report is None:
+        return
+    cases = [Case(f"{one.file}: {one.rule.name}", str(one)) for one in counted]
+    names = list(dict.fromkeys(f"{path}: {name}" for path in files for name in RULES))
+    try:
+        write_whole(report, junit("canmon eds check", names, cases))
+    except OSError as error:
+        refuse_path("--junit", error)

@@ -1,0 +1,43 @@
+"""EDS files that verbs are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+from tickrig.host.cli.refused import Refused, refuse_path
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tickrig.host.canopen.data_sheet.document import Document
+
+MOST_BYTES = 32_000_000
+"""A larger file is no EDS."""
+
+
+def read_document(path: Path) -> Document:
+    """Read a file; Refused if it cannot be read, or is too large."""
+    from tickrig.host.canopen.data_sheet.document import Document  # noqa: PLC0415 - slow
+
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        refuse_path("FILE", error)
+    except ValueError as error:
+        _refuse(path, str(error))
+    if len(data) > MOST_BYTES:
+        _refuse(path, f"more than {MOST_BYTES:,} bytes: no EDS")
+    return Document(str(path), data)
+
+
+def read_device_document(path: Path) -> Document:
+    """Read a file that has to describe a device; Refused if it does not."""
+    document = read_document(path)
+    if not document.rows:
+        raise Refused("\n".join(map(str, document.file.errors)))
+    return document
+
+
+def _refuse(path: Path, reason: str) -> NoReturn:
+    raise Refused(f"FILE {path}: {reason}")

@@ -1,0 +1,74 @@
+"""The verb `eds fix`: what needs no knowledge of the device is mended."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from tickrig.host.canmon.eds.eds_files import read_document
+from tickrig.host.canmon.errors import until_unread
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from tickrig.host.canopen.data_sheet.document import Document
+
+LEFT: Final = 1
+"""Exit status where something is left that needs knowledge of the device."""
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@click.option("-o", "--output", type=PATH, metavar="OUT", help="Where it is written; may be FILE.")
+@click.option("--dry-run", is_flag=True, help="Show the lines that would change; write nothing.")
+def command(file: Path, output: Path | None, dry_run: bool) -> None:
+    """Mend an EDS; exit status 1 if errors or warnings are left.
+
+    Lines that no finding names stay to the byte. What is mended, and what is left as
+    it needs knowledge of the device, is told. XDD files are not mended.
+
+    \b
+    canmon eds fix drive.eds -o mended.eds
+    canmon eds fix drive.eds --dry-run
+    """  # noqa: D301 - click wants the backspace
+    from tickrig.host.canopen.data_sheet.fix import fix  # noqa: PLC0415 - slow
+
+    if (output is None) is not dry_run:
+        raise Refused("give -o OUT, or --dry-run")
+    document = read_document(file)
+    fixed = fix(document)
+    with until_unread():
+        if dry_run:
+            for line in _differences(document, fixed.document):
+                click.echo(line)
+        for one in fixed.mended:
+            click.echo(f"{one.file}:{max(one.line, 1)}: mended: [{one.rule.name}] {one.text}")
+        for one in fixed.left:
+            click.echo(str(one))
+    if output is not None:
+        _write(output, fixed.document.data)
+    say(f"{len(fixed.mended)} mended, {len(fixed.left)} left")
+    if fixed.left:
+        click.get_current_context().exit(LEFT)
+
+
+def _differences(old: Document, new: Document) -> Iterator[str]:
+    """Give the lines that differ, as `diff -u`; what cannot be printed as ?."""
+    lines = difflib.unified_diff(old.texts, new.texts, old.name, new.name, n=1, lineterm="")
+    for line in lines:
+        yield "".join(letter if letter.isprintable() else "?" for letter in line)
+
+
+def _write(output: Path, data: bytes) -> None:
+    try:
+        write_whole(output, data)
+    except OSError as error:
+        refuse_path("-o", error)
+    except ValueError as error:
+        raise Refused(f"-o {output}: {error}") from None

@@ -1,0 +1,29 @@
+"""The verb `eds`: EDS files, and what is done with them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import click
+
+from tickrig.host.cli.lazy_group import LazyGroup
+
+HERE: Final = "tickrig.host.canmon.eds"
+VERBS: Final = {
+    "check": (f"{HERE}.check_verb:command", "Tell all that is wrong in EDS files."),
+    "fix": (f"{HERE}.fix_verb:command", "Mend an EDS."),
+    "diff": (f"{HERE}.diff_verb:command", "Compare the devices of two EDS files."),
+    "show": (f"{HERE}.show_verb:command", "Show the device of an EDS."),
+}
+
+
+@click.group(cls=LazyGroup, commands=VERBS)
+def command() -> None:
+    """Check, mend, compare and show EDS files: EDS, DCF, XDD, XDC.
+
+    \b
+    canmon eds check drive.eds                    all findings, with line, clause and fix
+    canmon eds fix drive.eds -o mended.eds        what needs no knowledge of the device
+    canmon eds diff old.eds new.xdd               what is another device
+    canmon eds show drive.eds 6040                an object; without it, all of them
+    """  # noqa: D301 - click wants the backspace

@@ -1,0 +1,1 @@
+"""The rules over EDS files: text, head, lists, objects, values, PDOs, profiles."""

@@ -1,0 +1,101 @@
+"""Each deviation of real files is reported, read for what it is, and mended where that can be."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pytest
+
+from tests.host.canopen.data_sheet.corpus import CORPUS, DRIVE, GOOD, NAME, Deviation
+from tickrig.host.canopen.data_sheet.check import check, failing
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.fix import fix
+from tickrig.host.canopen.data_sheet.rule import Severity
+from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+
+FIELDS: Final = [name for name in EntryDescription.__slots__ if name != "key"]
+IDS: Final = [f"{at}-{each.rule}" for at, each in enumerate(CORPUS)]
+all_deviations = pytest.mark.parametrize("deviation", CORPUS, ids=IDS)
+
+
+def document_of(deviation: Deviation) -> Document:
+    return Document(deviation.name, deviation.data)
+
+
+def rows(document: Document) -> dict[tuple[int, int], list[object]]:
+    return {key: [getattr(row, name) for name in FIELDS] for key, row in document.rows.items()}
+
+
+def rules(document: Document) -> set[str]:
+    return {one.rule.name for one in check(document)}
+
+
+@pytest.mark.parametrize(("text", "name"), [(GOOD, NAME), (DRIVE, "epos.eds")])
+def test_what_is_deviated_from_is_without_any_finding(text: str, name: str) -> None:
+    assert check(Document(name, text.encode())) == []
+
+
+def test_every_rule_has_a_deviation() -> None:
+    assert {each.rule for each in CORPUS} == RULES.keys()
+
+
+@all_deviations
+def test_a_deviation_is_reported(deviation: Deviation) -> None:
+    document = document_of(deviation)
+    found = [one for one in check(document) if one.rule.name == deviation.rule]
+    assert found
+    lines = max(len(document.texts), 1)
+    for one in found:
+        assert 0 <= one.line <= lines
+        assert "\n" not in str(one)
+
+
+@all_deviations
+def test_a_deviation_is_read_for_what_it_is(deviation: Deviation) -> None:
+    document = document_of(deviation)
+    if deviation.reads is None:
+        assert rows(document) == rows(Document(NAME, GOOD.encode()))
+    else:
+        assert deviation.reads(document)
+
+
+@all_deviations
+def test_what_is_mended_passes_and_the_rest_is_told(deviation: Deviation) -> None:
+    fixed = fix(document_of(deviation))
+    if deviation.mended:
+        assert [str(one) for one in fixed.left] == []
+    elif RULES[deviation.rule].severity is not Severity.NOTE:
+        assert fixed.left
+    assert list(fixed.left) == failing(check(fixed.document), strict=True)
+
+
+@all_deviations
+def test_mending_changes_nothing_else(deviation: Deviation) -> None:
+    document = document_of(deviation)
+    fixed = fix(document)
+    again = fix(fixed.document)
+    assert (again.mended, again.document.data) == ((), fixed.document.data)
+    if not fixed.mended:
+        assert fixed.document.data == document.data
+    told = {one.rule.name for one in fixed.mended}
+    if not told & {"sub0-value", "list-extra"}:
+        assert rows(fixed.document) == rows(document) or told & CHARACTERS
+
+
+CHARACTERS: Final = {"control-character"}
+"""What a reader sees of these is not what is left when they are mended."""
+
+
+def test_lines_that_no_finding_names_stay_to_the_byte() -> None:
+    made = GOOD.replace("u8 write", "µ8 write").replace("NrOfRXPDO=4", "NrOfRXPDO = 7 ")
+    data = made.replace("\n", "\r\n").encode("cp1252")
+    fixed = fix(Document(NAME, data))
+    assert fixed.document.data == data.replace(b"NrOfRXPDO = 7 ", b"NrOfRXPDO = 4 ")
+    assert [(one.rule.name, one.line) for one in fixed.mended] == [("pdo-count", 29)]
+
+
+def test_bytes_that_no_code_page_has_survive() -> None:
+    data = GOOD.replace("u8 write", "\x81 write").encode("latin-1").replace(b"=4\n", b"=4 \n")
+    data = data.replace(b"Lines=2", b"Lines=3")
+    assert fix(Document(NAME, data)).document.data == data.replace(b"Lines=3", b"Lines=2")
