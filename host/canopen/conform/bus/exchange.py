@@ -15,7 +15,7 @@ from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID, index_sub
 from tickrig.wire.instant import NEVER
 
 MS_US: Final = 1_000
@@ -34,6 +34,9 @@ NODE_ID_MASK: Final = 0x7F
 
 NODES: Final = range(0x081, 0x780)
 """CAN-IDs of the pre-defined connection set that belong to a node."""
+
+MULTIPLEXER: Final = slice(1, 4)
+"""Of an SDO frame."""
 
 UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
@@ -56,6 +59,7 @@ class Exchange:
         boots: boot-up messages of the node so far.
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
+        transfer: index and sub-index of the last SDO transfer that the node has answered.
     """
 
     def __init__(  # noqa: PLR0913 - a bus, by keyword
@@ -74,6 +78,8 @@ class Exchange:
         self.start_us = self._known_us = self._busy_us = link.now_us
         self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
+        self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
+        self._asked, self.transfer = b"", (0, 0)
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -115,6 +121,8 @@ class Exchange:
             self._listen(self.now_us + wait_us)
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
+        if frame.can_id == self._request:
+            self._asked = frame.data[MULTIPLEXER]
         self._link.send((frame,))
 
     def expect(self, patterns: list[str], within_ms: int) -> str:
@@ -248,6 +256,9 @@ class Exchange:
         if own:
             self._allowance.use(at_us, frame)
             self.boots += text == self._boot_up
+            answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
+            if answered and frame.data[MULTIPLEXER] == self._asked:
+                self.transfer = index_sub(frame.data)
             return
         if not frame.extended and NODES.start <= frame.can_id < NODES.stop:
             self.others.add(frame.can_id & NODE_ID_MASK)

@@ -37,8 +37,9 @@ class SdoClient(ScriptRunner):
             return None
 
     def abort(self) -> None:
-        """End a transfer that a check left open."""
-        self._exchange.send(data_frame(self._request, Abort(0, 0, AbortCode.GENERAL).encode()))
+        """End a transfer that a check left open; stacks look which object the abort names."""
+        frame = Abort(*self._exchange.transfer, AbortCode.GENERAL).encode()
+        self._exchange.send(data_frame(self._request, frame))
 
 
 class ExchangeLink:

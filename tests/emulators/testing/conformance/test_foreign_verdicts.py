@@ -1,0 +1,39 @@
+"""What the tester says of two foreign stacks, beside what the 172 public checks said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from tests.emulators.testing.conformance.stacks import judge_durand, judge_local_node, judge_ours
+from tests.emulators.testing.conformance.verdict_table import compare, read_table
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+
+pytestmark = pytest.mark.unmeasured
+
+LEAST = 0.95
+GROUPS = (
+    *("UE", "US", "BU", "DE", "DS", "BD", "SG", "NMT", "HB", "NG", "PC", "PR", "SY", "EM"),
+    *("IO", "D4", "ST", "LS"),
+)
+
+
+def test_our_slave_has_no_failure() -> None:
+    report = judge_ours()
+    assert [one.check.id for one in report.results if one.outcome.verdict is Verdict.FAIL] == []
+    assert report.exit_status == 0
+
+
+@pytest.mark.parametrize(
+    ("stack", "judge"), [("LocalNode", judge_local_node), ("durand", judge_durand)]
+)
+def test_the_verdicts_are_those_of_the_public_checks(
+    stack: str, judge: Callable[[tuple[str, ...]], Report]
+) -> None:
+    report = judge(GROUPS)
+    assert report.count(Verdict.BLOCKED) == 0
+    found = compare(report, read_table(stack))
+    assert found.both >= 75
+    assert found.same >= LEAST * found.both
+    assert {one.check_id for one in found.differences} == found.explained, "each has its reason"

@@ -1,0 +1,77 @@
+"""Verdicts of two foreign stacks with the public checks, and how those of the tester compare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+from tests.environment import ROOT
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+
+FILE: Final = ROOT / "tests" / "golden" / "canopen" / "foreign_verdicts.txt"
+COLUMNS: Final = ("LocalNode", "durand")
+WORDS: Final = {
+    Verdict.PASS: "ok",
+    Verdict.FAIL: "FAIL",
+    Verdict.IMPLEMENTATION_DEFINED: "FAIL",
+}
+"""What the public checks call a verdict; where the device decides they said FAIL, and (impl)."""
+
+REASONS: Final[Mapping[tuple[str, str], str]] = {
+    ("LocalNode", "SG-01"): "a fresh LocalNode cannot abort, as it has no object yet to name; here"
+    " it was asked for others before",
+}
+"""Why a verdict differs."""
+
+
+class Difference(NamedTuple):
+    """A check of which the two say different things."""
+
+    check_id: str
+    public: str
+    here: str
+    reason: str
+
+
+class Comparison(NamedTuple):
+    """How a report compares.
+
+    Attributes:
+        both: checks that both judged.
+        differences: those of which they say different things.
+        explained: ids for which there is a reason.
+    """
+
+    both: int
+    differences: tuple[Difference, ...]
+    explained: frozenset[str]
+
+    @property
+    def same(self) -> int:
+        """Checks of which both say the same."""
+        return self.both - len(self.differences)
+
+
+def read_table(stack: str) -> dict[str, str]:
+    """Return the public verdicts on a stack: `ok`, `FAIL`, or `-` where it lacks the feature."""
+    column = 1 + COLUMNS.index(stack)
+    lines = FILE.read_text("ascii").splitlines()
+    rows = (line.split() for line in lines if not line.startswith("#"))
+    return {row[0]: row[column] for row in rows} | {"": stack}
+
+
+def compare(report: Report, table: Mapping[str, str]) -> Comparison:
+    """Compare a report with the public verdicts."""
+    stack = table[""]
+    both, differences = 0, list[Difference]()
+    for result in report.results:
+        name, word = result.check.id, WORDS.get(result.outcome.verdict, "-")
+        public = table.get(name, "-")
+        if "-" in (public, word):
+            continue
+        both += 1
+        if public != word:
+            reason = REASONS.get((stack, name), "")
+            differences.append(Difference(name, public, word, reason))
+    explained = frozenset(name for of, name in REASONS if of == stack)
+    return Comparison(both, tuple(differences), explained)
