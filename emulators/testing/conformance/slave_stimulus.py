@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
+from tickrig.wire.errors import FieldError
 
 LINES = 8
 """`di1` is lines 1 to 8, `di2` those that follow."""
@@ -27,8 +29,7 @@ class SlaveStimulus:
         slave, application = self._slave, self._application
         match words:
             case ("input", name, data) if ":" in name:
-                index, _, sub = name.partition(":")
-                slave.dictionary[int(index, 16), int(sub, 16)].assign(bytes.fromhex(data))
+                self._assign(name, bytes.fromhex(data))
             case ("output", "time"):
                 time = slave.time_of_day
                 return "none" if time is None else f"{time.ms}.{time.days}"
@@ -45,6 +46,17 @@ class SlaveStimulus:
             case _:
                 raise _unknown(words)
         return ""
+
+    def _assign(self, name: str, data: bytes) -> None:
+        """Write an object from the inside."""
+        index, _, sub = name.partition(":")
+        entry = self._slave.dictionary.find(int(index, 16), int(sub, 16))
+        if entry is None:
+            raise NotAllowed(f"input {name}: the device has no such object")
+        try:
+            entry.assign(data)
+        except (FieldError, SdoAbort) as error:
+            raise NotAllowed(f"input {name} {data.hex().upper()}: {error}") from None
 
 
 def _module(module: Ds401, words: tuple[str, ...]) -> str:
