@@ -86,7 +86,8 @@ def write_dcf(
         table: the objects.
         node_id: 1..127.
         bit_rate: in bit/s.
-        values: bytes of the present values by index << 8 | sub-index; others have their default.
+        values: bytes of the present values by index << 8 | sub-index; others have their default,
+            with the node-ID where it belongs to it.
         info: the head of the file.
     """
     commissioning = [
@@ -95,7 +96,8 @@ def write_dcf(
         *("NetNumber=0", "NetworkName=", "CANopenManager=0"),
         *(f"LSS_SerialNumber=0x{_identity(table).get(SERIAL_NUMBER, 0):08X}", ""),
     ]
-    objects = _objects(table, values)
+    present = {row.key: row.power_on_data(node_id) for row in table} | dict(values)
+    objects = _objects(table, present)
     return "\n".join([*_head(table, info, ".dcf"), *commissioning, *objects])
 
 
@@ -218,7 +220,7 @@ def _variable(
     yield f"PDOMapping={int(bool(entry.access & MAPPABLE))}"
     yield f"DefaultValue={_default(entry) or ''}"
     if values is not None:
-        value = format_value(kind, values.get(entry.key, entry.default))
+        value = format_value(kind, values[entry.key])
         yield f"ParameterValue={value if _fits_a_line(value) else ''}"
     if entry.low is not None:
         yield f"LowLimit={format_limit(kind, entry.low)}"
