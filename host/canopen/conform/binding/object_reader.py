@@ -16,6 +16,8 @@ PATIENCE: Final = 3
 """So many requests in a row without an answer: the node is gone."""
 
 ABSENT: Final = (AbortCode.NO_OBJECT, AbortCode.NO_SUBINDEX)
+BROKEN: Final = (AbortCode.TOGGLE_BIT, AbortCode.COMMAND_SPECIFIER)
+"""With these an upload ends that went wrong, from whichever side."""
 
 
 class ObjectReader:
@@ -90,6 +92,10 @@ def _contradiction(entry: EntryDescription, answer: bytes | SdoFailed) -> str:
     match answer:
         case SdoAborted() if answer.code in ABSENT and entry.sub in {0, 1}:
             return f"is described, and the node does not have it: {describe_abort(answer.code)}"
+        case SdoAborted() if answer.code in BROKEN:
+            return f"cannot be read: {describe_abort(answer.code)}"
+        case SdoTimeout():
+            return "was not answered"
         case bytes() if entry.size and len(answer) != entry.size:
             return f"is described as {entry.data_type.name}, and the node sends {len(answer)} bytes"
     return ""

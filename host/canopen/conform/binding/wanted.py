@@ -18,6 +18,7 @@ HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
 EXPEDITED_BYTES: Final = 4
+SEGMENT_BYTES: Final = 7
 SIZES: Final = (8, 16, 32, 64)
 
 Fits = Callable[[EntryDescription], bool]
@@ -154,10 +155,10 @@ WANTED: Final[tuple[Wanted, ...]] = (
     ),
     Wanted(
         "long_string",
-        "readable string of more than 4 bytes",
+        "readable string of more than 7 bytes, which has at least two segments",
         Use.READ,
         lambda entry: entry.readable and entry.data_type in TEXTS,
-        lambda value: len(value) > EXPEDITED_BYTES,
+        lambda value: len(value) > SEGMENT_BYTES,
     ),
     Wanted(
         "short_string",

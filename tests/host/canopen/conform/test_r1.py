@@ -35,7 +35,7 @@ def not_passed(report: Report) -> list[str]:
 
 def test_each_older_check_is_among_those_of_the_tester() -> None:
     checks = {check.id for group in read_suite() for check in group.checks}
-    assert checks == {check.id for check in load_all()}
+    assert checks >= {check.id for check in load_all()}
 
 
 def test_r1_passes_all_and_is_left_as_it_was() -> None:

@@ -51,7 +51,7 @@ def test_without_an_eds_a_node_shows_what_it_has() -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_the_examples_contradict_nothing(path: Path) -> None:
     found = features(make_bench(read_eds(path).make_dictionary()), open_eds(path))
-    assert {"heartbeat", "block", "lss"} <= found.words
+    assert {"heartbeat", "block", "tpdo", "rpdo"} <= found.words
     assert found.findings == ()
 
 

@@ -87,7 +87,9 @@ DEFECTS: Final = (
         hears("605#A2(..)..(.*)", r"605#A2\g<1>01\2"),
     ),
     Defect("lost segments are not asked for", ("BD-05",), says("585#A201(.*)", r"585#A203\1")),
-    Defect("4 bytes are no block", ("BU-10",), hears("605#A[04]0010(.*)", r"605#E00010\1")),
+    Defect(
+        "4 bytes are no block", ("BU-10",), hears("605#A[04]001000(?!01)(.*)", r"605#E0001000\1")
+    ),
     Defect(
         *("block download of read-only is confirmed", ("BD-07",)),
         hears("605#(C[26])001000(.*)", r"605#\g<1>022000\2"),

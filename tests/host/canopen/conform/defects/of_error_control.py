@@ -29,7 +29,7 @@ class OffBy(HeartbeatProducer):
     """Sends heartbeats a tenth too late."""
 
     def schedule(self, due_us: int) -> None:
-        if self.node.now_us < due_us < NEVER:
+        if 0 < due_us < NEVER:
             due_us = self.node.now_us + 1_100 * self.node.dictionary[0x1017, 0].number
         super().schedule(due_us)
 
@@ -126,9 +126,11 @@ def hears_first_only(slave: CanopenSlave) -> Bends:
     heard: set[str] = set()
 
     def hear(text: str) -> Iterable[str]:
-        if text.startswith("7") and text[:3] != "705" and text in heard:
+        if text.startswith("605#23161001"):
+            heard.clear()
+        elif text.startswith("7") and text[:3] != "705" and text[:3] in heard:
             return ()
-        heard.add(text)
+        heard.add(text[:3])
         return (text,)
 
     return Bends(hear)
@@ -161,7 +163,9 @@ DEFECTS: Final = (
     Defect("heartbeat never stops", ("HB-03",), services={HeartbeatProducer: Endless}),
     Defect(*("heartbeat begins late", ("HB-04", "HB-02")), services={HeartbeatProducer: Sluggish}),
     Defect(
-        "a heartbeat time cannot be read", ("HB-06",), says("585#4316.*", "585#8016100111000906")
+        "a heartbeat time cannot be read",
+        ("HB-06",),
+        says("585#43161001(?!0000).*", "585#4316100100000000"),
     ),
     Defect(
         *("two consumers of one node", ("HB-07",)),

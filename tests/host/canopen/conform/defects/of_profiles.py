@@ -19,14 +19,16 @@ from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RW, EntryDescription
 
 
-def module(name: str, breaks: tuple[str, ...], plant: Plant, *rows: EntryDescription) -> Defect:
+def module(
+    name: str, breaks: tuple[str, ...], plant: Plant, *rows: EntryDescription, left: bool = False
+) -> Defect:
     """Return a defect of a module of CiA 401."""
-    return Defect(name, breaks, plant, rows=rows, needs=frozenset({GENERIC_IO}))
+    return Defect(name, breaks, plant, rows=rows, needs=frozenset({GENERIC_IO}), left=left)
 
 
-def drive(name: str, breaks: tuple[str, ...], plant: Plant) -> Defect:
+def drive(name: str, breaks: tuple[str, ...], plant: Plant, *, left: bool = False) -> Defect:
     """Return a defect of a drive of CiA 402."""
-    return Defect(name, breaks, plant, needs=frozenset({DRIVE}))
+    return Defect(name, breaks, plant, needs=frozenset({DRIVE}), left=left)
 
 
 def ignored(place: str, instead: int) -> Plant:
@@ -75,7 +77,9 @@ def number(index: str, instead: str) -> Plant:
 
 DEFECTS: Final = (
     module(
-        "1000h names another profile", ("IO-01",), says("585#43001000.*", "585#4300100092010F00")
+        "1000h names another profile",
+        ("IO-01", "OD-1000.00-type"),
+        says("585#43001000.*", "585#4300100092010F00"),
     ),
     module(
         "inputs are not shown", ("IO-02", "IO-03"), says("585#4F006001.*", "585#4F00600155000000")
@@ -89,15 +93,15 @@ DEFECTS: Final = (
     module("output polarity ignored", ("IO-09",), ignored("6202:01", 0)),
     module("output filter mask ignored", ("IO-10",), ignored("6208:01", 0xFF)),
     module("error value ignored", ("IO-11", "IO-13"), ignored("6207:01", 0)),
-    module("error value not on heartbeat loss", ("IO-13",), hears("707#.*")),
+    module("error value not on heartbeat loss", ("IO-13",), hears("7(?!05|E5)..#.*"), left=True),
     module("error mode ignored", ("IO-12",), ignored("6206:01", 0xFF)),
     module(
         *("analogue values are sent at once", ("IO-14",), events_at_first),
         EntryDescription(0x6423, 0, "enable", DataType.BOOLEAN, RW, default=True),
     ),
     module("6423h ignored", ("IO-15",), ignored("6423:00", 0)),
-    module("upper limit ignored", ("IO-16",), ignored("6424:01", 0)),
-    module("lower limit ignored", ("IO-17",), ignored("6425:01", 0)),
+    module("upper limit ignored", ("IO-16",), ignored("6424:01", 0), left=True),
+    module("lower limit ignored", ("IO-17",), ignored("6425:01", 0), left=True),
     module("delta ignored", ("IO-18",), ignored("6426:01", 0)),
     module("analogue error value ignored", ("IO-19",), ignored("6444:01", 0)),
     drive(
@@ -106,9 +110,9 @@ DEFECTS: Final = (
     drive("Shutdown is not obeyed", ("D4-02",), controlword("06", "00")),
     drive("Switch on is not obeyed", ("D4-03",), controlword("07", "06")),
     drive("Enable operation is not obeyed", ("D4-04", "D4-05"), controlword("0F", "07")),
-    drive("Enable operation from Ready is not obeyed", ("D4-05",), needs_switched_on),
+    drive("Enable operation from Ready is not obeyed", ("D4-05",), needs_switched_on, left=True),
     drive("Quick stop is not obeyed", ("D4-06", "D4-07"), controlword("02", "0F")),
-    drive("605Ah ignored", ("D4-07",), ignored("605A:00", 2)),
+    drive("605Ah ignored", ("D4-07",), ignored("605A:00", 2), left=True),
     drive("Disable voltage is not obeyed", ("D4-08",), controlword("00", "0F")),
     drive("no EMCY of a fault", ("D4-09",), says("085#1023.*")),
     drive("fault is reset without an edge", ("D4-10",), resets_without_edge),
@@ -119,6 +123,7 @@ DEFECTS: Final = (
         "target reached is not told",
         ("D4-14",),
         says("585#4B416000(...)[4-7C-F](.*)", r"585#4B416000\g<1>0\2"),
+        left=True,
     ),
     drive(
         "homing attained is not told",

@@ -12,6 +12,7 @@ from tests.host.canopen.conform.defects.defect import (
     acts_as,
     hears,
     says,
+    together,
     unguarded,
 )
 from tickrig.device.canopen.bus.sync import Sync
@@ -155,7 +156,8 @@ def emcy_moves(slave: CanopenSlave) -> Bends:
     """Send EMCY on its old CAN-ID for ever."""
 
     def say(text: str) -> Iterable[str]:
-        return (f"085#{text[4:]}",) if text.startswith("0C5#") else (text,)
+        can_id = f"{slave.dictionary[0x1014, 0].number & 0x7FF:03X}#"
+        return (f"085#{text[4:]}",) if text.startswith(can_id) else (text,)
 
     return Bends(say=say)
 
@@ -174,7 +176,12 @@ def emcy_never_off(slave: CanopenSlave) -> Bends:
 ABORT: Final = AbortCode
 
 DEFECTS: Final = (
-    Defect("SYNC has another default", ("SY-01",), says("585#43051000.*", "585#4305100081000000")),
+    Defect(
+        "SYNC has another default",
+        ("SY-01",),
+        says("585#43051000.*", "585#4305100081000000"),
+        left=True,
+    ),
     Defect("SYNC period off by 10 %", ("SY-02",), services={Sync: Slow}),
     Defect("no SYNC producer", ("SY-02", "SY-03"), says("080#.*")),
     Defect("SYNC counter begins at 0", ("SY-03",), says("080#0(.)", r"080#1\1")),
@@ -187,12 +194,17 @@ DEFECTS: Final = (
         *("COB-ID SYNC takes all", ("SY-06", "SY-09", "SY-13")),
         unguarded("1005:00"),
     ),
-    Defect("SYNC is consumed on 80h only", ("SY-07",), hears("0B0#.*")),
-    Defect("EMCY 8240h missing", ("SY-08",), says("085#4082.*")),
+    Defect("SYNC is consumed on 80h only", ("SY-07",), hears("(0B0|6A2)#.*")),
+    Defect("EMCY 8240h missing", ("SY-08",), says("085#4082.*"), left=True),
     Defect("SYNC producer never stops", ("SY-10",), services={Sync: Endless}),
     Defect("TIME is not consumed", ("SY-11",), hears("100#.*")),
     Defect("SYNC is not consumed", ("PR-04", "PR-05"), hears("080#.*")),
-    Defect("EMCY has another default", ("EM-01",), says("585#43141000.*", "585#4314100086000000")),
+    Defect(
+        "EMCY has another default",
+        ("EM-01",),
+        says("585#43141000.*", "585#4314100086000000"),
+        left=True,
+    ),
     Defect("no EMCY", ("EM-02", "EM-11"), says("085#.*")),
     Defect(
         "EMCY without error register",
@@ -228,10 +240,12 @@ DEFECTS: Final = (
         hears("7E5#5(.*)", "7E5#0401000000000000", r"7E5#5\1"),
     ),
     Defect(
-        "LSS node-ID does not count after a reset", ("LS-04",), hears("7E5#1110(.*)", r"7E5#1105\1")
+        "LSS node-ID does not count after a reset",
+        ("LS-04",),
+        hears("7E5#11(?!00|80)..(.*)", r"7E5#1105\1"),
     ),
     Defect("LSS node-ID 0 is accepted", ("LS-05",), hears("7E5#1100(.*)", r"7E5#1105\1")),
-    Defect("LSS bit timing is refused", ("LS-06",), says("7E4#13.*")),
+    Defect("LSS bit timing is refused", ("LS-06",), says("7E4#13.*"), left=True),
     Defect("LSS bit timing 10 is accepted", ("LS-07",), hears("7E5#13000A(.*)", r"7E5#130002\1")),
     Defect("LSS stores nothing", ("LS-08",), hears("7E5#17.*")),
     Defect("LSS selective does not answer", ("LS-09",), says("7E4#44.*")),
@@ -244,7 +258,10 @@ DEFECTS: Final = (
     Defect(
         "LSS identify answers outside of its range",
         ("LS-12",),
-        hears("7E5#4([89]).{8}(.*)", r"7E5#4\g<1>04000300\2"),
+        together(
+            hears("7E5#4([8A]).{8}(.*)", r"7E5#4\g<1>00000000\2"),
+            hears("7E5#4([9B]).{8}(.*)", r"7E5#4\g<1>FFFFFFFF\2"),
+        ),
     ),
     Defect("LSS configured node says that it is not", ("LS-13",), answers_lss("4C", 0x50)),
     Defect("LSS fastscan is answered by a configured node", ("LS-14",), answers_lss("51", 0x4F)),
