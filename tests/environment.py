@@ -43,7 +43,6 @@ class Environment:
             "PIP_NO_BUILD_ISOLATION": "0",
             "PIP_DISABLE_PIP_VERSION_CHECK": "1",
             "PIP_NO_CACHE_DIR": "1",
-            "PYTHONDONTWRITEBYTECODE": "1",
         }
 
     def run(self, *words: str | Path, cwd: Path, typed: str = "", status: int = 0) -> str:
