@@ -75,6 +75,7 @@ class ConformRun:
         more = partial(play_object_step, self._client)
         player = Player(self._exchange, node_id, plan.stimulus, more)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
+        self._longest_us = round(plan.longest_s * 1e6)
         self._results: list[Result] = []
         self._subject: Subject | None = None
 
@@ -100,7 +101,7 @@ class ConformRun:
         return self._report(aborted)
 
     def _run(self) -> None:
-        self._exchange.begin(EXAMINE_US)
+        self._exchange.begin(min(EXAMINE_US, self._longest_us))
         self._exchange.wait(LISTEN_MS)
         self._permission.others = frozenset(self._exchange.others)
         try:
@@ -127,7 +128,7 @@ class ConformRun:
 
     def _judge_all(self, checks: list[Check]) -> None:
         assert self._subject is not None
-        until_us = self._exchange.start_us + round(self._plan.longest_s * 1e6)
+        until_us = self._exchange.start_us + self._longest_us
         for number, check in enumerate(checks):
             if self._care.lost:
                 self._block(checks[number:], "the node does not answer any more")

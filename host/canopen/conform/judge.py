@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
@@ -16,6 +17,9 @@ from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.subject.subject import Subject
 from tickrig.host.canopen.conform.verdict import Outcome, Result, Verdict
+
+HISTORY: Final = (0x1003, 0)
+EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 
 
 class Judge:
@@ -69,6 +73,8 @@ class Judge:
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):
                 self._permission.check_write(index, refused=True)
+            if HISTORY in bound.changed and any(self._care.held(HISTORY)):
+                self._permission.check_confirmed(EMPTIED)
             for question in sorted(bound.questions):
                 self._permission.check_confirmed(question)
         except Unbound as error:

@@ -54,6 +54,7 @@ PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
 LSS: Final = ("lss", "lssident", "unconfigured")
 IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 DEVICE_TYPE: Final = 0x1000
+LSS_ADDRESS: Final = 0x1018
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +88,18 @@ def find_features(binding: Binding, runner: ScriptRunner, file: EdsFile | None =
     reasons = dict(_missing(binding))
     if not any(_number(text) for text in dummies.values()):
         reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
+    findings = [*_profile(binding), *_identity(binding, info)]
+    if _number(info.get("lss_supported", "")) and not _has_lss_address(binding):
+        reasons |= dict.fromkeys(LSS, "1018h has not the four numbers of an LSS address")
+        findings.append(
+            "the EDS says that it has LSS, and 1018h has not the numbers of its address"
+        )
     if not _number(info.get("lss_supported", "")):
         reasons |= dict.fromkeys(LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
     if not has_block_upload(runner):
         reasons["block"] = "it refuses a block upload of 1000h"
     words = {*OF_OBJECTS, *PROFILES, *LSS, "dummy", "block"} - reasons.keys()
-    findings = (*_profile(binding), *_identity(binding, info))
-    return Features(frozenset(words), reasons, findings)
+    return Features(frozenset(words), reasons, tuple(findings))
 
 
 def has_block_upload(runner: ScriptRunner) -> bool:
@@ -133,6 +139,12 @@ def _number(text: str) -> int | None:
     with suppress(ValueError):
         return parse_number(text)
     return None
+
+
+def _has_lss_address(binding: Binding) -> bool:
+    """Return whether 1018h has vendor, product, revision and serial number (CiA 305)."""
+    present = {(entry.index, entry.sub) for entry in binding.device.entries}
+    return present.issuperset((LSS_ADDRESS, sub) for sub in range(1, 5))
 
 
 def _profile_number(binding: Binding) -> int | None:

@@ -254,7 +254,6 @@ class Exchange:
             self._unread[can_id].append((at_us, text))
             self.evidence.add(at_us - self.start_us, Direction.RECEIVED, text)
         if own:
-            self._allowance.use(at_us, frame)
             self.boots += text == self._boot_up
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
             if answered and frame.data[MULTIPLEXER] == self._asked:

@@ -11,11 +11,15 @@ from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING
 from tickrig.host.canopen.conform.notation.names import Address
+from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo.sdo_command import SEGMENT_BYTES
 
 MOST_BYTES: Final = 20_000
 """A transfer that brings more than this failed: a node that never ends one is found out."""
+
+STATE_MS: Final = 20
+"""So long after an NMT command a node is in its new state."""
 
 SCAN_MS: Final = 10
 FOUND: Final = "7E4#4F00000000000000"
@@ -173,6 +177,28 @@ def remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> No
     sdo.write((head, 1), cob_id)
 
 
+def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
+    """Guard a node: it tells the states in turn, and its toggle bit alternates.
+
+    Args:
+        sdo: for its bus.
+        can_id: of error control.
+        words: states in hex, each asked for once; a word with # is a frame that is sent before.
+    """
+    toggle: int | None = None
+    for word in words:
+        if "#" in word:
+            sdo.exchange.send(CanFrame.parse(word))
+            sdo.exchange.wait(STATE_MS)
+            continue
+        sdo.exchange.forget(can_id)
+        sdo.exchange.send(CanFrame.parse(f"{can_id}#R1"))
+        state = int(word, 16)
+        wanted = (state, state | 0x80) if toggle is None else (state | toggle ^ 0x80,)
+        got = sdo.exchange.expect([f"{can_id}#{number:02X}" for number in wanted], ANSWER_MS)
+        toggle = int(got[-2:], 16) & 0x80
+
+
 def fastscan(sdo: SdoFrames, *address: str) -> None:
     """Find the LSS address bit by bit (CiA 305, LSS fastscan)."""
     if not _scan(sdo, 0, 0x80, 0, 0):
@@ -229,4 +255,5 @@ MACROS: Final[dict[str, Callable[..., object]]] = {
     "blockup": upload_same,
     "map": remap,
     "fastscan": fastscan,
+    "guard": guard,
 }

@@ -61,11 +61,11 @@ class SdoFrames:
         """Read an object; StepFailed unless it holds what the pattern says."""
         size = len(data) // 2
         self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
-        if size <= EXPEDITED_BYTES:
+        if 1 <= size <= EXPEDITED_BYTES:
             self.answer(f"{_sized(UPLOADED, size):02X}{multiplexer(at)}{data:.<8}")
             return
         self.answer(f"41{multiplexer(at)}{size.to_bytes(4, 'little').hex().upper()}")
-        for number, start in enumerate(range(0, size, SEGMENT_BYTES)):
+        for number, start in enumerate(range(0, max(1, size), SEGMENT_BYTES)):
             toggle, part = (number & 1) << 4, data[2 * start : 2 * (start + SEGMENT_BYTES)]
             self.say(bytes([0x60 | toggle, *bytes(7)]))
             last = start + SEGMENT_BYTES >= size

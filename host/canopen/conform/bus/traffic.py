@@ -31,9 +31,9 @@ class Allowance:
         self._at_us = 0
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count a frame of the tester or an answer to it."""
+        """Count a frame of the tester, and as much again: it is answered."""
         self._fill(now_us)
-        self._left -= frame_bits(frame)
+        self._left -= 2 * frame_bits(frame)
 
     def wait_us(self, now_us: int) -> int:
         """Return how long nothing may be sent."""

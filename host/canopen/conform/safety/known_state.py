@@ -35,26 +35,29 @@ class KnownState:
         client: reads and writes the node.
 
     Attributes:
+        original: what objects held before the run.
+        changed: what the check under way may have changed.
         unrestored: what could not be written back, one a line.
     """
 
     def __init__(self, exchange: Exchange, client: SdoClient) -> None:
         self._exchange, self._client = exchange, client
-        self._original: Values = {}
+        self.original: Values = {}
         self._begin: Values = {}
+        self.changed: frozenset[Address] = frozenset()
         self.unrestored: dict[str, None] = {}
 
     def learn(self, addresses: Iterable[Address]) -> None:
         """Read objects that are not known yet; what cannot be read is not restored."""
         for at in addresses:
-            if at not in self._original:
+            if at not in self.original:
                 value = self._read(at)
                 if value is not None:
-                    self._original[at] = self._begin[at] = value
+                    self.original[at] = self._begin[at] = value
 
     def prepare(self) -> None:
         """Bring what is known into the state in which checks begin."""
-        for at, value in self._original.items():
+        for at, value in self.original.items():
             if at in QUIET or (at[0] == CONSUMERS and at[1]):
                 self._begin[at] = bytes(len(value))
             elif at == SYNC_COB_ID:
@@ -62,23 +65,24 @@ class KnownState:
                 self._begin[at] = number.to_bytes(len(value), "little")
         left = self._write_back(self._begin, self._begin)
         for at in left:
-            self._begin[at] = self._original[at]
+            self._begin[at] = self.original[at]
 
     def tidy(self, addresses: Iterable[Address] | None) -> None:
         """Bring objects into the state in which checks begin; all that are known if None."""
         touched = self._begin if addresses is None else addresses
         self._write_back(self._begin, [at for at in touched if at in self._begin])
+        self.changed = frozenset()
 
     def restore(self) -> None:
         """Bring all objects into the state before the run, and tell what could not be."""
-        for at in self._write_back(self._original, self._original):
-            value = self._original[at].hex().upper()
+        for at in self._write_back(self.original, self.original):
+            value = self.original[at].hex().upper()
             self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value}"] = None
 
     def give_up(self) -> None:
         """Tell all that is not as it was, as far as anybody knows: the node is gone."""
-        for at, value in self._original.items():
-            if self._begin[at] != value:
+        for at, value in self.original.items():
+            if self._begin[at] != value or at in self.changed:
                 self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value.hex().upper()}"] = None
 
     def _write_back(self, target: Values, addresses: Iterable[Address]) -> list[Address]:

@@ -95,8 +95,13 @@ class NodeCare:
         self._exchange.begin(CARE_US)
         try:
             self._state.learn(bound.written)
+            self._state.changed = frozenset(self._state.original) if bound.resets else bound.written
         except (SdoFailed, StepFailed):
             self._recover()
+
+    def held(self, at: Address) -> bytes:
+        """Return what an object held before the run; nothing if that is not known."""
+        return self._state.original.get(at, b"")
 
     def give_up(self) -> None:
         """Tell what is not as it was: nobody can write it back."""

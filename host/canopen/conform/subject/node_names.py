@@ -65,6 +65,8 @@ class NodeNames:
 
     def address(self, name: str) -> Address:
         """Return index and sub-index of an object."""
+        if name in self._texts:
+            raise Unbound(name, "is a number, not an object")
         bound = self._bound(name)
         return bound.index, 0 if isinstance(bound, BoundPdo) else bound.sub
 

@@ -26,6 +26,9 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 EDS: Final = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 
 
+HISTORY: Final = 0x1003
+
+
 class Stimulus:
     """The hands at the inputs of R1, in the words of the tester."""
 
@@ -95,15 +98,20 @@ class R1:
 
     def values(self) -> dict[tuple[int, int], bytes]:
         """Return what all its objects hold."""
-        return {(e.index, e.sub): e.data for e in self.slave.dictionary}
+        return {
+            (e.index, e.sub): e.data
+            for e in self.slave.dictionary
+            if e.index != HISTORY or not e.sub  # beyond 1003h:00 nothing can be read
+        }
 
     def judge(self, plan: Plan, **given: Any) -> Report:
         """Run the tester against it."""
+        link = given.pop("link", self.link)
         file = open_eds(EDS)
         dictionary = self.slave.dictionary
         entries = tuple(entry.description for entry in dictionary)
         device = EdsDevice(read_device(file).info, entries, dictionary.objects)
-        return ConformRun(self.link, NODE_ID, plan, device=device, eds=file, **given).run()
+        return ConformRun(link, NODE_ID, plan, device=device, eds=file, **given).run()
 
 
 def yes(question: str) -> bool:

@@ -1,0 +1,149 @@
+"""Nodes that lie, hosts that sleep and buses that are full: each run ends, and accuses nobody."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+
+from tests.host.canopen.conform.r1 import R1, yes
+from tests.host.canopen.conform.test_safety import SpyLink, failing
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.wire.can import CanFrame, Frames, data_frame
+from tickrig.wire.instant import NEVER
+
+LONGEST_S = 600
+CARE_US = 90_000_000
+"""What is done after the last check: the node is brought back and restored."""
+
+
+class Liar:
+    """A device on the bus that is no node.
+
+    Args:
+        lie: called with the time and what arrived in each millisecond.
+        busy: it says something without being asked.
+    """
+
+    tick_us = 1_000
+
+    def __init__(self, lie: Callable[[int, Frames], Frames], *, busy: bool = False) -> None:
+        self._lie, self._busy, self._now_us = lie, busy, 0
+
+    @property
+    def due_us(self) -> int:
+        return self._now_us + self.tick_us if self._busy else NEVER
+
+    def reset(self) -> None:
+        """Nothing is kept."""
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        self._now_us = now_us
+        return self._lie(now_us, rx)
+
+
+def judge(liar: Liar, *only: str, longest_s: float = LONGEST_S) -> Report:
+    plan = Plan(Level.INTRUSIVE, only, confirm=yes, longest_s=longest_s)
+    wire = CanWire()
+    rig = Rig(Station(liar, wire.end()))
+    link = CanHost(rig, wire.end())
+    report = ConformRun(link, 5, plan).run()
+    assert report.duration_us < longest_s * 1_000_000 + CARE_US
+    assert report.exit_status != 0
+    return report
+
+
+def test_a_node_that_never_answers_blocks_all_at_once() -> None:
+    report = judge(Liar(lambda now_us, rx: ()))
+    assert {r.outcome.verdict for r in report.results} == {Verdict.BLOCKED}
+    assert report.duration_us < 10_000_000
+
+
+def test_a_node_that_answers_by_chance() -> None:
+    chance = random.Random(16)
+
+    def lie(now_us: int, rx: Frames) -> Frames:
+        return tuple(data_frame(0x585, chance.randbytes(8)) for f in rx if f.can_id == 0x605)
+
+    judge(Liar(lie))
+
+
+def test_a_node_that_floods_the_bus() -> None:
+    chance = random.Random(16)
+
+    def lie(now_us: int, rx: Frames) -> Frames:
+        can_ids = (0x585, 0x705, 0x185, 0x085)
+        return tuple(data_frame(can_id, chance.randbytes(8)) for can_id in can_ids)
+
+    judge(Liar(lie, busy=True), "NMT", "UE", longest_s=10)
+
+
+@pytest.mark.parametrize("segments", [b"\x00" + bytes(7), b"\x10" + bytes(7)])
+def test_a_node_whose_transfers_never_end(segments: bytes) -> None:
+    def lie(now_us: int, rx: Frames) -> Frames:
+        return tuple(_answer(frame) for frame in rx if frame.can_id == 0x605)
+
+    def _answer(frame: CanFrame) -> CanFrame:
+        if frame.data[:1] == b"\x40":
+            return data_frame(0x585, b"\x41" + frame.data[1:4] + bytes(4))
+        toggle = frame.data[0] & 0x10 if frame.data else 0
+        return data_frame(0x585, bytes([segments[0] ^ toggle]) + segments[1:])
+
+    judge(Liar(lie), longest_s=60)
+
+
+@pytest.mark.parametrize("late_us", [200_000, 1_500_000])
+def test_a_node_that_answers_late(late_us: int) -> None:
+    r1, waiting = R1(), list[tuple[int, Frames]]()
+    tick = r1.slave.tick
+
+    def late(now_us: int, rx: Frames) -> Frames:
+        waiting.append((now_us + late_us, tick(now_us, rx)))
+        return waiting.pop(0)[1] if waiting[0][0] <= now_us else ()
+
+    judge(Liar(late, busy=True), "NMT", "UE", "US", longest_s=60)
+
+
+def test_a_node_that_resets_by_itself() -> None:
+    r1 = R1()
+
+    def lie(now_us: int, rx: Frames) -> Frames:
+        if now_us % 700_000 == 0:
+            r1.slave.reset()
+        return r1.slave.tick(now_us, rx)
+
+    report = judge(Liar(lie, busy=True))
+    assert report.count(Verdict.PASS) > 50
+
+
+@pytest.mark.parametrize("stop_us", [15_000, 300_000])
+def test_a_host_that_was_stopped_accuses_nobody(stop_us: int) -> None:
+    def sleep(receives: int) -> None:
+        if receives % 97 == 0:
+            r1.rig.run_for(stop_us)
+
+    r1 = R1()
+    plan = Plan(Level.COMMUNICATION, ("[!O]*",), confirm=yes)
+    report = r1.judge(plan, link=SpyLink(r1, sleep))
+    assert failing(report) == []
+    assert report.count(Verdict.PASS) > 100
+
+
+def test_a_full_bus_accuses_nobody() -> None:
+    def fill(receives: int) -> None:
+        if r1.rig.now_us > 1_000_000:
+            others.send(tuple(data_frame(0x090 + n, b"\x55" * 8) for n in range(60)))
+
+    r1 = R1()
+    others = CanHost(r1.rig, r1.wire.end())
+    plan = Plan(Level.COMMUNICATION, ("NMT", "HB", "UE", "PR"), confirm=yes, bit_rate=1_000_000)
+    report = r1.judge(plan, link=SpyLink(r1, fill))
+    assert failing(report) == []
+    assert "other nodes" in report.settings

@@ -1,0 +1,71 @@
+"""Our own devices, and those of every EDS of the examples: nothing fails, all is as before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.host.canopen.conform.r1 import yes
+from tests.host.canopen.conform.under_test import Judged, not_harmless
+from tickrig.device.canopen.device_rtc.component import CanopenEcho
+from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.verdict import Verdict
+
+EXAMPLES = Path(__file__).parents[4] / "examples"
+FILES = sorted(EXAMPLES.rglob("*.eds"))
+MODELS = ("f-palette", "motor-core-unit", "epos")
+ALL = Plan(Level.INTRUSIVE, confirm=yes)
+
+
+class StrictEcho(CanopenEcho):
+    """The echo with NMT as CiA 301 has it."""
+
+    strict_cia301 = True
+
+
+def eds_of(model: str) -> Path:
+    return EXAMPLES / "eds" / f"{model}.eds"
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_fails_at_a_model(model: str) -> None:
+    judged = Judged.of(model)
+    before = judged.values()
+    report = judged.judge(ALL, eds_of(model))
+    assert not_harmless(report) == []
+    assert report.count(Verdict.PASS) > 500
+    assert report.unrestored == ()
+    assert judged.values() == before
+
+
+@pytest.mark.parametrize("path", FILES, ids=[path.stem for path in FILES])
+def test_nothing_fails_at_a_device_of_an_example(path: Path) -> None:
+    judged = Judged.of(path)
+    before = judged.values()
+    report = judged.judge(ALL, path)
+    assert not_harmless(report) == []
+    assert judged.values() == before
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_fails_without_an_eds(model: str) -> None:
+    judged = Judged.of(model)
+    before = judged.values()
+    report = judged.judge(Plan(Level.COMMUNICATION))
+    assert not_harmless(report) == []
+    assert report.count(Verdict.PASS) > 100
+    assert judged.values() == before
+
+
+def test_a_component_that_keeps_to_cia_301_fails_nothing() -> None:
+    judged = Judged(make_device_rtc(StrictEcho, 48))
+    assert not_harmless(judged.judge(ALL, eds_of("rtc-echo"))) == []
+
+
+def test_the_component_of_the_report_leaves_error_by_a_reset_alone() -> None:
+    report = Judged.of("rtc-echo").judge(ALL, eds_of("rtc-echo"))
+    failed = [r.check.id for r in report.results if r.outcome.verdict is Verdict.FAIL]
+    assert failed == ["NMT-13", "NMT-17"]

@@ -1,0 +1,191 @@
+"""What the tester may do, and how it leaves the node: whatever happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from tests.host.canopen.conform.r1 import R1, yes
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.links.link import StampedFrames
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.canopen.nmt import NmtState
+
+HEARTBEAT = (0x1017, 0)
+
+
+class SpyLink:
+    """The link of R1, with what was sent, and something that happens at a receive."""
+
+    def __init__(self, r1: R1, act: Callable[[int], object] = lambda number: None) -> None:
+        self._inner, self._act = r1.link, act
+        self.sent: list[CanFrame] = []
+        self.receives = 0
+
+    @property
+    def now_us(self) -> int:
+        return self._inner.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        self.sent += traffic
+        self._inner.send(traffic)
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
+
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        self.receives += 1
+        self._act(self.receives)
+        return self._inner.receive_stamped(timeout_us)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+def configured() -> R1:
+    """Return R1 as a user left it: Operational, with a heartbeat and a mapping of their own."""
+    r1 = R1()
+    dictionary = r1.slave.dictionary
+    for at, value in (
+        (HEARTBEAT, 1_000),
+        ((0x1400, 2), 1),
+        ((0x1600, 0), 1),
+        ((0x1800, 5), 250),
+        ((0x1016, 1), 0x0003_07D0),
+        ((0x2001, 0), 0xBEEF),
+    ):
+        dictionary[at].value = value
+    r1.link.send((CanFrame.parse("000#0105"),))
+    r1.rig.run_for(50_000)
+    return r1
+
+
+def failing(report: Report) -> list[str]:
+    return [
+        f"{r.check.id}: {r.outcome.reason}"
+        for r in report.results
+        if r.outcome.verdict is Verdict.FAIL
+    ]
+
+
+def test_read_only_sends_nothing_but_uploads() -> None:
+    r1 = configured()
+    before, link = r1.values(), SpyLink(r1)
+    report = r1.judge(Plan(), link=link)
+    assert report.count(Verdict.PASS) > 300
+    assert {frame.can_id for frame in link.sent} == {0x605}
+    assert {frame.data[0] & 0xE0 for frame in link.sent} == {0x40, 0x60, 0x80, 0xA0}
+    assert r1.values() == before
+
+
+@pytest.mark.parametrize("level", [Level.COMMUNICATION, Level.INTRUSIVE])
+def test_a_run_leaves_the_node_as_it_was(level: Level) -> None:
+    r1 = configured()
+    before = r1.values()
+    report = r1.judge(Plan(level, ("NMT", "HB", "PC", "PR", "SY", "DE"), confirm=yes))
+    assert report.unrestored == ()
+    assert r1.values() == before
+    assert r1.slave.state is NmtState.OPERATIONAL
+
+
+@pytest.mark.parametrize("number", [800, 1_500, 3_000, 5_000])
+def test_ctrl_c_leaves_the_node_as_it_was(number: int) -> None:
+    def act(receives: int) -> None:
+        if receives == number:
+            raise KeyboardInterrupt
+
+    r1 = configured()
+    before = r1.values()
+    plan = Plan(Level.COMMUNICATION, ("NMT", "HB", "PC", "PR", "SY"), confirm=yes)
+    report = r1.judge(plan, link=SpyLink(r1, act))
+    assert report.aborted == "interrupted"
+    assert report.unrestored == ()
+    assert r1.values() == before
+    assert r1.slave.state is NmtState.OPERATIONAL
+
+
+def test_a_second_ctrl_c_leaves_the_node_and_tells_it() -> None:
+    def act(receives: int) -> None:
+        if receives in (1_500, 1_505):
+            raise KeyboardInterrupt
+
+    r1 = configured()
+    report = r1.judge(Plan(Level.COMMUNICATION, ("PC",)), link=SpyLink(r1, act))
+    assert report.aborted == "interrupted"
+    assert "1017h:00 was E803" in report.unrestored
+
+
+def test_an_error_of_whoever_is_told_leaves_the_node_as_it_was() -> None:
+    def fail(result: Result) -> None:
+        if result.check.id == "PC-03":
+            raise RuntimeError("the disk is full")
+
+    r1 = configured()
+    before = r1.values()
+    with pytest.raises(RuntimeError):
+        r1.judge(Plan(Level.COMMUNICATION, ("PC",)), on_result=fail)
+    assert r1.values() == before
+
+
+def test_a_node_that_is_lost_blocks_the_rest_at_once() -> None:
+    def pull_the_plug(result: Result) -> None:
+        if result.check.id == "PC-05":
+            r1.power(on=False)
+            times.append(r1.rig.now_us)
+
+    times: list[int] = []
+    r1 = configured()
+    report = r1.judge(Plan(Level.COMMUNICATION, ("PC",)), on_result=pull_the_plug)
+    verdicts = {r.check.id: r.outcome.verdict for r in report.results}
+    assert verdicts["PC-06"] is verdicts["PC-29"] is Verdict.BLOCKED
+    assert r1.rig.now_us - times[0] < 30_000_000
+    assert failing(report) == []
+    assert "1017h:00 was E803" in report.unrestored
+
+
+def test_a_node_that_comes_back_is_restored_then() -> None:
+    def pull_the_plug(result: Result) -> None:
+        if result.check.id == "PC-05":
+            r1.power(on=False)
+            back_us = r1.rig.now_us + 9_000_000
+            r1.rig.event_queue.put("power", back_us, lambda now_us: r1.power(on=True))
+
+    r1 = configured()
+    before = r1.values()
+    report = r1.judge(Plan(Level.COMMUNICATION, ("PC-0*",)), on_result=pull_the_plug)
+    assert report.results[-1].outcome.verdict is Verdict.BLOCKED
+    assert report.unrestored == ()
+    lost = [at for at, value in r1.values().items() if value != before[at]]
+    assert lost == [(0x2001, 0)]  # of the manufacturer: this level does not write it
+
+
+def test_objects_of_the_profile_are_not_written_unless_allowed() -> None:
+    r1 = R1()
+    link = SpyLink(r1)
+    groups = ("DE", "DS", "NMT", "PC", "PR", "ST", "IO", "OD")  # no blocks: any byte begins one
+    r1.judge(Plan(Level.INTRUSIVE, groups, confirm=yes), link=link)
+    written = {
+        int.from_bytes(frame.data[1:3], "little")
+        for frame in link.sent
+        if frame.can_id == 0x605 and frame.data and frame.data[0] & 0xE0 == 0x20
+    }
+    assert 0x1017 in written
+    assert not [index for index in written if index >= 0x6000]
+
+
+def test_what_concerns_other_nodes_is_asked_for() -> None:
+    asked: list[str] = []
+
+    def no(question: str) -> bool:
+        asked.append(question)
+        return False
+
+    report = R1().judge(Plan(Level.INTRUSIVE, ("NMT-06", "LS-01", "ST-05"), confirm=no))
+    assert [r.outcome.verdict for r in report.results] == [Verdict.NOT_APPLICABLE] * 3
+    assert asked == [
+        "send NMT commands to all nodes of the bus",
+        "send LSS requests, which every node of the bus takes",
+    ]

@@ -1,0 +1,57 @@
+"""Any slave of ours on a bus in virtual time, under the tester."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.build import describe
+from tickrig.emulators.canopen.eds import EdsCache
+from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.eds import open_eds
+from tickrig.wire.canopen.eds.eds_device import read_device
+
+HARMLESS = {Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.IMPLEMENTATION_DEFINED}
+
+
+class Judged:
+    """A slave that has booted, and the host's end of its bus."""
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        self.slave, self.wire = slave, CanWire()
+        self.rig = Rig(Station(slave, self.wire.end()))
+        self.link = CanHost(self.rig, self.wire.end())
+        self.rig.run_for(100_000)
+
+    @classmethod
+    def of(cls, device: Path | str) -> Judged:
+        """Make a model by its name, or a device of its EDS."""
+        described = describe(EdsCache(), device)
+        node_id = described.node_id or 5
+        dictionary = described.make_dictionary()
+        return cls(make_slave(dictionary, node_id, application=described.application))
+
+    def values(self) -> dict[tuple[int, int], bytes]:
+        """Return what all its objects hold."""
+        return {(e.index, e.sub): e.data for e in self.slave.dictionary}
+
+    def judge(self, plan: Plan, eds: Path | None = None) -> Report:
+        """Run the tester."""
+        file = open_eds(eds) if eds else None
+        device = read_device(file) if file else None
+        return ConformRun(self.link, self.slave.node_id, plan, device=device, eds=file).run()
+
+
+def not_harmless(report: Report) -> list[str]:
+    """Return what failed, or could not be judged, one a line."""
+    return [
+        f"{result.check.id} {result.outcome.verdict}: {result.outcome.reason}"
+        for result in report.results
+        if result.outcome.verdict not in HARMLESS
+    ]
