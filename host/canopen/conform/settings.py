@@ -27,6 +27,6 @@ def describe_settings(plan: Plan, others: Collection[int]) -> dict[str, str]:
         "answers": f"within {ANSWER_MS} ms, where the check says nothing else",
         "periods": f"mean within {PERIOD_TOLERANCE:.0%}",
         "late host": f"{HOST_GAP_US / MS_US:g} ms make a failure inconclusive",
-        "longest run": f"{plan.longest_s / 60:g} min, then the rest is blocked; 2 min more to restore",
+        "longest run": f"{plan.longest_s / 60:g} min, then all is blocked; 2 min more to restore",
         "seed": str(plan.seed),
     }
