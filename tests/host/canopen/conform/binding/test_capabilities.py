@@ -6,12 +6,14 @@ import pytest
 
 from tests.device.canopen.reference import make_dictionary
 from tests.host.canopen.conform.bench import Bench, make_bench
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.binding.binding import bind
 from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.object_table import DeviceInfo
 
 ROOT = Path(__file__).parents[5]
 R1 = ROOT / "tests/golden/canopen/r1.eds"
@@ -60,6 +62,17 @@ def test_an_eds_that_does_not_tell_of_lss_denies_it() -> None:
     found = features(make_bench(make_dictionary()), file)
     assert not found.words & {"lss", "lssident", "unconfigured"}
     assert found.reasons["lss"] == "LSS_Supported of the EDS does not say that it has LSS"
+
+
+def test_lss_without_an_address_is_a_finding() -> None:
+    bare = [entry for entry in make_dictionary() if (entry.index, entry.sub) != (0x1018, 4)]
+    bench = make_bench(Dictionary(entry.description for entry in bare))
+    device = EdsDevice(DeviceInfo(), tuple(entry.description for entry in bare), {})
+    found = find_features(bind(device, bench.upload), bench.runner, open_eds(R1))
+    assert found.reasons["lss"] == "1018h has not the four numbers of an LSS address"
+    assert found.findings == (
+        "the EDS says that it has LSS, and 1018h has not the numbers of its address",
+    )
 
 
 def test_another_identity_than_the_head_of_the_eds_is_a_finding() -> None:
