@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -10,8 +12,12 @@ from tickrig.device.canopen.ds402 import Ds402
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.wire.errors import FieldError
 
-LINES = 8
+LINES: Final = 8
 """`di1` is lines 1 to 8, `di2` those that follow."""
+
+ANALOGUE: Final = 0x6401
+INPUTS: Final = {0x6000: "di", ANALOGUE: "ai"}
+"""Objects of CiA 401 that show what is at the inputs."""
 
 
 class SlaveStimulus:
@@ -48,12 +54,18 @@ class SlaveStimulus:
         return ""
 
     def _assign(self, name: str, data: bytes) -> None:
-        """Write an object from the inside."""
-        index, _, sub = name.partition(":")
-        entry = self._slave.dictionary.find(int(index, 16), int(sub, 16))
+        """Write an object from the inside; one that shows inputs by moving these."""
+        index, sub = (int(part, 16) for part in name.split(":"))
+        if isinstance(self._application, Ds401) and index in INPUTS:
+            value = int.from_bytes(data, "little", signed=index == ANALOGUE)
+            text = f"{value}" if index == ANALOGUE else f"{value:02X}"
+            _module(self._application, ("input", f"{INPUTS[index]}{sub}", text))
+            return
+        entry = self._slave.dictionary.find(index, sub)
         if entry is None:
             raise NotAllowed(f"input {name}: the device has no such object")
         try:
+            entry.data_type.decode(data)
             entry.assign(data)
         except (FieldError, SdoAbort) as error:
             raise NotAllowed(f"input {name} {data.hex().upper()}: {error}") from None
