@@ -65,6 +65,7 @@ class NodeCare:
         self._exchange, self._client, self._node_id = exchange, client, node_id
         self._level, self._state = level, KnownState(exchange, client)
         self._nmt_state: NmtState | None = None
+        self._moved = False  # to another NMT state than it was in
         self._errors = 0
         self.lost = False
 
@@ -84,6 +85,7 @@ class NodeCare:
         self._exchange.begin(CARE_US)
         self._state.learn(addresses)
         self._nmt_state = self._learn_state()
+        self._moved = True
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._state.prepare()
         self._errors = self._client.number(*ERROR_REGISTER) or 0
@@ -127,7 +129,8 @@ class NodeCare:
             return
         try:
             self._client.abort()
-            self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+            if self._moved:
+                self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
             self._state.restore()
             if self._nmt_state in TO_STATE:
                 self._command(TO_STATE[self._nmt_state])
