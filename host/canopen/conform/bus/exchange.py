@@ -79,7 +79,7 @@ class Exchange:
         self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
-        self._asked, self.transfer = b"", (0, 0)
+        self._multiplexer, self.transfer = b"", (0, 0)
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -122,7 +122,7 @@ class Exchange:
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
         if frame.can_id == self._request:
-            self._asked = frame.data[MULTIPLEXER]
+            self._multiplexer = frame.data[MULTIPLEXER]
         self._link.send((frame,))
 
     def expect(self, patterns: list[str], within_ms: int) -> str:
@@ -256,7 +256,7 @@ class Exchange:
         if own:
             self.boots += text == self._boot_up
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
-            if answered and frame.data[MULTIPLEXER] == self._asked:
+            if answered and frame.data[MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
             return
         if not frame.extended and NODES.start <= frame.can_id < NODES.stop:

@@ -7,6 +7,7 @@ consumers of a stack without any would say nothing of the stack.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
@@ -67,8 +68,9 @@ def _text(leave_out: tuple[int, ...], lss: bool) -> str:
     made = make_dictionary()
     entries = list(filter(kept, made.description))
     text = write_eds(Dictionary(entries, made.objects).description)
-    dummies = text.replace("Dummy0005=1", "Dummy0005=0") if leave_out else text
-    return dummies if lss else dummies.replace("LSS_Supported=1", "LSS_Supported=0")
+    if leave_out:
+        text = re.sub(r"^(Dummy\d{4})=1", r"\1=0", text, flags=re.MULTILINE)
+    return text if lss else text.replace("LSS_Supported=1", "LSS_Supported=0")
 
 
 def ours() -> CanopenSlave:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
 
 from tests.emulators.testing.conformance.stacks import judge_durand, judge_local_node, judge_ours
+from tests.emulators.testing.conformance.verdict_page import FOREIGN, PAGE
 from tests.emulators.testing.conformance.verdict_table import compare, read_table
+from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.verdict import Report, Verdict
 
 pytestmark = pytest.mark.unmeasured
@@ -37,3 +40,13 @@ def test_the_verdicts_are_those_of_the_public_checks(
     assert found.both >= 75
     assert found.same >= LEAST * found.both
     assert {one.check_id for one in found.differences} == found.explained, "each has its reason"
+
+
+def test_the_page_tells_of_these_stacks() -> None:
+    text = PAGE.read_text("utf-8")
+    for _, name, _ in FOREIGN:
+        assert f"## {name}\n" in text, "run tools/conform-stacks"
+    known = {check.id for group in read_suite() for check in group.checks}
+    named = set(re.findall(r"^\| ([A-Z0-9]+-\d+): ", text, re.MULTILINE))
+    assert named
+    assert named <= known

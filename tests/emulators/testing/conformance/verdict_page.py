@@ -1,0 +1,132 @@
+"""docs/conformance.md: what the tester says of our slaves and of foreign stacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from typing import Final, NamedTuple
+
+from tests.emulators.testing.conformance.stacks import judge_durand, judge_local_node, judge_ours
+from tests.emulators.testing.conformance.verdict_table import compare, read_table
+from tests.environment import ROOT
+from tickrig import Bench
+from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.testing import conformance
+
+PAGE: Final = ROOT / "docs" / "conformance.md"
+OBJECTS: Final = "OD"
+SHOWN: Final = (
+    Verdict.PASS,
+    Verdict.FAIL,
+    Verdict.IMPLEMENTATION_DEFINED,
+    Verdict.INCONCLUSIVE,
+    Verdict.BLOCKED,
+    Verdict.NOT_APPLICABLE,
+)
+HEAD: Final = """# Verdicts on CANopen stacks
+
+What [`canmon conform --intrusive`](conform.md) says of our slaves and of two foreign stacks, in
+virtual time. The page is written by `tools/conform-stacks`; the same versions give the same page.
+
+A verdict is on a slave as it was put together for this page: the objects are those of the
+reference dictionary R1 for which the stack has something, the application moves inputs and raises
+errors as the stack lets it, and does no more. What a stack leaves to the application, such as
+values after a reset, is a failure here, and need not be one in a device.
+
+"""
+NOT_RUN: Final = """## Not run
+
+CANopenNode and lely-core are written in C and come by no registry of Python packages: they were
+not run for this page.
+"""
+MOST: Final = 110
+"""Characters of what came: what else had been allowed is in a run of one's own."""
+
+
+class Subject(NamedTuple):
+    """Something to judge.
+
+    Attributes:
+        name: for people.
+        judge: judges it.
+    """
+
+    name: str
+    judge: Callable[[], Report]
+
+
+FOREIGN: Final = (
+    ("LocalNode", f"LocalNode of canopen {version('canopen')}", judge_local_node),
+    ("durand", f"durand {version('durand')}", judge_durand),
+)
+MODELS: Final = ("f-palette", "motor-core-unit", "epos")
+
+
+def page() -> str:
+    """Return the page."""
+    reports = {name: judge() for name, judge in _subjects()}
+    foreign = {name: judge() for _, name, judge in FOREIGN}
+    parts = [HEAD + "\n".join(_table({**reports, **foreign}))]
+    for stack, name, _ in FOREIGN:
+        parts += ["\n".join(_section(stack, name, foreign[name]))]
+    return "\n\n".join([*parts, NOT_RUN])
+
+
+def _subjects() -> Iterator[Subject]:
+    yield Subject("R1, the reference slave", judge_ours)
+    for model in MODELS:
+        yield Subject(model, lambda model=model: _judge_model(model))  # type: ignore[misc]
+
+
+def _judge_model(model: str) -> Report:
+    with Bench(model) as bench:
+        return conformance(bench)
+
+
+def _table(reports: dict[str, Report]) -> Iterator[str]:
+    yield f"| | {' | '.join(map(str, SHOWN))} |"
+    yield "|---|" + "---|" * len(SHOWN)
+    for name, report in reports.items():
+        counts = " | ".join(str(report.count(verdict)) for verdict in SHOWN)
+        yield f"| {name} | {counts} |"
+
+
+def _section(stack: str, name: str, report: Report) -> Iterator[str]:
+    found = compare(report, read_table(stack))
+    yield f"## {name}\n"
+    yield (
+        f"Of the 172 public checks {found.both} were judged here and there:"
+        f" {found.same} verdicts are the same."
+    )
+    for one in found.differences:
+        yield f"{one.check_id} differs: {one.public} there, {one.here} here: {one.reason}."
+    failed = [one for one in report.results if one.outcome.verdict is Verdict.FAIL]
+    yield "\n| check | clause | what came |\n|---|---|---|"
+    for result in failed:
+        if result.check.group != OBJECTS:
+            yield _row(result)
+    yield from _objects([one for one in failed if one.check.group == OBJECTS])
+
+
+def _row(result: Result) -> str:
+    check = result.check
+    cells = (f"{check.id}: {check.title}", check.source, _short(result.outcome.reason))
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _short(reason: str) -> str:
+    return reason if len(reason) <= MOST else f"{reason[:MOST].rpartition(' ')[0]} ..."
+
+
+def _objects(failed: list[Result]) -> Iterator[str]:
+    """Tell of the checks of each object: one of a kind stands for all that failed alike."""
+    kinds: dict[str, list[Result]] = {}
+    for result in failed:
+        kinds.setdefault(result.check.id.rsplit("-", 1)[1], []).append(result)
+    if kinds:
+        yield "\nChecks of each object that failed, one of a kind:\n"
+        yield "| kind | failed | example | what came |\n|---|---|---|---|"
+    for kind, results in sorted(kinds.items()):
+        example = results[0]
+        title = example.check.title.replace("|", "\\|")
+        yield f"| {kind} | {len(results)} | {title} | {_short(example.outcome.reason)} |"
