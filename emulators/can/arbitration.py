@@ -84,12 +84,12 @@ class CanArbiter(Part):
     def put_back(self, ends: Iterable[CanEnd]) -> None:
         """Let nodes take part again, those that still have a frame to send."""
         for end in ends:
-            if end.queue:
+            if end.waiting:
                 self.push(end)
 
     def push(self, end: CanEnd) -> None:
         """Let a node take part again, which has a frame to send."""
-        head = priority(end.queue[0]) << NUMBER_BITS | end.number - FIRST_NUMBER
+        head = priority(end.next) << NUMBER_BITS | end.number - FIRST_NUMBER
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:

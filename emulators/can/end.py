@@ -42,8 +42,9 @@ class CanEnd(Copyable):
         wire: the bus.
         number: place among the ends of the bus.
         controller: error counters and error state.
-        queue: frames that have not left.
-        room: how many may be there; none while the node is bus-off.
+        waiting: how many frames have not left.
+        next: the first of them, if there are any.
+        room: how many may wait; none while the node is bus-off.
         held: no frame of it starts before this, in units of the segment.
         arrived_us: when the first frame that waits here had ended, `NEVER` if none does.
         lost: frames that found a queue or inbox full, or the node bus-off.
@@ -53,9 +54,10 @@ class CanEnd(Copyable):
     """
 
     __slots__ = (
-        *("_accepts", "_device", "_error_aware", "_first", "_more", "_reconfigured_by"),
-        *("arrived_us", "auto_recovery", "controller", "held", "lost", "number"),
-        *("on_error_state", "queue", "room", "segment", "unfiltered", "wake", "wire"),
+        *("_accepts", "_behind", "_device", "_error_aware", "_first", "_more"),
+        *("_reconfigured_by", "arrived_us", "auto_recovery", "controller", "held", "lost"),
+        *("next", "number", "on_error_state", "room", "segment", "unfiltered", "waiting"),
+        *("wake", "wire"),
     )
 
     _new_in_twins = _NEW_IN_TWINS
@@ -64,11 +66,13 @@ class CanEnd(Copyable):
         self.wire, self.number, self._accepts = wire, number, accepts
         self.segment = wire.bus
         self.controller = ErrorCounters()
-        self.queue: deque[CanFrame] = deque()
+        self.next: CanFrame
+        self._behind: deque[CanFrame] | None = None  # those behind it; seldom there are any
         self._first: Frames = ()  # the frame that waits longest, as all its receivers have it
         self._more: list[tuple[int, CanFrame]] | None = None  # those behind it, with their times
         self.arrived_us = NEVER
-        self.room, self.held, self.lost, self.unfiltered = QUEUE_FRAMES, 0, 0, False
+        self.waiting, self.room, self.held, self.lost = 0, QUEUE_FRAMES, 0, 0
+        self.unfiltered = False
         self._reconfigured_by: frozenset[int] = frozenset()
         self.wake: Callable[[int], None] = _ignore
         self.on_error_state: Callable[[int, ErrorState], None] | None = None
@@ -131,6 +135,28 @@ class CanEnd(Copyable):
         if traffic:
             self.segment.send(self, now_us, traffic)
 
+    def enqueue(self, frames: Frames) -> None:
+        """Let frames wait behind those that do."""
+        behind = frames
+        if not self.waiting:  # mostly one: without a queue two objects less are touched
+            self.next, behind = frames[0], frames[1:]
+        if behind:
+            self._behind = self._behind or deque()
+            self._behind.extend(behind)
+        self.waiting += len(frames)
+
+    def take(self) -> CanFrame:
+        """Take the first of the frames that wait: it was sent."""
+        frame = self.next
+        self.waiting -= 1
+        if self._behind:
+            self.next = self._behind.popleft()
+        return frame
+
+    def drop(self) -> None:
+        """Lose what waits to be sent."""
+        self.waiting, self._behind = 0, None
+
     def recover(self, now_us: int) -> None:
         """Leave bus-off: after 128 times 11 recessive bits the node is error-active again."""
         self.segment.recover(self, now_us)
@@ -173,15 +199,15 @@ class CanEnd(Copyable):
 
     def forget(self) -> None:
         """Lose what waits to be sent and to be polled, as a node without power does."""
-        self.queue.clear()
+        self.drop()
         self._empty()
 
     def open(self, *, on_bus: bool) -> None:
         """Let it send, or not; then what waits is lost."""
         self.room = QUEUE_FRAMES if on_bus else 0
         if not on_bus:
-            self.lost += len(self.queue)
-            self.queue.clear()
+            self.lost += self.waiting
+            self.drop()
 
     def error_state_changed(self, at_us: int) -> None:
         """Tell whoever wants to know."""

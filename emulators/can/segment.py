@@ -98,8 +98,8 @@ class CanSegment(TransmissionOutcomes):
         """Queue the frames of one node."""
         if self.now_us < now_us:
             self.advance(now_us)
-        now, queue = now_us * self.unit, end.queue
-        if (excess := len(queue) + len(frames) - end.room) > 0:
+        now, idle = now_us * self.unit, not end.waiting
+        if (excess := end.waiting + len(frames) - end.room) > 0:
             end.lost += excess
             frames = frames[: len(frames) - excess]
         if not frames:
@@ -108,10 +108,8 @@ class CanSegment(TransmissionOutcomes):
             self._withdraw()
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
-        if queue:
-            queue.extend(frames)
-        else:
-            queue.extend(frames)
+        end.enqueue(frames)
+        if idle:
             self._enter(end, now)
 
     def join(self, end: CanEnd, now_us: int) -> None:
@@ -123,7 +121,7 @@ class CanSegment(TransmissionOutcomes):
         self._confinement.join(end)
         self._arbiter.join(end)
         self.disturb(now_us)
-        if end.queue:
+        if end.waiting:
             end.held = 0
             self._enter(end, now_us * self.unit)
 
@@ -178,7 +176,7 @@ class CanSegment(TransmissionOutcomes):
             else:
                 self._start, winners = arbiter.free, arbiter.take()
             self._winners = winners
-            frame = winners[0].queue[0]
+            frame = winners[0].next
             latest = self._lengths.get(frame[0])
             if latest and latest[0] == frame[1] and not (frame[2] or frame[3]):
                 bits = latest[1]
@@ -211,7 +209,7 @@ class CanSegment(TransmissionOutcomes):
         """Plan a transmission that may fail."""
         if self.shorted:  # recessive for good: each start of frame is a bit error
             self._settle(self._fail_alone, 1 + ERROR_BITS)
-        elif any(end.queue[0] != frame for end in self._winners):
+        elif any(end.next != frame for end in self._winners):
             self._collide()
         elif self._on_bus <= len(self._winners):
             self._settle(self._go_unheard, bits - RECESSIVE_BITS + ERROR_BITS)
@@ -233,9 +231,9 @@ class CanSegment(TransmissionOutcomes):
 
     def _collide(self) -> None:
         """Plan what happens when several send one identifier with different contents."""
-        frames = [end.queue[0] for end in self._winners]
+        frames = [end.next for end in self._winners]
         received = dominant(frames)
-        losers = [end for end in self._winners if end.queue[0] != received]
+        losers = [end for end in self._winners if end.next != received]
         if all(end.controller.state is ErrorState.PASSIVE for end in losers):
             self._settle(self._override, self._length(received))
         else:

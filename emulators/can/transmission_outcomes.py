@@ -71,13 +71,12 @@ class TransmissionOutcomes(Part):
             self._deliver_and_count()
             return
         at_us, (sender,), arbiter = self._due_us, winners, self._arbiter
-        queue = sender.queue
-        frame = queue.popleft()
+        frame = sender.take()
         for observe in self._observers:
             observe(at_us, frame)
         arbiter.free = self._free
         self.busy.note(self._start, self._free)
-        if queue:
+        if sender.waiting:
             arbiter.push(sender)
         self._winners = []
         if receivers := self.routes.receivers(frame):
@@ -89,7 +88,7 @@ class TransmissionOutcomes(Part):
     def _deliver_and_count(self) -> None:
         """Hand a frame to all that accept it, and count it in error counters and recovery."""
         at_us, winners = self._due_us, self._winners
-        frame = winners[0].queue[0]
+        frame = winners[0].next
         self._take_off(frame)
         for end in self.routes.receivers(frame):
             if end not in winners:
@@ -97,12 +96,12 @@ class TransmissionOutcomes(Part):
 
     def _drop(self) -> None:
         """Let a frame be acknowledged, and lost."""
-        self._take_off(self._winners[0].queue[0])
+        self._take_off(self._winners[0].next)
 
     def _duplicate(self) -> None:
         """Hand a frame out that its sender will send again."""
         at_us, winners = self._due_us, self._winners
-        frame = winners[0].queue[0]
+        frame = winners[0].next
         for end in self.routes.receivers(frame):
             if end not in winners:
                 end.receive(at_us, frame, (frame,))
@@ -112,8 +111,8 @@ class TransmissionOutcomes(Part):
 
     def _override(self) -> None:
         """Let the dominant frame through; the error flags of passive nodes are not received."""
-        frame = dominant([end.queue[0] for end in self._winners])
-        losers = [end for end in self._winners if end.queue[0] != frame]
+        frame = dominant([end.next for end in self._winners])
+        losers = [end for end in self._winners if end.next != frame]
         self._winners = [end for end in self._winners if end not in losers]
         self._confinement.failed_to_send(self._due_us, losers)
         self._suspend(losers)
@@ -148,7 +147,7 @@ class TransmissionOutcomes(Part):
     def _take_off(self, frame: CanFrame) -> None:
         """Take a frame that went well from its queues."""
         for end in self._winners:
-            end.queue.popleft()
+            end.take()
         if self._confinement.marked:
             self._confinement.sent(self._due_us, self._winners)
         self._notify(frame)

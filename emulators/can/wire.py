@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -177,22 +176,23 @@ class CanWire(Copyable):
 
     def _babble(self, now_us: int, *, armed: bool) -> None:
         if armed:
-            self._babbler = CanEnd(self, BABBLER, frozenset())
-            self._babbler.queue = _Endless([CanFrame(0)])
+            self._babbler = _Babbler(self, BABBLER, frozenset())
+            self._babbler.enqueue((CanFrame(0),))
             self.bus.join(self._babbler, now_us)
         elif self._babbler is not None:
             self.bus.leave(self._babbler, now_us)
             self._babbler = None
 
 
-@mypyc_attr(native_class=False)  # a subclass of a class in C
-class _Endless(deque[CanFrame]):
-    """A queue that is never empty: its node does not care for its error state either."""
+class _Babbler(CanEnd):
+    """A node that always has its frame to send: it does not care for its error state either."""
 
-    def popleft(self) -> CanFrame:
-        return self[0]
+    __slots__ = ()
 
-    def clear(self) -> None:
+    def take(self) -> CanFrame:
+        return self.next
+
+    def drop(self) -> None:
         return
 
 

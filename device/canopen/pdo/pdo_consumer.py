@@ -43,7 +43,8 @@ class PdoConsumer(Service):
         if window is not None:
             self._window_changed(window)
             window.watch(self._window_changed)
-        node.sync_handlers.append(self._sync)
+        if self.rpdos or window is not None:  # else each SYNC touched it for nothing
+            node.sync_handlers.append(self._sync)
 
     @property
     def window_is_over(self) -> bool:

@@ -100,7 +100,7 @@ def test_a_sender_of_nothing_but_corrupt_frames_ends_bus_off() -> None:
     wire.advance(1_000_000)
     assert counters(node, host) == [(256, 0, BUS_OFF), (0, 32, ACTIVE)]
     assert len(log.heard) == 32
-    assert (len(node.queue), node.lost) == (0, 2)
+    assert (node.waiting, node.lost) == (0, 2)
     node.send(1_000_000, frames("187#"))
     assert (node.lost, wire.due_us) == (3, NEVER)
 

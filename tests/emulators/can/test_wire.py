@@ -154,7 +154,7 @@ def test_queues_are_finite_and_losses_are_counted() -> None:
     wire = CanWire()
     sender, host = wire.end(), wire.end()
     sender.send(0, frames("100#") * 5_000)
-    assert (len(sender.queue), sender.lost) == (4_096, 904)
+    assert (sender.waiting, sender.lost) == (4_096, 904)
     sender.send(1_000_000, frames("101#"))
     assert (len(host.poll(2_000_000)), host.lost) == (4_096, 1)
 
