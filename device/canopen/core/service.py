@@ -10,6 +10,7 @@ from tickrig.device.twin import Copyable
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.core.entry import Entry
@@ -32,12 +33,13 @@ class Service(Copyable):
     Attributes:
         node: the slave that it belongs to.
         slot: its place in the order of a tick.
+        asked_us: when it wants its `tick`, `NEVER` for not at all; `schedule` sets it.
     """
 
-    __slots__ = ("node", "slot")
+    __slots__ = ("asked_us", "node", "slot")
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
-        self.node, self.slot = node, slot
+        self.node, self.slot, self.asked_us = node, slot, NEVER
 
     @classmethod
     def of(cls, node: CanopenSlave) -> Self:
@@ -154,4 +156,4 @@ class Service(Copyable):
         Args:
             due_us: when; `NEVER` for not at all.
         """
-        self.node.schedule(self.slot, due_us)
+        self.node.await_tick(self, due_us)

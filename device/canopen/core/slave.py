@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -26,6 +26,7 @@ UNCONFIGURED: Final = 0xFF
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 REMOTE: Final = 1 << 29
 
+_slot = attrgetter("slot")
 _priority = itemgetter(0)
 """Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as out of the
 mailboxes of a CAN controller; on the wire `emulators/can/arbitration.py` decides."""
@@ -80,7 +81,7 @@ class CanopenSlave(Copyable):
     """
 
     __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %
-        *("__dict__", "__weakref__", "_asking", "_dues", "_handlers", "_out", "_powered"),
+        *("__dict__", "__weakref__", "_asking", "_handlers", "_out", "_powered"),
         *("accepts", "admits", "boots", "configured_id", "dictionary", "due_us", "entered"),
         *("horizon", "model", "node_id", "nonvolatile", "now_us", "on_accepts", "on_bit_rate"),
         *(
@@ -123,8 +124,7 @@ class CanopenSlave(Copyable):
         self.accepts: frozenset[int] | None = None
         self.reconfigured_by: frozenset[int] = frozenset()
         self.on_accepts: list[Callable[[], None]] = []
-        self._dues = [NEVER] * len(services)
-        self._asking: tuple[int, ...] = ()  # slots that have ever had a due time, in order
+        self._asking: tuple[Service, ...] = ()  # those that have ever asked for a tick, in order
         self.due_us: int = 0
         self.services: list[Service] = [make(self, slot) for slot, make in enumerate(services)]
 
@@ -233,9 +233,18 @@ class CanopenSlave(Copyable):
             slot: the place of the service.
             due_us: when; `NEVER` for not at all.
         """
-        before, self._dues[slot] = self._dues[slot], due_us
-        if due_us < NEVER and slot not in self._asking:
-            self._asking = tuple(sorted((*self._asking, slot)))
+        self.await_tick(self.services[slot], due_us)
+
+    def await_tick(self, service: Service, due_us: int) -> None:
+        """Enter when a service wants its `tick`; `schedule` names it by its place.
+
+        Args:
+            service: one of the slave.
+            due_us: when; `NEVER` for not at all.
+        """
+        before, service.asked_us = service.asked_us, due_us
+        if due_us < NEVER and service not in self._asking:
+            self._asking = tuple(sorted((*self._asking, service), key=_slot))
         if due_us < self.due_us:
             self.due_us = due_us
         elif before == self.due_us and self._powered:
@@ -326,22 +335,22 @@ class CanopenSlave(Copyable):
 
     def _run_due(self, now_us: int, after: int = -1) -> None:
         """Let the services act that are due, in their order; most have never asked for a tick."""
-        dues, asking = self._dues, self._asking
-        for slot in asking:
-            if dues[slot] <= now_us and slot > after:
-                dues[slot] = NEVER
-                self.services[slot].tick(now_us)
+        asking = self._asking
+        for service in asking:
+            if service.asked_us <= now_us and service.slot > after:
+                service.asked_us = NEVER
+                service.tick(now_us)
                 if self._asking is not asking:  # one that had never asked may be due behind it
-                    self._run_due(now_us, slot)
+                    self._run_due(now_us, service.slot)
                     return
         if self._powered:
             self.due_us = self._first_due()
 
     def _first_due(self) -> int:
         """Return when the first of the services is due that have ever asked for a tick."""
-        dues, first_us = self._dues, NEVER
-        for slot in self._asking:
-            first_us = min(first_us, dues[slot])
+        first_us = NEVER
+        for service in self._asking:
+            first_us = min(first_us, service.asked_us)
         return first_us
 
 

@@ -104,7 +104,7 @@ class PdoProducer(Service):
         """Run a TPDO at this time, unless it comes back earlier anyway."""
         if due_us < self._due_us:
             self._due_us = due_us
-            self.node.schedule(self.slot, due_us)
+            self.node.await_tick(self, due_us)
 
     def tick(self, now_us: int) -> None:
         """Send what SYNC has asked for, then what events have."""
