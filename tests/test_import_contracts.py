@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+STALE = shutil.ignore_patterns("__pycache__")
 
 VIOLATIONS = {
     "device reads a clock": ("device/core.py", "import time"),
@@ -42,22 +43,26 @@ def lint(tree: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=tree, env=env, capture_output=True, text=True, check=False)
 
 
-def copied(tmp_path: Path) -> Path:
-    shutil.copytree(ROOT / "src" / "tickrig", tmp_path / "tickrig", symlinks=False)
-    return tmp_path
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Copy the package once; who breaks it mends it."""
+    folder = tmp_path_factory.mktemp("tree")
+    shutil.copytree(ROOT / "src" / "tickrig", folder / "tickrig", symlinks=False, ignore=STALE)
+    return folder
 
 
-def test_contracts_hold(tmp_path: Path) -> None:
-    done = lint(copied(tmp_path))
+def test_contracts_hold(tree: Path) -> None:
+    done = lint(tree)
     assert done.returncode == 0, done.stdout
 
 
 @pytest.mark.parametrize("name", VIOLATIONS)
-def test_a_seeded_violation_breaks_a_contract(name: str, tmp_path: Path) -> None:
+def test_a_seeded_violation_breaks_a_contract(name: str, tree: Path) -> None:
     path, line = VIOLATIONS[name]
-    module = copied(tmp_path) / "tickrig" / path
+    module = tree / "tickrig" / path
     source = module.read_text("utf-8")
     module.write_text(f"{source}\n{line}\n")
-    done = lint(tmp_path)
+    done = lint(tree)
+    module.write_text(source)
     assert done.returncode != 0
     assert "broken" in done.stdout.lower()
