@@ -6,8 +6,9 @@ import random
 
 import pytest
 
+from tickrig.wire import can_bits
 from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can_bits import KEPT_HEADS, frame_bits
 
 
 def stream(frame: CanFrame) -> str:
@@ -82,3 +83,11 @@ def test_five_equal_bits_at_the_end_of_the_crc_are_stuffed_too() -> None:
     assert ended
     for frame in ended:
         assert frame_bits(frame) == counted(frame)
+
+
+def test_more_identifiers_than_are_kept_are_as_long_as_counted() -> None:
+    frames = [CanFrame(can_id, extended=True) for can_id in range(2 * KEPT_HEADS + 1)]
+    bits = [frame_bits(frame) for frame in frames]
+    assert len(can_bits._heads) <= KEPT_HEADS
+    assert bits[-50:] == [counted(frame) for frame in frames[-50:]]
+    assert [frame_bits(frame) for frame in frames[:50]] == bits[:50]
