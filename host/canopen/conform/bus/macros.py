@@ -183,7 +183,8 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     Args:
         sdo: for its bus.
         can_id: of error control.
-        words: states in hex, each asked for once; a word with # is a frame that is sent before.
+        words: states in hex, each asked for once, as `=7F` where the toggle bit is 0; a word
+            with # is a frame that is sent before.
     """
     toggle: int | None = None
     for word in words:
@@ -193,8 +194,9 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
             continue
         sdo.exchange.forget(can_id)
         sdo.exchange.send(CanFrame.parse(f"{can_id}#R1"))
-        state = int(word, 16)
+        state = int(word.removeprefix("="), 16)
         wanted = (state, state | 0x80) if toggle is None else (state | toggle ^ 0x80,)
+        wanted = (state,) if word.startswith("=") else wanted
         got = sdo.exchange.expect([f"{can_id}#{number:02X}" for number in wanted], ANSWER_MS)
         toggle = int(got[-2:], 16) & 0x80
 
