@@ -34,6 +34,9 @@ HEARTBEAT: Final = (0x1017, 0)
 ERROR_REGISTER: Final = (0x1001, 0)
 HISTORY: Final = (0x1003, 0)
 DEVICE_TYPE: Final = (0x1000, 0)
+STORAGE: Final = frozenset((0x1010, 0x1011))
+STORE: Final = (0x1010, 1)
+SAVE: Final = b"save"
 
 RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
     Level.READ_ONLY: (None,),
@@ -67,7 +70,7 @@ class NodeCare:
         self._nmt_state: NmtState | None = None
         self._moved = False  # to another NMT state than it was in
         self._errors = 0
-        self.lost = False
+        self._stored = self.lost = False
 
     @property
     def unrestored(self) -> tuple[str, ...]:
@@ -95,6 +98,7 @@ class NodeCare:
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(CARE_US)
+        self._stored = self._stored or bool(STORAGE & {index for index, _ in bound.changed})
         try:
             self._state.learn(bound.written)
             self._state.changed = frozenset(self._state.original) if bound.resets else bound.written
@@ -132,6 +136,8 @@ class NodeCare:
             if self._moved:
                 self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
             self._state.restore()
+            if self._stored:
+                self._client.download(*STORE, SAVE)
             if self._nmt_state in TO_STATE:
                 self._command(TO_STATE[self._nmt_state])
         except (SdoFailed, StepFailed):

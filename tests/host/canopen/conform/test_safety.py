@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.host.canopen.conform.r1 import R1, yes
+from tests.device.canopen.actions import SlaveActions
+from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
@@ -89,6 +90,19 @@ def test_a_run_leaves_the_node_as_it_was(level: Level) -> None:
     assert report.unrestored == ()
     assert r1.values() == before
     assert r1.slave.state is NmtState.OPERATIONAL
+
+
+def test_what_a_run_stored_is_what_was_there_before() -> None:
+    r1 = configured()
+    before = r1.values()
+    stimulus = Stimulus(r1, SlaveActions(r1.slave))
+    groups = ("ST", "HB-05")
+    report = r1.judge(Plan(Level.INTRUSIVE, groups, stimulus=stimulus, confirm=yes))
+    assert failing(report) == []
+    r1.power(on=False)
+    r1.power(on=True)
+    r1.rig.run_for(100_000)
+    assert r1.values() == before
 
 
 @pytest.mark.parametrize("number", [800, 1_500, 3_000, 5_000])
