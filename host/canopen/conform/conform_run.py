@@ -97,7 +97,7 @@ class ConformRun:
         except LinkClosed as error:
             aborted = str(error)
         finally:
-            self._restore()
+            self._restore(patient=not aborted)
         return self._report(aborted)
 
     def _run(self) -> None:
@@ -147,10 +147,16 @@ class ConformRun:
         self._results.append(result)
         self._on_result(result)
 
-    def _restore(self) -> None:
+    def _restore(self, *, patient: bool) -> None:
+        """Leave the node as it was; the first Ctrl-C of a run does not keep anybody from it."""
         try:
             self._care.restore()
-        except (KeyboardInterrupt, LinkClosed):
+        except KeyboardInterrupt:
+            if patient:
+                self._restore(patient=False)
+            else:
+                self._care.give_up()
+        except LinkClosed:
             self._care.give_up()
 
     def _report(self, aborted: str) -> Report:

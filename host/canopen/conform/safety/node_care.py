@@ -128,9 +128,11 @@ class NodeCare:
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(CARE_US)
-        if self.lost and not self._answers(GONE_MS):
+        if not self._put_back() and not (self._answers(GONE_MS) and self._put_back()):
             self._state.give_up()
-            return
+
+    def _put_back(self) -> bool:
+        """Write everything back; False if the node does not answer."""
         try:
             self._client.abort()
             if self._moved:
@@ -141,7 +143,8 @@ class NodeCare:
             if self._nmt_state in TO_STATE:
                 self._command(TO_STATE[self._nmt_state])
         except (SdoFailed, StepFailed):
-            self._state.give_up()
+            return False
+        return True
 
     def _tidy(self, addresses: Iterable[Address] | None) -> None:
         self._client.abort()

@@ -122,8 +122,8 @@ def judge(r1: R1, level: Level, *only: str) -> Report:
     return r1.judge(Plan(level, only, confirm=yes))
 
 
-SAMPLE: Final = (5, 400, *range(900, 10_000, 700))
-"""Calls of the link at which something happens; a run makes 10 134."""
+SAMPLE: Final = (5, 400, *range(900, 10_000, 700), 9_953)
+"""Calls of the link at which something happens; a run makes 10 134, the last ones to restore."""
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["EDS", "no EDS"])
@@ -154,20 +154,23 @@ def test_all_is_as_it_was(level: Level) -> None:
 
 @pytest.mark.parametrize("call", SAMPLE)
 def test_all_is_as_it_was_after_an_interruption(call: int) -> None:
+    fired = []
+
     def interrupt() -> None:
+        fired.append(call)
         raise KeyboardInterrupt
 
     r1 = configured()
     before = told(r1)
     r1.link = Meddler(r1.link, call, interrupt)  # type: ignore[assignment]
     report = judge(r1, Level.COMMUNICATION, *SOME)
-    assert report.aborted == "interrupted"
+    assert fired
     assert report.unrestored == ()
     assert told(r1) == before
     assert r1.slave.state is NmtState.OPERATIONAL
 
 
-@pytest.mark.parametrize("call", SAMPLE[::3])
+@pytest.mark.parametrize("call", [1_600, 2_400, 4_500, 7_200, 9_300])
 def test_all_is_as_it_was_though_the_node_was_away(call: int) -> None:
     r1 = configured()
     before, link = told(r1), r1.link
