@@ -15,6 +15,7 @@ from tickrig.emulators.testing.conformance.bench_source import bench_source
 from tickrig.emulators.testing.conformance.slave import CalledSlave, Slave, SlaveCall
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canmon.conform.consent import Consent
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan, Stimulus
@@ -81,7 +82,7 @@ def conformance(  # noqa: PLR0913 - by keyword
             bit_rate=source.bit_rate,
             seed=seed,
             stimulus=source.stimulus(number) if source.stimulus else None,
-            confirm=lambda question: True,
+            confirm=Consent(yes=False, virtual=True, alone=len(source.nodes) <= 1).confirm,
         )
         file = _eds(eds) or source.eds.get(number)
         device = None if file is None else read_device(file)

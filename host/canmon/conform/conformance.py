@@ -79,7 +79,9 @@ class Conformance:
 
     def _judge(self, source: ConformSource, node_id: int) -> Report | None:
         """Return the report; None if it was ended before it had begun."""
-        consent = Consent(yes=self._options["yes"], virtual=source.virtual)
+        consent = Consent(
+            yes=self._options["yes"], virtual=source.virtual, alone=len(source.nodes) == 1
+        )
         plan = self._plan(source, node_id, consent)
         progress = Progress(shown=sys.stderr.isatty())
         eds = _read_eds(self._eds) if self._eds else source.eds.get(node_id)

@@ -9,6 +9,7 @@ import click
 
 from tickrig.host.canmon.conform.nodes_heard import listed
 from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation.bound_check import LSS_TO_ALL
 from tickrig.host.canopen.conform.verdict import Result, Verdict
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
@@ -29,11 +30,12 @@ class Consent:
 
     Args:
         yes: `--yes`: all was said yes to.
-        virtual: nobody else is there, and nothing moves.
+        virtual: all is in a rig in virtual time, where nothing moves.
+        alone: no other node is there.
     """
 
-    def __init__(self, *, yes: bool, virtual: bool) -> None:
-        self._yes = yes or virtual
+    def __init__(self, *, yes: bool, virtual: bool, alone: bool = False) -> None:
+        self._yes, self._virtual, self._alone = yes, virtual, alone
 
     @property
     def can_ask(self) -> bool:
@@ -48,7 +50,7 @@ class Consent:
         """
         if others:
             say(f"also on this bus: {listed(others)}")
-        if level is Level.READ_ONLY or self._yes:
+        if level is Level.READ_ONLY or self._yes or self._virtual:
             return
         what = f"node {node_id} {DOES[level]}: what it drives may move, other nodes may trip"
         if not self.can_ask:
@@ -58,9 +60,14 @@ class Consent:
             raise Refused("not begun")
 
     def confirm(self, question: str) -> bool:
-        """Ask; no where nobody is there."""
+        """Ask; no where nobody is there.
+
+        In a rig there is nothing to be asked but for LSS, which other nodes would answer too.
+        """
         if self._yes:
             return True
+        if self._virtual:
+            return self._alone or question != LSS_TO_ALL
         if not self.can_ask:
             return False
         return click.confirm(one_line(question), default=False, err=True)

@@ -34,6 +34,13 @@ def test_a_device_of_a_bench_is_judged_beside_others() -> None:
         assert bench["left"].get("state") == "Pre-operational"
 
 
+def test_a_node_has_not_failed_because_another_one_answers() -> None:
+    with Bench(left=make_epos(1), right=make_epos(2)) as bench:
+        report = conformance(bench["right"], only=("LS-02", "NMT-03"))
+        verdicts = [result.outcome.verdict for result in report.results]
+        assert sorted(verdicts) == [Verdict.NOT_APPLICABLE, Verdict.PASS]
+
+
 def test_a_bare_callable_is_judged() -> None:
     def make() -> SlaveCall:
         def call(now_us: int, frames: Frames) -> Frames:

@@ -4,6 +4,7 @@ import pytest
 
 from tickrig.host.canmon.conform.consent import Consent
 from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation.bound_check import LSS_TO_ALL
 from tickrig.host.cli.refused import Refused
 
 
@@ -21,6 +22,13 @@ def test_others_are_listed_and_a_pipe_is_refused(capsys: pytest.CaptureFixture[s
 def test_who_said_yes_or_is_alone_is_not_asked(consent: Consent) -> None:
     consent.begin(5, Level.INTRUSIVE, {})
     assert consent.confirm("SYNC?")
+
+
+def test_lss_is_not_sent_to_several_nodes_of_a_rig() -> None:
+    several = Consent(yes=False, virtual=True)
+    assert not several.confirm(LSS_TO_ALL)
+    assert Consent(yes=False, virtual=True, alone=True).confirm(LSS_TO_ALL)
+    assert Consent(yes=True, virtual=True).confirm(LSS_TO_ALL)
 
 
 def test_reading_needs_no_consent() -> None:
