@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.emulators.canopen.cli import main
 
 ROOT = Path(__file__).parents[3]
@@ -336,3 +337,18 @@ def test_a_recording_that_ended_early_is_exit_status_3() -> None:
     result = run("--model", "epos", "--scenario", "-", "--trace", "/dev/full", text="0.1 end")
     assert result.exit_code == 3
     assert result.stderr.endswith("the recording ended early: /dev/full: No space left on device\n")
+
+
+def test_a_slave_is_made_of_an_xdd(tmp_path: Path) -> None:
+    xdd = tmp_path / "lamp.xdd"
+    xdd.write_text(XDD, "utf-8")
+    result = play("1ms send 605#4014100000000000\n9ms end\n", "--node", f"5={xdd}")
+    assert "585#4314100085000000" in frames(result)
+
+
+def test_an_xdd_with_a_document_type_is_refused(tmp_path: Path) -> None:
+    xdd = tmp_path / "bomb.xdd"
+    xdd.write_text('<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>', "utf-8")
+    result = run("--eds", xdd, "--node-id", "5")
+    line = f"Error: {xdd}:1: has a document type, which is refused (xml)"
+    assert (result.exit_code, result.stderr.splitlines()) == (2, [line])

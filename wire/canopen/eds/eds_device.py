@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_entry import read_entry, required
+from tickrig.wire.canopen.eds.eds_entry import KIND_WORDS, read_entry, required
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import (
@@ -116,7 +116,7 @@ def _kinds(file: EdsFile) -> Kinds:
 def _kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
     """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
     usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
-    number = file.number(section, "ObjectType", usual)
+    number = file.number(section, "ObjectType", usual, words=KIND_WORDS)
     if number in NO_DATA:
         return None
     if number not in DESCRIBED:

@@ -18,7 +18,9 @@ from tickrig.wire.canopen.eds.object_table import (
 SIMPLE_TYPES: Final = range(0x1C)
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
 TRUTH: Final = (0, 1)
-TRUE_WORDS: Final = ("yes", "true")
+TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
+TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
+KIND_WORDS: Final = {code.name.lower(): int(code) for code in ObjectCode}
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
 MISSING: Final = {
     "ParameterName": "name-missing",
@@ -72,11 +74,11 @@ def is_visible_char(file: EdsFile, number: int) -> bool:
 
 
 def _data_type(file: EdsFile, section: str) -> DataType:
-    if file.number(section, "ObjectType", ObjectCode.VAR) == ObjectCode.DOMAIN:
+    if file.number(section, "ObjectType", ObjectCode.VAR, words=KIND_WORDS) == ObjectCode.DOMAIN:
         return DataType.DOMAIN
     usual = DataType.UNSIGNED8 if section.endswith("sub0") else DataType.DOMAIN
     required(file, section, "DataType", usual.name)
-    number = file.number(section, "DataType", usual)
+    number = file.number(section, "DataType", usual, words=TYPE_WORDS)
     if number not in SIMPLE_TYPES and not is_visible_char(file, number):
         number = _derived(file, section, number)
     try:
@@ -102,7 +104,7 @@ def _unknown(file: EdsFile, section: str, number: int) -> int:
 def _access(file: EdsFile, section: str) -> Access:
     text = required(file, section, "AccessType", "rw")
     known = LONE_LETTERS.get(text.lower(), text or "rw")
-    mappable = _mappable(file, section)
+    mappable = bool(file.number(section, "PDOMapping", words=TRUTH_WORDS))
     try:
         access = Access.from_eds(known, mappable=mappable)
     except ValueError:
@@ -111,15 +113,6 @@ def _access(file: EdsFile, section: str) -> Access:
         what = f"AccessType={shorten(text)} is none of CiA 306" if text else "AccessType is empty"
         file.warn(section, f"{what}: {known} is taken", "access-form", "AccessType")
     return access
-
-
-def _mappable(file: EdsFile, section: str) -> bool:
-    words = file.value(section, "PDOMapping").lower()
-    if words not in TRUE_WORDS:
-        return bool(file.number(section, "PDOMapping"))
-    reason = f"PDOMapping={words} is not a number: 1 is taken"
-    file.warn(section, reason, "no-number", "PDOMapping")
-    return True
 
 
 def _default(

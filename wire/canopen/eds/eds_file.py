@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
@@ -63,6 +63,7 @@ def shorten(text: str) -> str:
 
 
 Section = dict[str, str]
+NO_WORDS: Final[Mapping[str, int]] = {}
 
 _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 
@@ -143,13 +144,20 @@ class EdsFile:
             self.warn(section, what, "number-form", key)
         return plain
 
-    def number(
-        self, section: str, key: str, default: int = 0, low: int = 0, high: int = 0xFFFF_FFFF
+    def number(  # noqa: PLR0913, PLR0917 - a place, and what counts there
+        self,
+        section: str,
+        key: str,
+        default: int = 0,
+        low: int = 0,
+        high: int = 0xFFFF_FFFF,
+        words: Mapping[str, int] = NO_WORDS,
     ) -> int:
         """Return the number of a keyword.
 
         Where there is none the default counts, with a warning if the keyword is
-        empty, is no number, or not one from `low` to `high`.
+        empty, is no number, or not one from `low` to `high`. One of `words`, which
+        are in lower case, stands for its number, with a warning.
         """
         text = self.numeric(section, key)
         if not text:
@@ -157,6 +165,9 @@ class EdsFile:
                 self.warn(section, f"{key} is empty: {default} is taken", "empty-value", key)
             return default
         said = f"{key}={shorten(text)}"
+        if (word := words.get(text.lower())) is not None:
+            self.warn(section, f"{said} is not a number: {word} is taken", "number-word", key)
+            return word
         try:
             number = parse_number(text)
         except ValueError:

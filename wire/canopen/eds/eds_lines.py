@@ -69,7 +69,8 @@ def read_lines(text: str) -> list[EdsLine]:
     """
     lines, section = [], ""
     for number, raw in enumerate(split_lines(text), 1):
-        content = _COMMENT.sub("", raw).strip()
+        has_comment = ";" in raw or "#" in raw  # most have none
+        content = (_COMMENT.sub("", raw) if has_comment else raw).strip()
         match = _TITLE.match(content)
         if match:
             section = canonical_section(match[1])

@@ -14,6 +14,7 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
     FILE_INFO,
     FLAGS,
     NAMES,
+    NUMBERS,
     OF_DCF,
 )
 from tickrig.wire.canopen.eds.eds_file import shorten
@@ -31,6 +32,8 @@ FORMS: Final = {
 MOST_GRANULARITY: Final = 64
 DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
 DUMMY_TYPES: Final = range(1, 0x20)
+DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
+"""Those that CiA 306 lists."""
 PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
 IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
 
@@ -85,6 +88,11 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
             what = f"{key} is missing: {value or 'none'} is taken"
             if not file.is_xml:
                 yield document.found("device-info-missing", what, title, key, edit)
+    for key in (*NUMBERS, *FLAGS):
+        line = document.keyword(title, key)
+        if line is not None and not line.value:
+            edits = () if file.is_xml else (document.with_value(line, "0"),)
+            yield document.found("empty-value", f"{key} is empty: 0 is taken", title, key, *edits)
     for key in FLAGS:
         if number(document, title, key) not in (None, 0, 1):
             what = f"{key}={shorten(file.value(title, key))} is not 0 or 1"
@@ -143,6 +151,12 @@ def dummy_usage(document: Document) -> Iterator[RuleFinding]:
         if match is None or int(match[1], 16) not in DUMMY_TYPES or line.value not in ("0", "1"):
             what = f"{shorten(line.content)} is not Dummy0001=0 to Dummy001F=1"
             yield document.found("dummy-usage", what, "DummyUsage", line.number)
+    file, title = document.file, "DummyUsage"
+    for key in DUMMIES if title in file.sections and not file.is_xml else ():
+        if not file.has(title, key):
+            edit = document.add_to(title, [f"{key}=0"])
+            what = f"{key} is missing: 0 is taken"
+            yield document.found("dummy-usage", what, title, "", edit)
 
 
 def comment_lines(document: Document) -> Iterator[RuleFinding]:
@@ -153,10 +167,10 @@ def comment_lines(document: Document) -> Iterator[RuleFinding]:
     if head is None or document.file.is_xml:
         return
     said = number(document, "Comments", "Lines")
-    if said != len(numbers):
-        wanted = {f"line{at}" for at in range(1, len(numbers) + 1)}
+    wanted = {f"line{at}" for at in range(1, len(numbers) + 1)}
+    if said != len(numbers) or numbers != wanted:
         edits = (document.with_value(head, str(len(numbers))),) if numbers == wanted else ()
-        what = f"Lines={shorten(head.value)}, but there are {len(numbers)}"
+        what = f"Lines={shorten(head.value)}, and there are {len(numbers)}, from Line1 on"
         yield document.found("comment-lines", what, "Comments", "Lines", *edits)
 
 

@@ -70,3 +70,18 @@ def keys_of(section: str) -> dict[str, str] | None:
     if object_section(section) is not None:
         return _OBJECT
     return _BY_SECTION.get(section)
+
+
+def numbered(section: str, key: str) -> str | None:
+    """Return how a keyword of a list is spelled, as `Line3`, `Dummy001B` or `12`; None for another.
+
+    >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
+    ('Line5', 'Dummy001B', None)
+    """
+    pattern = KEYS.get(section)
+    if pattern is None or not pattern.fullmatch(key):
+        return None
+    return _LISTED.get(key.lower(), f"{key[:1].upper()}{key[1:5].lower()}{key[5:].upper()}")
+
+
+_LISTED: Final = _spelled("SupportedObjects", "NrOfEntries", "Lines")

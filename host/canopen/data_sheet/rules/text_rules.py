@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
-from tickrig.host.canopen.data_sheet.rules.known_keys import KEYS, SECTION, keys_of
+from tickrig.host.canopen.data_sheet.rules.known_keys import SECTION, keys_of, numbered
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
 
@@ -84,20 +84,15 @@ def keywords(document: Document) -> Iterator[RuleFinding]:
         known = keys_of(line.section)
         if not line.is_keyword or not line.key or known is None:
             continue
-        spelled = known.get(line.key.lower())
+        spelled = known.get(line.key.lower()) or numbered(line.section, line.key)
         if spelled is None:
-            if not _numbered(line.section, line.key):
-                what = f"{shorten(line.key)} is no keyword of CiA 306 here"
-                yield document.found("unknown-key", what, line.section, line.number)
+            what = f"{shorten(line.key)} is no keyword of CiA 306 here"
+            yield document.found("unknown-key", what, line.section, line.number)
         elif spelled != line.key:
+            text = document.texts[line.number - 1].replace(line.key, spelled, 1)
             what = f"{shorten(line.key)} stands for {spelled}"
-            yield document.found("key-case", what, line.section, line.number)
-
-
-def _numbered(section: str, key: str) -> bool:
-    """Return whether a keyword is one of a list, as `Line3`, `Dummy0001` or `12`."""
-    pattern = KEYS.get(section)
-    return pattern is not None and pattern.fullmatch(key) is not None
+            edit = Edit(line.number, lines=(text,))
+            yield document.found("key-case", what, line.section, line.number, edit)
 
 
 def comments(document: Document) -> Iterator[RuleFinding]:

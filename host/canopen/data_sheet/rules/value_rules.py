@@ -12,7 +12,7 @@ from tickrig.host.canopen.data_sheet.rule import Edit, RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS, TRUE_WORDS
+from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
 from tickrig.wire.canopen.eds.eds_value import NODE_IDS, parse_limit, plain_numbers
@@ -126,10 +126,13 @@ def _plain(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, .
 
 
 def _word(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    """Mend a PDOMapping that is a word."""
-    if line.key.lower() == "pdomapping" and line.value.lower() in TRUE_WORDS:
-        return (document.with_value(line, "1"),)
-    return ()
+    """Write the number that a word stands for."""
+    return (document.with_value(line, _taken(finding)),)
+
+
+def _taken(finding: Finding) -> str:
+    """Return what the reader says that it has taken."""
+    return finding.reason.rpartition(": ")[2].partition(" ")[0]
 
 
 def _access(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -141,8 +144,7 @@ def _empty(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, .
     """Give an empty keyword the value that it counts as; what a DataType is nobody knows."""
     if line.key.lower() == "datatype" and not line.section.endswith("sub0"):
         return ()
-    taken = finding.reason.rpartition(": ")[2].partition(" ")[0]
-    return (document.with_value(line, taken),)
+    return (document.with_value(line, _taken(finding)),)
 
 
 def _type_of_sub0(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -203,7 +205,7 @@ def _compact(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit,
 
 _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]]] = {
     "number-form": _plain,
-    "no-number": _word,
+    "number-word": _word,
     "access-form": _access,
     "empty-value": _empty,
     "data-type-missing": _type_of_sub0,

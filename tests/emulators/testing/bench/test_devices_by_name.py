@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from serial import SerialException, serial_for_url
 
+from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig import Bench, open_bench
 from tickrig.device import make_epos
 
@@ -127,3 +128,10 @@ def test_a_port_has_the_name_that_the_bench_gave_it() -> None:
         port.close()
         with pytest.raises(SerialException, match=r"tickrig://chiar: .*did you mean .*chair'\?"):
             serial_for_url(bench.url.replace("chair", "chiar"))
+
+
+def test_an_xdd_names_a_device_as_an_eds_does(tmp_path: Path) -> None:
+    xdd = tmp_path / "lamp.xdd"
+    xdd.write_text(XDD, "utf-8")
+    with Bench(f"5={xdd}") as bench:
+        bench.run_for("11ms")

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.host.monitor.decode.traces import last
+from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsError
@@ -94,3 +95,17 @@ def test_a_file_that_is_no_eds_is_refused(tmp_path: Path, text: str, findings: l
 def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read_eds_objects(tmp_path / "none.eds", 5)
+
+
+def test_an_xdd_is_read_as_an_eds(tmp_path: Path) -> None:
+    path = tmp_path / "lamp.xdd"
+    path.write_text(XDD, "utf-8")
+    eds = read_eds_objects(path, 5)
+    assert (eds.name, eds.texts[0x2000, 0].kind) == ("Lamp", DataType.UNSIGNED8)
+    assert eds.values[0x1014, 0] == bytes.fromhex("85000000")
+
+
+def test_an_eds_in_utf_16_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_bytes(EPOS.read_text("utf-8").encode("utf-16"))
+    assert read_eds_objects(path, 5).name == "EPOS"

@@ -108,7 +108,7 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
         ),
         (
             f"[1017]\n{U8}PDOMapping=yes\n",
-            "a.eds:5: [1017] PDOMapping=yes is not a number: 1 is taken (no-number)",
+            "a.eds:5: [1017] PDOMapping=yes is not a number: 1 is taken (number-word)",
         ),
         (
             f"[1017]\n{U8}ObjectType=3\n",
