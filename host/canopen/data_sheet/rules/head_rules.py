@@ -30,6 +30,7 @@ FORMS: Final = {
     "EDSVersion": (re.compile(r"[34]\.[0-9]"), "3.0 or 4.0"),
 }
 MOST_GRANULARITY: Final = 64
+WIDEST: Final = 32
 DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
 DUMMY_TYPES: Final = range(1, 0x20)
 DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
@@ -39,11 +40,12 @@ IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber",
 
 
 def number(document: Document, section: str, key: str) -> int | None:
-    """Return the number of a keyword; None where there is none."""
+    """Return the number of a keyword; None where there is none of 32 bits."""
     try:
-        return parse_number(plain_numbers(document.file.value(section, key)))
+        found = parse_number(plain_numbers(document.file.value(section, key)))
     except ValueError:
         return None
+    return found if found.bit_length() <= WIDEST else None
 
 
 def sections(document: Document) -> Iterator[RuleFinding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -17,6 +18,7 @@ MANUFACTURER: Final = "ManufacturerObjects"
 LISTS: Final = (MANDATORY, OPTIONAL, MANUFACTURER)
 ALWAYS_MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 MANUFACTURER_AREA: Final = range(0x2000, 0x6000)
+NUMBER: Final = re.compile(r"[0-9]{1,5}", re.ASCII)
 INDICES: Final = range(0x1000, 0x10000)
 
 
@@ -32,7 +34,7 @@ class ObjectList:
         self.title = title
         self.entries: list[tuple[EdsLine, int | None]] = []
         for line in document.lines_of(title):
-            if line.key.isdecimal() and line.key.isascii() and line.value:
+            if NUMBER.fullmatch(line.key) and line.value:
                 self.entries.append((line, _index(line.value)))
 
     @property

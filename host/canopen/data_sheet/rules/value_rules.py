@@ -18,7 +18,7 @@ from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object
 from tickrig.wire.canopen.eds.eds_value import NODE_IDS, parse_limit, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-OCTAL: Final = re.compile(r"0+[0-7]*[1-7][0-7]*", re.ASCII)
+OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
 NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
 NUMBERS: Final = ("ObjectType", "DataType", "PDOMapping", "SubNumber", "CompactSubObj")
 VALUES: Final = ("DefaultValue", "LowLimit", "HighLimit", "ParameterValue")
