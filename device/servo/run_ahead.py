@@ -41,7 +41,7 @@ class RunAhead(Part):
         self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
 
 
-def work_out(
+def work_out(  # noqa: PLR0915 - one loop over locals
     plant: Plant, loops: Loops, encoder: tuple[int, float], demands: Demands, bounds: Bounds
 ) -> RunAhead:
     """Work out what the loops and the plant do in steps with a position demand, to the bit.
@@ -68,7 +68,7 @@ def work_out(
     electrical, copper = losses.electrical_j, losses.copper_j
     rubbed, squares = losses.friction_j, losses.square_a2s
     angle, w, i, integral = plant.position, plant.speed_rad_s, plant.current_a, loops.integral_a
-    steps = 0
+    fast, steps = slow + 1.0, 0
     for position, velocity in demands:
         error = position - counts
         if velocity == 0.0 and -1.0 < error < 1.0:
@@ -97,7 +97,9 @@ def work_out(
         way = a0 * i + a1 * w + a2 * current + a3 * (load + friction)
         ahead = angle + way * per_rad
         seen = floor(ahead - lost_counts + 0.5)
-        turns = -slow <= velocity <= slow or abs(round(speed * per_rad)) > slow
+        rate = speed * per_rad
+        rolls = not -fast <= rate <= fast or abs(round(rate)) > slow  # `round` is one, too
+        turns = rolls or -slow <= velocity <= slow
         follows = turns and -window <= position - seen <= window
         if not (follows and first <= seen <= last and speed):
             break

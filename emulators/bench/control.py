@@ -12,10 +12,10 @@ from tickrig.host.control.requests import Object, RequestDispatcher, short, text
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
-from tickrig.wire.instant import NEVER
 
 MAX_LINES: Final = 100
 MAX_PRESS_US: Final = 10**15
+MAX_SINCE: Final = 2**63 - 1
 """As long as a command line can say."""
 
 
@@ -103,7 +103,7 @@ class EmulatorControl(RequestDispatcher):
         return {}
 
     def _lines(self, request: Object) -> Object:
-        since = whole(request.get("since", 0), "since", 0, NEVER)
+        since = whole(request.get("since", 0), "since", 0, MAX_SINCE)
         return {
             "lines": [
                 {"number": x.number, "at_us": x.at_us, "mark": x.mark, "text": escape(x.data)}
@@ -114,7 +114,7 @@ class EmulatorControl(RequestDispatcher):
     def _status(self, request: Object) -> Object:
         status: Object = dict(self._emulator.status())
         if "since" in request:
-            since_us = whole(request["since"], "since", 0, NEVER)
+            since_us = whole(request["since"], "since", 0, MAX_SINCE)
             status["late_us"] = self._emulator.rig.late_since(since_us)
         return status
 
