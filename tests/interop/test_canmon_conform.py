@@ -103,3 +103,13 @@ def test_a_tester_that_was_stopped_calls_no_silence_a_failure(bus: Bus, board: S
     assert status in (0, 4)
     assert said["counts"]["fail"] == 0
     board.wait_for("0x1017", 0)
+
+
+def test_a_control_socket_moves_inputs_errors_and_power(bus: Bus, board: Slave) -> None:
+    names = only("NMT-01", "EM-01", "EM-02", "EM-03", "PR-01")
+    stimulus = ("--stimulus", f"control:{board.control}")
+    status, said = report_of(begin(bus, "--intrusive", *stimulus, *names))
+    verdicts = {check["id"]: check["verdict"] for check in said["checks"]}
+    assert verdicts.keys() == {"NMT-01", "EM-01", "EM-02", "EM-03", "PR-01"}
+    assert status in (0, 4), said
+    assert said["counts"]["not applicable"] == 0, verdicts
