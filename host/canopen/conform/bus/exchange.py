@@ -32,7 +32,7 @@ PERIOD_TOLERANCE: Final = 0.05
 NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
 
-NODES: Final = range(0x081, 0x780)
+NODES: Final = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
 """CAN-IDs of the pre-defined connection set that belong to a node."""
 
 MULTIPLEXER: Final = slice(1, 4)
@@ -259,7 +259,7 @@ class Exchange:
             if answered and frame.data[MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
             return
-        if not frame.extended and NODES.start <= frame.can_id < NODES.stop:
+        if not frame.extended and any(frame.can_id in ids for ids in NODES):
             self.others.add(frame.can_id & NODE_ID_MASK)
         if can_id in self._reserved:
             self.disturb(f"somebody else sent {text}")

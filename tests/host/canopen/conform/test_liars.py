@@ -146,4 +146,10 @@ def test_a_full_bus_accuses_nobody() -> None:
     plan = Plan(Level.COMMUNICATION, ("NMT", "HB", "UE", "PR"), confirm=yes, bit_rate=1_000_000)
     report = r1.judge(plan, link=SpyLink(r1, fill))
     assert failing(report) == []
-    assert "other nodes" in report.settings
+    assert report.settings["other nodes"].startswith("16, 17, 18")
+
+
+def test_another_server_of_the_node_is_no_other_node() -> None:
+    report = R1().judge(Plan(Level.COMMUNICATION, ("SG",)))
+    assert report.count(Verdict.PASS) > 5
+    assert report.settings["other nodes"] == "none"
