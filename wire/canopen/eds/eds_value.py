@@ -21,6 +21,7 @@ TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 WIDEST: Final = 64
 """Bits of the widest number."""
 
+_PLAIN: Final = re.compile(r"0x[0-9A-Fa-f]+|0|[1-9][0-9]*|", re.ASCII)
 _C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECASE | re.ASCII)
 _SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
 _ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f]*)h", re.IGNORECASE | re.ASCII)
@@ -87,8 +88,8 @@ def plain_numbers(text: str) -> str:
     >>> plain_numbers("0x 12 34"), plain_numbers("1Ah"), plain_numbers("1_000")
     ('0x1234', '0x1A', '1000')
     """
-    if text.isdigit() and text.isascii() and (text[0] != "0" or text == "0"):
-        return text  # most are such
+    if _PLAIN.fullmatch(text):  # most are such: a third of the time of a file
+        return text
     plain = _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
     if assembler := _ASSEMBLER_HEX.fullmatch(plain):
         return f"0x{assembler[1]}"
