@@ -39,7 +39,7 @@ def test_the_verdicts_are_those_of_the_public_checks(
     found = compare(report, read_table(stack))
     assert found.both >= 75
     assert found.same >= LEAST * found.both
-    assert {one.check_id for one in found.differences} == found.explained, "each has its reason"
+    assert {one.check_id for one in found.differences} <= found.explained, "each has its reason"
 
 
 def test_the_page_tells_of_these_stacks() -> None:

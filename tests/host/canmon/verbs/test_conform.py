@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree.ElementTree import parse
 
@@ -55,6 +58,20 @@ def test_json_is_the_same_each_time_and_says_what_was_run(rig: str) -> None:
     assert said["settings"]["adapter"] == "a rig in virtual time"
     assert said["settings"]["EDS"] == "r1.eds"
     assert [check["verdict"] for check in said["checks"]] == ["pass"] * 3
+
+
+def test_the_hash_seed_makes_no_difference(rig: str) -> None:
+    line = [sys.executable, "-c", "from tickrig.commands import canmon; canmon()", "conform", rig]
+    line += ["--node", "5", "--intrusive", "--only", "[NUES]*", "--json"]
+
+    def run(seed: int) -> bytes:
+        variables = {**os.environ, "PYTHONHASHSEED": f"{seed}"}
+        done = subprocess.run(line, capture_output=True, check=False, env=variables)
+        return done.stdout
+
+    first = run(0)
+    assert len(json.loads(first)["checks"]) > 50
+    assert run(1) == first
 
 
 def test_a_node_without_power_is_blocked_not_failed(tmp_path: Path) -> None:
