@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.host.canopen.conform.r1 import R1
+from tickrig.host.canopen.conform.check import Check, Level
+from tickrig.host.canopen.conform.notation.names import NAME
+from tickrig.host.canopen.conform.notation.step_text import parse_step
+from tickrig.host.canopen.conform.notation.suite import ORDER, parse_group, read_suite
+from tickrig.host.canopen.conform.plan import Plan
+
+CHECKS = [check for group in read_suite() for check in group.checks]
+SOURCE = re.compile(r"(practice: .+; )?CiA \d{3}(-\d)? v\d\.\d\.\d, .+|practice: .+")
+READS = {"read", "refuse read", "send", "expect", "none", "wait", "forget", "macro"}
+
+
+def words_of(check: Check) -> str:
+    return " ".join(str(step) for step in check.steps)
+
+
+def test_groups_come_in_the_order_in_which_they_are_judged() -> None:
+    assert tuple(group.name for group in read_suite()) == ORDER
+
+
+def test_an_id_is_of_its_group_and_of_one_check() -> None:
+    ids = [check.id for check in CHECKS]
+    assert len(set(ids)) == len(ids)
+    assert all(check.id.startswith(f"{check.group}-") for check in CHECKS)
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.id)
+def test_each_check_names_its_clause(check: Check) -> None:
+    assert SOURCE.fullmatch(check.source), check.source
+
+
+def test_what_only_reads_has_no_step_that_writes() -> None:
+    reading = [check for check in CHECKS if check.level is Level.READ_ONLY]
+    assert len(reading) > 30
+    assert all(READS & step.keys() for check in reading for step in check.steps)
+    macros = {step["macro"][0] for check in reading for step in check.steps if "macro" in step}
+    assert macros == {"upload", "blockup"}
+
+
+def test_each_name_stands_for_something_on_some_node() -> None:
+    report = R1(("1029", "1F80")).judge(Plan(Level.INTRUSIVE, confirm=lambda question: True))
+    reasons = {result.check.id: result.outcome.reason for result in report.results}
+    named = [check for check in CHECKS if NAME.search(words_of(check))]
+    assert len(named) > 200
+    assert not [name for name, reason in reasons.items() if "no check has such a name" in reason]
+
+
+@pytest.mark.parametrize("line", ["", "sleep 5", "> ", "write 1017:00", "wait 5", "none on 705"])
+def test_a_line_that_is_no_step_is_refused(line: str) -> None:
+    with pytest.raises(ValueError, match=r"is no step; docs/conform\.md has the notation"):
+        parse_step(line)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("NMT-03 title", "is no head like 'group: NMT, what it is about'"),
+        ("group: NMT, states\n\ntitle alone", "is no head like 'NMT-03 what conforming means'"),
+        ("group: NMT, states\n\nNMT-03 title\nwait 5 ms", "NMT-03 has no level and no source"),
+    ],
+)
+def test_a_file_that_is_no_group_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(reason)):
+        parse_group(text)
