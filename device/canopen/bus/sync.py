@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.abort import SdoAbort, whole_number
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Handler, Service
@@ -25,6 +26,7 @@ COUNTER_OVERFLOWS: Final = (0, *range(2, 241))
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Sync(Service):
     """Consumes SYNC, and produces it if bit 30 of 1005h and 1006h say so.
 

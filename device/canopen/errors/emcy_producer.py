@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.cob_id_rules import check_emcy_cob_id, is_valid
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -27,6 +28,7 @@ QUEUE_LENGTH: Final = 16
 """EMCY messages that wait; more are lost, as in a real device."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class EmcyProducer(Service):
     """Reports errors, once when they occur and once when they are gone (0000h).
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALIVE, Service
@@ -28,6 +29,7 @@ class Behaviour(IntEnum):
     STOPPED = 2
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ErrorBehaviour(Service):
     """Changes the NMT state on a communication error, or on an error of the device.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
 from tickrig.device.canopen.core.slave import CanopenSlave
@@ -14,6 +15,7 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatProducer(Service):
     """Sends the NMT state each producer heartbeat time.
 
@@ -63,6 +65,7 @@ PRODUCER_HEARTBEAT_TIME: Final = 0x1017
 TOGGLE: Final = 0x80
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NodeGuarding(Service):
     """Answers guarding requests with the NMT state, and watches that they come.
 

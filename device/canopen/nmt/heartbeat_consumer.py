@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from enum import Enum, auto
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.service import ALWAYS, Handler, Service
@@ -78,6 +79,7 @@ class Monitor(Part):
         self._consumer.node.emergency_clear(EmcyCode.HEARTBEAT, bytes([self.node_id]))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatConsumer(Service):
     """Watches the heartbeats of other nodes.
 

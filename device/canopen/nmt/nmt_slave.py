@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.wire.can import CanFrame
@@ -29,6 +30,7 @@ SELF_START: Final = 0b1000
 """1F80h of a slave that starts itself (CiA 302-2)."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NmtSlave(Service):
     """Follows the NMT master."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.cob_id_rules import check_sdo_cob_id, is_valid
 from tickrig.device.canopen.core.entry import Entry
@@ -44,6 +45,7 @@ class _Additional(NamedTuple):
             self.server.response_id = self.response.number & CAN_ID_MASK
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SdoServers(Service):
     """The default server and the additional ones.
 

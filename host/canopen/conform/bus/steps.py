@@ -98,7 +98,7 @@ class Player:
 
     def _compare(self, name: str, wanted: str) -> None:
         got = self._stimulate("output", name)
-        if got != wanted:
+        if _value(got) != _value(wanted):
             raise StepFailed(f"output {name} is {got}, want {wanted}")
 
     def _stimulate(self, *words: str) -> str:
@@ -111,3 +111,11 @@ class Player:
             raise NotAllowed(f"nobody can do {' '.join(words)}: {error}") from error
         finally:
             self._exchange.excuse()
+
+
+def _value(text: str) -> float | str:
+    """Read a number, however it is written; what is none stays a text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
