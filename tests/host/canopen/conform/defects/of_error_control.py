@@ -145,6 +145,18 @@ def toggles_anew(slave: CanopenSlave) -> Bends:
     return Bends(hear)
 
 
+def answers_besides(slave: CanopenSlave) -> Bends:
+    """Answer guarding requests beside heartbeats."""
+
+    def hear(text: str) -> Iterable[str]:
+        if text.startswith("705#R") and slave.dictionary[0x1017, 0].number:
+            slave.send(0x705, bytes([slave.state]))
+            slave.due_us = 0
+        return (text,)
+
+    return Bends(hear)
+
+
 def alarm_at_once(slave: CanopenSlave) -> Bends:
     """Report a lost heartbeat that was only configured."""
 
@@ -190,4 +202,5 @@ DEFECTS: Final = (
     Defect("the time of a node cannot be changed", ("HB-16",), guards_consumers(zero=True)),
     Defect("EMCY though heartbeats come", ("HB-11",), hears_first_only),
     Defect("toggle begins anew with Start", ("NG-02",), toggles_anew),
+    Defect("guarding beside heartbeat", ("NG-07",), answers_besides, left=True),
 )

@@ -314,4 +314,5 @@ DEFECTS: Final = (
     Defect("RPDO stays on its old CAN-ID", ("PR-20",), stays_on_old_id),
     Defect("RPDO is not received", ("PR-11", "PR-12"), hears("205#.*")),
     Defect("TPDO has the values before SYNC", ("PR-21",), lags, left=True),
+    Defect("type 254 sends nothing", ("PR-22",), all_act_as(0x1800, 2, {254: 0}), left=True),
 )

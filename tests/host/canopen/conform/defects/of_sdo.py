@@ -81,6 +81,32 @@ def answers_aborts(slave: CanopenSlave) -> Bends:
     return Bends(hear)
 
 
+def grows(slave: CanopenSlave) -> Bends:
+    commands = [0]
+
+    def hear(text: str) -> Iterable[str]:
+        commands[0] += text.startswith("000#")
+        return (text,)
+
+    def say(text: str) -> Iterable[str]:
+        long = commands[0] and text.startswith("585#4B1710")
+        return (f"585#43{text[6:]}",) if long else (text,)
+
+    return Bends(hear, say)
+
+
+def flickers_shortly(slave: CanopenSlave) -> Bends:
+    reads = [0]
+
+    def say(text: str) -> Iterable[str]:
+        if text.startswith("585#4B0910"):
+            reads[0] += 1
+            return (f"585#4B091000{reads[0] % 256:02X}310000",)
+        return (text,)
+
+    return Bends(say=say)
+
+
 def flickers(slave: CanopenSlave) -> Bends:
     """Give another value each time that 64 bits are read."""
     reads = [0]
@@ -156,7 +182,9 @@ def wrong_code(right: str, wrong: str) -> Plant:
 DEFECTS: Final = (
     Defect("wrong size in upload", ("UE-02", "OD-1001.00-type"), says("585#4F(.*)", r"585#4B\1")),
     Defect("u32 is sent as 3 bytes", ("UE-01", "OD-1000.00-type"), says("585#43(.*)", r"585#47\1")),
-    Defect("u16 is sent as 4 bytes", ("UE-03", "OD-1017.00-type"), says("585#4B(.*)", r"585#43\1")),
+    Defect("u16 is sent as 4 bytes", ("OD-1017.00-type", "UE-03"), says("585#4B(.*)", r"585#43\1")),
+    Defect("1017h is sent as 4 bytes after an NMT command", ("UE-03",), grows),
+    Defect("a short string is never the same", ("UE-04",), flickers_shortly, left=True),
     Defect(
         "short strings are sent in segments of one",
         ("UE-04", "OD-1009.00-type"),
@@ -275,5 +303,5 @@ DEFECTS: Final = (
     Defect(
         "the highest sub-index is wrong", ("UE-05",), says("585#4F181000.*", "585#4F18100005000000")
     ),
-    Defect("other initial values", ("UE-14",), flickers),
+    Defect("other initial values", ("UE-14", "US-02"), flickers),
 )

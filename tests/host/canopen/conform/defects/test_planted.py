@@ -16,8 +16,8 @@ from tests.host.canopen.conform.defects.table import DEFECTS
 CHECKS: Final = {check.id: check for check in load_all()}
 ACTIONS: Final = {GENERIC_IO: GenericIoActions, DRIVE: DriveActions}
 
-LENIENT: Final = {"heartbeat off by 10 %"}
-"""What these checks let pass, and those of the tester do not: they count, and measure nothing."""
+LENIENT: Final = {"heartbeat off by 10 %", "1017h is sent as 4 bytes after an NMT command"}
+"""What these checks let pass: they count, and measure no period, and each begins anew."""
 
 
 def fails(defect: Defect, check: str) -> bool:

@@ -175,6 +175,10 @@ def test_store_and_restore_are_never_written() -> None:
         (entry(U8, RO), entry(U8, RW), ["write 1 bytes were taken, want abort 06010002"]),
         (entry(U8, RW), entry(DataType.VISIBLE_STRING, RW), ["type 0 bytes", "long 1 bytes were"]),
         (
+            *(entry(U16, RW), entry(DataType.VISIBLE_STRING, RW, "ab")),
+            ["long 3 bytes were taken", "short 2 bytes were taken"],
+        ),
+        (
             *(entry(U8, RW), entry(U8, WO)),
             ["type refused with object is write only (06010001h), want its value"],
         ),

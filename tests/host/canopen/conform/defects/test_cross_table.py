@@ -1,0 +1,14 @@
+from __future__ import annotations
+
+from tests.host.canopen.conform.defects.cross_table import cross, unseen
+from tests.host.canopen.conform.defects.table import DEFECTS
+
+
+def test_no_check_is_one_that_no_defect_can_fail() -> None:
+    named = {check for defect in DEFECTS for check in defect.breaks}
+    assert [check.id for check in unseen(named)] == []
+
+
+def test_the_cross_table_tells_who_sees_a_defect() -> None:
+    doubled = next(defect for defect in DEFECTS if defect.name == "boot-up doubled")
+    assert [checks for _, checks in cross([doubled])] == [["NMT-01"]]
