@@ -117,8 +117,7 @@ class Exchange:
         """Send a frame, when the load allows it; NotAllowed if the level does not."""
         self._permit(frame)
         self._listen(self.now_us)
-        while (wait_us := self._allowance.wait_us(self.now_us)) > 0:
-            self._listen(self.now_us + wait_us)
+        self._listen_until(self.now_us + self._allowance.wait_us(self.now_us))
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
         if frame.can_id == self._request:
@@ -254,6 +253,8 @@ class Exchange:
             self._unread[can_id].append((at_us, text))
             self.evidence.add(at_us - self.start_us, Direction.RECEIVED, text)
         if own:
+            if frame.can_id == self._response:
+                self._allowance.use(at_us, frame)
             self.boots += text == self._boot_up
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
             if answered and frame.data[MULTIPLEXER] == self._multiplexer:

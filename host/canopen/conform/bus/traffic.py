@@ -13,6 +13,9 @@ ASSUMED_BIT_RATE: Final = 125_000
 WINDOW_US: Final = 100_000
 """The load is limited over so long."""
 
+LONGEST_WAIT_US: Final = 1_000_000
+"""A node that floods the bus with answers does not keep the tester from sending."""
+
 FOREIGN_LOAD: Final = 0.5
 """With more of it by other nodes, a late or missing answer says nothing of the node."""
 
@@ -31,14 +34,16 @@ class Allowance:
         self._at_us = 0
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count a frame of the tester, and as much again: it is answered."""
+        """Count a frame of the tester, or an answer to one."""
         self._fill(now_us)
-        self._left -= 2 * frame_bits(frame)
+        self._left -= frame_bits(frame)
 
     def wait_us(self, now_us: int) -> int:
-        """Return how long nothing may be sent."""
+        """Return how long nothing may be sent, at most `LONGEST_WAIT_US`."""
         self._fill(now_us)
-        return 0 if self._left >= 0 else int(-self._left / self._bits_us) + 1
+        if self._left >= 0:
+            return 0
+        return min(LONGEST_WAIT_US, int(-self._left / self._bits_us) + 1)
 
     def _fill(self, now_us: int) -> None:
         if now_us > self._at_us:

@@ -13,6 +13,7 @@ from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.canopen.nmt import NmtState
 
 HEARTBEAT = (0x1017, 0)
@@ -203,3 +204,12 @@ def test_what_concerns_other_nodes_is_asked_for() -> None:
         "send NMT commands to all nodes of the bus",
         "send LSS requests, which every node of the bus takes",
     ]
+
+
+def test_the_bus_is_not_loaded_more_than_allowed() -> None:
+    r1 = R1()
+    link = SpyLink(r1)
+    plan = Plan(Level.INTRUSIVE, ("US", "BU", "BD", "OD"), confirm=yes, bit_rate=125_000)
+    report = r1.judge(plan, link=link)
+    sent_us = sum(frame_bits(frame) for frame in link.sent) * 8
+    assert 0.05 < sent_us / report.duration_us < 0.3
