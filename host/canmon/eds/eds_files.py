@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 MOST_BYTES = 32_000_000
 """A larger file is no EDS."""
 
+LOOKED_AT = 4096
+"""Characters at its beginning by which a binary file is known."""
+
 
 def read_document(path: Path) -> Document:
     """Read a file; Refused if it cannot be read, or is too large."""
@@ -28,7 +31,17 @@ def read_document(path: Path) -> Document:
         _refuse(path, str(error))
     if len(data) > MOST_BYTES:
         _refuse(path, f"more than {MOST_BYTES:,} bytes: no EDS")
+    if _is_binary(data):
+        _refuse(path, "a binary file: no EDS")
     return Document(str(path), data)
+
+
+def _is_binary(data: bytes) -> bool:
+    """Say whether more than each twentieth character is one that no text has."""
+    from tickrig.wire.canopen.eds.eds_file import decode_text  # noqa: PLC0415 - slow
+
+    head = decode_text(data[:LOOKED_AT])
+    return sum(letter < " " and letter not in "\t\r\n" for letter in head) * 20 > len(head)
 
 
 def read_device_document(path: Path) -> Document:

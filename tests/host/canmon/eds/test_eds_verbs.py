@@ -218,3 +218,12 @@ def test_the_shell_completes_the_verbs() -> None:
 @pytest.mark.parametrize("verb", ["check", "fix", "diff", "show"])
 def test_help_has_examples(verb: str) -> None:
     assert f"canmon eds {verb} " in run(verb, "--help").stdout
+
+
+@pytest.mark.parametrize("verb", ["check", "show"])
+def test_a_binary_file_is_told_in_one_line(tmp_path: Path, verb: str) -> None:
+    path = tmp_path / "image.eds"
+    path.write_bytes(bytes(range(256)) * 20)
+    result = run(verb, path)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr == f"Error: FILE {path}: a binary file: no EDS\n"
