@@ -141,6 +141,7 @@ class Conformance:
         words += ["--eds", str(self._eds)] if self._options["eds"] else []
         words += ["--stimulus", self._options["stimulus"]] if self._options["stimulus"] else []
         words += [word for index in self._options["allow"] for word in ("--allow", index)]
+        words += ["--seed", str(self._options["seed"])] if self._options["seed"] else []
         return shlex.join(words)
 
 

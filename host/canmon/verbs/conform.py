@@ -59,10 +59,12 @@ _choice: Final[Decorator] = add_options(
         multiple=True,
         metavar="GROUP|ID",
         shell_complete=_complete_only,
-        help="As NMT, SDO-03, PR-*.",
+        help="As NMT, UE-01, PR-*.",
     ),
     click.option("--list", "lists", is_flag=True, help="List the checks; judge nothing."),
-    click.option("--seed", type=click.IntRange(0), default=0, metavar="N", help="Of chance; 0."),
+    click.option(
+        "--seed", type=click.IntRange(0), default=0, metavar="N", help="Shuffles objects; 0: no."
+    ),
 )
 _reports: Final[Decorator] = add_options(
     click.option("--json", "as_json", is_flag=True, help="JSON instead of text."),

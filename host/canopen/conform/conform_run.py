@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from random import Random
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
@@ -120,11 +121,14 @@ class ConformRun:
         )
         self._care.prepare(self._subject.restorable(self._plan.level))
 
-    def _object_checks(self) -> tuple[Check, ...]:
+    def _object_checks(self) -> list[Check]:
         """Make the checks of each object of the EDS; without one there are none."""
         if self._device is None:
-            return ()
-        return object_checks(self._device, self._node_id, allow=self._plan.allow)
+            return []
+        checks = [*object_checks(self._device, self._node_id, allow=self._plan.allow)]
+        if self._plan.seed:
+            Random(self._plan.seed).shuffle(checks)
+        return checks
 
     def _judge_all(self, checks: list[Check]) -> None:
         assert self._subject is not None

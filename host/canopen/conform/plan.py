@@ -25,7 +25,7 @@ class Plan:
         allow: indices of profile objects (6000h to 9FFFh) that may be written.
         bit_rate: of the bus in bit/s, None if nobody says it.
         max_load: share of the bit rate that the tester may use, above 0 to 1.
-        seed: of the random part.
+        seed: of the order in which objects are judged; 0: that of the dictionary.
         stimulus: moves the inputs of the device, None if nobody can.
         confirm: is asked before what concerns other nodes or cannot be undone; no says no.
         longest_s: after so long no further check is begun.

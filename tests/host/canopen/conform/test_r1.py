@@ -66,3 +66,15 @@ def test_without_a_hand_at_the_inputs_nothing_fails(level: Level) -> None:
     judged = {Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.IMPLEMENTATION_DEFINED}
     assert {result.outcome.verdict for result in report.results} <= judged
     assert r1.values() == before
+
+
+def test_objects_are_judged_in_any_order() -> None:
+    plans = [Plan(only=("OD",), seed=seed) for seed in (0, 7, 7, 8)]
+    told = [
+        [(result.check.id, result.outcome.verdict) for result in R1().judge(plan).results]
+        for plan in plans
+    ]
+    in_order, once, again, other = told
+    assert once == again
+    assert len({*map(tuple, told)}) == 3
+    assert sorted(in_order) == sorted(once) == sorted(other)
