@@ -14,6 +14,7 @@ from tickrig.host.canopen.data_sheet.rules import (
     pdo_rules,
     profile_rules,
     text_rules,
+    truncation,
     value_rules,
 )
 
@@ -25,6 +26,7 @@ CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     *(head_rules.sections, head_rules.file_info, head_rules.device_info, head_rules.counts),
     *(head_rules.features, head_rules.dummy_usage, head_rules.comment_lines),
     head_rules.commissioning,
+    truncation.truncated,
     list_rules.lists,
     *(object_rules.names, object_rules.kinds, object_rules.sub_numbers, object_rules.sub_zeros),
     *(value_rules.numbers, value_rules.limits),

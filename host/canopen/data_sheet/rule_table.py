@@ -27,6 +27,8 @@ _ERRORS: Final = (
         "it cannot be read",
         "give an XDD with a CANopenObjectList, without DOCTYPE",
     ),
+    ("object-index", "CiA 311", "the object is lost", "four hexadecimal digits, as 1018"),
+    ("truncated", PRACTICE, "the rest of the device is lost", "take the whole file"),
     ("no-objects", OBJECT, "there is no device", "describe its objects"),
     ("no-keyword", "CiA 306-1, structure", "parsers stop here, or skip it", "KEY=VALUE or ; text"),
     ("doubled-section", PRACTICE, "parsers refuse it, or take either", "merge the sections"),

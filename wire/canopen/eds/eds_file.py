@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.eds.eds_lines import (
+    KNOWN_SECTIONS,
     EdsLine,
     describes_device,
     object_section,
@@ -207,6 +208,9 @@ class EdsFile:
     def _begin(self, line: EdsLine) -> Section:
         """Begin a section, or go on with one that is there already."""
         title = line.section
+        if self.is_xml and title not in KNOWN_SECTIONS.values() and object_section(title) is None:
+            reason = "is no index of four, or sub-index of two hexadecimal digits: it is lost"
+            self._errors[Finding(self.name, title, reason, line.number, "object-index")] = None
         if title in self.sections and describes_device(title):
             reason = "is there twice: of each keyword the first is taken"
             self._warn_at(line, reason, "doubled-section")

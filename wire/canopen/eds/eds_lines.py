@@ -20,6 +20,10 @@ KNOWN_SECTIONS: Final = {
 """The spelling of CiA 306 by the name in lower case."""
 
 _OBJECT: Final = re.compile(r"([0-9A-F]{4})(?:(SUB)([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?")
+_LOOSE: Final = re.compile(
+    r"(?:0X)?([0-9A-F]{4})[ _]*(?:(SUB)[ _]*([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?"
+)
+"""Titles as people write them: `1018 sub 1`, `0x1018`, `1018_sub_1`."""
 _DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB1")
 _TITLE: Final = re.compile(r"\[([^\]]+)\]")
 _COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
@@ -88,11 +92,13 @@ def canonical_section(title: str) -> str:
 
     >>> canonical_section("1a00SUB0A"), canonical_section("deviceinfo"), canonical_section("a0")
     ('1A00subA', 'DeviceInfo', 'a0')
+    >>> canonical_section("1018 sub 1"), canonical_section("0x1018")
+    ('1018sub1', '1018')
     """
     title = title.strip()
     if derived := _DERIVED_TYPE.fullmatch(title.upper()):
         return f"{derived[1]}sub1"
-    match = _OBJECT.fullmatch(title.upper())
+    match = _LOOSE.fullmatch(title.upper())
     if match is None:
         return KNOWN_SECTIONS.get(title.lower(), title)
     index, sub, number, other = match.groups()

@@ -17,6 +17,7 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
     NUMBERS,
     OF_DCF,
 )
+from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import object_section
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
@@ -117,8 +118,9 @@ def counts(document: Document) -> Iterator[RuleFinding]:
         said, line = number(document, title, key), document.keyword(title, key)
         if said is not None and line is not None and said != present:
             what = f"{key}={said}, but there are {present} of {area[0]:X}h to {area[-1]:X}h"
-            edit = document.with_value(line, str(present)) if not document.file.is_xml else None
-            yield document.found("pdo-count", what, title, key, *([edit] if edit else []))
+            sound = not document.file.is_xml and (said < present or are_whole(document))
+            edits = (document.with_value(line, str(present)),) if sound else ()
+            yield document.found("pdo-count", what, title, key, *edits)
     for key, sub in IDENTITY:
         row, said = document.rows.get((0x1018, sub)), number(document, title, key)
         if row is None or not row.has_default or not said:

@@ -1,4 +1,7 @@
-"""Rules over the three lists of objects: each object in one, numbered from 1 on."""
+"""Rules over the three lists of objects: each object in one, numbered from 1 on.
+
+What is listed and not described may be lost: it stays in its list, and no count is lowered.
+"""
 
 from __future__ import annotations
 
@@ -62,14 +65,29 @@ def home(index: int) -> str:
     return MANUFACTURER if index in MANUFACTURER_AREA else OPTIONAL
 
 
+def described(document: Document) -> set[int]:
+    """Return the objects that have a section, and belong into a list."""
+    return {index for _, index, sub in document.file.objects() if sub is None and index in INDICES}
+
+
+def are_whole(document: Document) -> bool:
+    """Return whether the lists are there, as long as they say, and all that they name is there."""
+    if OPTIONAL not in document.file.sections:
+        return False
+    found = [ObjectList(document, title) for title in LISTS if title in document.file.sections]
+    listed = {index for each in found for index in each.indices}
+    return listed <= described(document) and all(
+        (_index(document.file.value(each.title, "SupportedObjects")) or 0) <= len(each.entries)
+        for each in found
+    )
+
+
 def lists(document: Document) -> Iterator[RuleFinding]:
     """Judge the three lists; each finding mends its list as a whole."""
     if document.file.is_xml:
         return
     found = [ObjectList(document, title) for title in LISTS]
-    present = {
-        index for _, index, sub in document.file.objects() if sub is None and index in INDICES
-    }
+    present = described(document)
     listed = {index for each in found for index in each.indices}
     for index in sorted(present - listed):
         title = home(index)
@@ -90,7 +108,7 @@ def _judge(
 ) -> Iterator[RuleFinding]:
     edits = _mended(document, found, each.title, present)
     for rule, what, line in _faults(document, each, present, seen):
-        yield document.found(rule, what, each.title, line, *edits)
+        yield document.found(rule, what, each.title, line, *(edits if rule != "list-extra" else ()))
 
 
 def _faults(
@@ -137,13 +155,20 @@ def _mended(
     listed = {index for one in found for index in one.indices if not _is_wrong(one.title, index)}
     wanted = list(
         dict.fromkeys(
-            index for index in each.indices if index in present and not _is_wrong(title, index)
+            index
+            for index in each.indices
+            if index in INDICES and not (index in present and _is_wrong(title, index))
         )
     )
     earlier = {index for one in found[: found.index(each)] for index in one.indices}
     wanted = [index for index in wanted if index not in earlier or home(index) == title]
     wanted += sorted(index for index in present - listed if home(index) == title)
     return tuple(_rewritten(document, each, wanted))
+
+
+def _may_be_set(said: int | None, listed: int, wanted: int) -> bool:
+    """Return whether a count is wrong, and does not tell of entries that are lost."""
+    return said is None or (said != wanted and (said <= listed or said < wanted))
 
 
 def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Iterator[Edit]:
@@ -158,7 +183,7 @@ def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Itera
     head = document.keyword(each.title, "SupportedObjects")
     if head is None:
         added.insert(0, f"SupportedObjects={len(wanted)}")
-    elif _index(head.value) != len(wanted):
+    elif _may_be_set(_index(head.value), len(lines), len(wanted)):
         yield document.with_value(head, str(len(wanted)))
     if added:
         yield document.add_to(each.title, added)

@@ -53,7 +53,7 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 
 
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Hold SubNumber against the sub-indices that are there."""
+    """Hold SubNumber against the sub-indices that are there; what is missing is not hidden."""
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)
@@ -67,8 +67,19 @@ def sub_numbers(document: Document) -> Iterator[RuleFinding]:
             yield document.found("sub-number", what, section, "", edit)
         elif line is not None and said not in (present, None):
             what = f"SubNumber={said}, but there are {present} sub-indices"
-            edits = () if file.is_xml else (document.with_value(line, str(present)),)
+            lost = said > present and not _is_whole(document, section, index)
+            edits = () if file.is_xml or lost else (document.with_value(line, str(present)),)
             yield document.found("sub-number", what, section, "SubNumber", *edits)
+
+
+def _is_whole(document: Document, section: str, index: int) -> bool:
+    """Return whether all but SubNumber agrees that no sub-index is missing."""
+    if document.device.objects[index].code in VARIABLES:
+        return document.file.has(section, "ObjectType")
+    subs, row = sorted(document.subs(index)), document.rows.get((index, 0))
+    if row is None or not row.has_default or index in COUNTS:
+        return False
+    return subs == list(range(len(subs))) and row.default[:1] == bytes([len(subs) - 1])
 
 
 def sub_zeros(document: Document) -> Iterator[RuleFinding]:
@@ -95,7 +106,7 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
         return
     what = f"its default is {said}, the highest sub-index is {max(subs)}"
     edits: tuple[Edit, ...] = ()
-    if line is not None and not document.file.is_xml:
+    if line is not None and said < max(subs) and not document.file.is_xml:
         edits = (document.with_value(line, str(max(subs))),)
     yield document.found("sub0-value", what, section, "DefaultValue", *edits)
 

@@ -39,6 +39,9 @@ def mandatory(document: Document) -> Iterator[RuleFinding]:
     for index in MANDATORY:
         if index not in objects:
             yield document.found("mandatory-missing", f"there is no {index:04X}h")
+    if IDENTITY in objects and (IDENTITY, 1) not in document.rows:
+        what = "there is no 1018h:01 (vendor-ID)"
+        yield document.found("mandatory-missing", what, f"{IDENTITY:04X}")
     if 0x1017 not in objects and 0x100C not in objects:
         what = "there is no 1017h (heartbeat) and no 100Ch (node guarding)"
         yield document.found("error-control", what)

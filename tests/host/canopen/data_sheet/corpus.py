@@ -30,6 +30,7 @@ class Deviation(NamedTuple):
         mended: `fix` mends it, so that nothing is left.
         reads: what is so of the document; None where it is read as the good one.
         name: what the file is called.
+        keeps: what still stands in it when it is mended.
     """
 
     rule: str
@@ -37,6 +38,7 @@ class Deviation(NamedTuple):
     mended: bool = True
     reads: Callable[[Document], bool] | None = None
     name: str = NAME
+    keeps: tuple[str, ...] = ()
 
     @property
     def data(self) -> bytes:
@@ -92,6 +94,21 @@ def out(section: str, key: str) -> Change:
 def without(section: str) -> Change:
     """Take a section out."""
     return lambda text: re.sub(rf"\[{section}\]\n[^\[]*", "", text, count=1)
+
+
+def without_object(index: str) -> Change:
+    """Take an object out, with all of its sections."""
+    return lambda text: re.sub(rf"\[{index}(sub.)?\]\n[^\[]*", "", text)
+
+
+def cut_in(text: str) -> Change:
+    """End the file within a text."""
+    return lambda whole: whole[: whole.index(text) + 9]
+
+
+def in_xdd(old: str, new: str) -> Change:
+    """Make an XDD instead, with one text replaced."""
+    return lambda _: put(old, new)(XDD)
 
 
 def all_of(*changes: Change) -> Change:
@@ -180,6 +197,10 @@ CORPUS: Final = (
     ),
     Deviation("doubled-key", put_in("FileInfo", "FileVersion=1")),
     Deviation("section-form", put("[1018sub1]", "[1018SUB01]")),
+    *(
+        Deviation("section-form", put("[1018sub1]", title))
+        for title in ("[1018 sub 1]", "[ 1018 Sub1 ]", "[1018_sub_01]", "[0x1018sub1]")
+    ),
     Deviation("section-form", put("[DeviceInfo]", "[deviceinfo]")),
     Deviation("section-form", put("[1017]", "[1017] heartbeat")),
     Deviation("inline-comment", within("1017", "AccessType=rw", "AccessType=rw   ; or ro?")),
@@ -199,6 +220,9 @@ CORPUS: Final = (
     Deviation("granularity", put("Granularity=1", "Granularity=65"), False),
     Deviation("flag", put("SimpleBootUpSlave=1", "SimpleBootUpSlave=2"), False),
     Deviation("pdo-count", put("NrOfRXPDO=4", "NrOfRXPDO=8")),
+    Deviation(
+        "pdo-count", without_object("1403"), False, lacks(0x1403), keeps=("NrOfRXPDO=4", "=0x1403")
+    ),
     Deviation("identity", put("ProductNumber=0x00000002", "ProductNumber=3"), False),
     Deviation("dynamic-channels", put("ChannelsSupported=0", "ChannelsSupported=2"), False),
     Deviation("boot-up-master", put("UpMaster=0", "UpMaster=1"), False),
@@ -219,10 +243,28 @@ CORPUS: Final = (
     # lists
     Deviation("list-count", put("SupportedObjects=12", "SupportedObjects=11")),
     Deviation("list-count", put("SupportedObjects=12\n", "")),
+    Deviation(
+        "list-count",
+        all_of(put("12=0x200C\n", ""), without_object("200C")),
+        False,
+        lacks(0x200C, 1),
+        keeps=("SupportedObjects=12",),
+    ),
     Deviation("list-gap", put("12=0x200C", "14=0x200C")),
     Deviation("list-missing", put("12=0x200C\n", "")),
     Deviation("list-missing", without("ManufacturerObjects")),
-    Deviation("list-extra", put("SupportedObjects=12\n", "SupportedObjects=13\n13=0x2FFF\n")),
+    Deviation(
+        "list-extra",
+        put("SupportedObjects=12\n", "SupportedObjects=13\n13=0x2FFF\n"),
+        False,
+        keeps=("=13\n13=0x2FFF\n",),
+    ),
+    Deviation(
+        "list-extra",
+        all_of(put("12=0x200C\n", "12=0x200C\n12=0x2FFF\n"), put("1=0x1003", "1=0x2000")),
+        False,
+        keeps=("0x2FFF\n",),
+    ),
     Deviation("list-entry", put("12=0x200C", "12=bits")),
     Deviation("list-wrong", put("1=0x1003", "1=0x2000")),
     Deviation("list-doubled", put("12=0x200C", "12=0x2000")),
@@ -265,6 +307,13 @@ CORPUS: Final = (
     Deviation("no-number", within("1017", "PDOMapping=0", "PDOMapping=off"), False),
     Deviation("pdo-mapping-missing", out("1017", "PDOMapping")),
     Deviation("sub-number", within("1018", "SubNumber=5", "SubNumber=4")),
+    *(
+        Deviation(
+            "sub-number", without(f"1018sub{sub}"), False, lacks(0x1018, sub), keeps=("=5\n",)
+        )
+        for sub in (1, 2, 4)
+    ),
+    Deviation("sub-number", within("1018", "SubNumber=5", "SubNumber=6")),
     Deviation("sub-number", out("1018", "SubNumber")),
     Deviation("sub-number", put_in("1017", "SubNumber=1")),
     Deviation(
@@ -288,8 +337,15 @@ CORPUS: Final = (
     Deviation(
         "sub0-value",
         within("1018sub0", "DefaultValue=0x04", "DefaultValue=5"),
-        True,
+        False,
         entry(0x1018, 0, default=b"\5"),
+        keeps=("DefaultValue=5",),
+    ),
+    Deviation(
+        "sub0-value",
+        within("1018sub0", "DefaultValue=0x04", "DefaultValue=3"),
+        True,
+        entry(0x1018, 0, default=b"\3"),
     ),
     Deviation("compact-record", compact, True, entry(0x1A02, 8, default=bytes(4))),
     Deviation("limit-type", put_in("1008", "LowLimit=1")),
@@ -361,6 +417,7 @@ CORPUS: Final = (
     Deviation("mapped-direction", put(RPDO_OBJECT, "DefaultValue=0x20050008"), False, anything),
     # standards
     Deviation("mandatory-missing", without("1001"), False, lacks(0x1001)),
+    Deviation("mandatory-missing", without("1018sub1"), False, lacks(0x1018, 1)),
     Deviation("error-control", all_of(without("1017"), without("100C")), False, lacks(0x1017)),
     Deviation("communication-type", within("1017", "0x0006", "0x0007"), False, anything),
     Deviation(
@@ -392,10 +449,30 @@ CORPUS: Final = (
         "epos.eds",
     ),
     Deviation("profile-none", put("0x000F0191", "0"), True, anything),
+    # what is cut off
+    *(
+        Deviation("truncated", cut_in(at), False, anything)
+        for at in (
+            "\n5=0x1008",
+            "[1001]\nPar",
+            "[1018sub2]\n",
+            "[1400]\nPar",
+            "[1A02sub0]\n",
+            "[200Csub2]\n",
+        )
+    ),
     # what is no device
     Deviation("no-objects", lambda _: "[DeviceInfo]\n", False, anything),
     Deviation("no-objects", lambda _: "", False, anything),
     Deviation("xml", lambda _: "<a/>", False, anything, "a.xdd"),
+    *(
+        Deviation("object-index", in_xdd(*new), False, anything, "a.xdd")
+        for new in (
+            ('index="2001"', 'index="60G0"'),
+            ('index="2001"', 'index="70000"'),
+            ('index="2001"', 'index=""'),
+        )
+    ),
     Deviation(
         "xml", lambda _: XDD.replace("<ISO", "<!DOCTYPE x><ISO", 1), False, anything, "a.xdd"
     ),

@@ -78,6 +78,21 @@ def test_what_is_no_xdd_is_refused(text: str, error: str) -> None:
     assert device.entries == ()
 
 
+@pytest.mark.parametrize("index", ["60G0", "70000", "", "A0"])
+def test_an_object_without_an_index_is_an_error_at_its_line(index: str) -> None:
+    _, file = read(XDD.replace('index="2001"', f'index="{index}"'))
+    (error,) = file.errors
+    assert (error.line, error.rule, error.section) == (40, "object-index", index)
+
+
+def test_a_sub_object_without_a_sub_index_is_an_error_at_its_line() -> None:
+    _, file = read(XDD.replace('subIndex="01"', 'subIndex="G1"'))
+    assert [str(error) for error in file.errors] == [
+        "a.xdd:45: [2002subG1] is no index of four, or sub-index of two hexadecimal digits:"
+        " it is lost (object-index)"
+    ]
+
+
 def test_a_list_without_objects_is_no_device() -> None:
     _, file = read("<a><CANopenObjectList/></a>")
     assert [one.rule for one in file.errors] == ["no-objects"]
