@@ -21,6 +21,7 @@ from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.settings import describe_settings
+from tickrig.host.canopen.conform.subject.other_device import other_device
 from tickrig.host.canopen.conform.subject.subject import Subject, examine
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 from tickrig.host.canopen.errors import SdoFailed
@@ -177,6 +178,7 @@ class ConformRun:
             unrestored=self._care.unrestored,
             duration_us=self._exchange.now_us - self._exchange.start_us,
             aborted=aborted,
+            doubt=other_device(self._device, subject.about) if subject else "",
         )
 
 

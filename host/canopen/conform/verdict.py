@@ -94,6 +94,7 @@ class Report:
         unrestored: what could not be written back, one a line.
         duration_us: of the run, in bus time.
         aborted: why it ended before its end; empty if it did not.
+        doubt: why all of it may say nothing of the node; empty if it does.
     """
 
     source: str
@@ -106,6 +107,7 @@ class Report:
     unrestored: tuple[str, ...] = ()
     duration_us: int = 0
     aborted: str = ""
+    doubt: str = ""
 
     def count(self, verdict: Verdict) -> int:
         """Return how many checks gave this verdict."""

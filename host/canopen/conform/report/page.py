@@ -62,6 +62,7 @@ def html_page(
     page: str = template.render(
         report=report,
         baseline=baseline,
+        mended=baseline.mended(report),
         counts=verdict_counts(report.results),
         groups=by_group(report),
         clauses=by_clause(report),

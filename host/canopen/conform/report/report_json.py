@@ -28,6 +28,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         "level": report.level.word,
         "exit_status": baseline.exit_status(report),
         "aborted": report.aborted,
+        "doubt": report.doubt,
         "duration_us": report.duration_us,
         "counts": {str(verdict): report.count(verdict) for verdict in Verdict},
         "device": dict(report.node),

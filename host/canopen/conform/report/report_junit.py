@@ -89,6 +89,7 @@ def _add_properties(root: Element, report: Report) -> None:
     if not len(root):
         return
     told = {"level": report.level.word, **report.node, **report.settings}
+    told |= {"doubt": report.doubt} if report.doubt else {}
     told |= {f"finding {number}": text for number, text in enumerate(report.findings, 1)}
     told |= {f"not restored {number}": text for number, text in enumerate(report.unrestored, 1)}
     properties = Element("properties")

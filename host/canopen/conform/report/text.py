@@ -60,7 +60,8 @@ def _head(report: Report) -> list[str]:
     told = {**report.node, **report.settings}
     wide = max(map(len, told), default=0)
     rows = [f"  {one_line(name):<{wide}}  {one_line(value)}" for name, value in told.items()]
-    return [f"{head} in {duration(report.duration_us)}", *rows]
+    doubt = [one_line(report.doubt)] if report.doubt else []
+    return [*doubt, f"{head} in {duration(report.duration_us)}", *rows]
 
 
 def _groups(report: Report) -> list[str]:
@@ -112,5 +113,7 @@ def _ending(report: Report, baseline: Baseline) -> Iterator[str]:
         yield f"{counted(known, 'failure')} known, {new} new"
     if mended := baseline.mended(report):
         yield f"known to fail, and passed: {', '.join(mended)}"
+    if report.doubt:
+        yield one_line(report.doubt)
     if report.aborted:
         yield f"not all was judged: {one_line(report.aborted)}"

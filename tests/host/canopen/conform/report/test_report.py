@@ -140,6 +140,31 @@ def test_the_page_has_summary_clauses_and_each_check_with_its_frames() -> None:
     assert set(links) <= {one.attributes.get("id") for one in page.below()}
 
 
+def test_the_page_begins_with_the_groups() -> None:
+    page = parse_page(html_page(SAMPLE))
+    (table,) = page.all("header")[0].all("section", id="groups")
+    rows = [[cell.text for cell in row.below()] for row in table.all("tbody")[0].all("tr")]
+    assert [row[0] for row in rows] == ["NMT", "HB", "US", "PR", "LS"]
+    links = [link.attributes["href"] for link in table.all("a")]
+    assert links == ["#g-NMT", "#g-HB", "#g-US", "#g-PR", "#g-LS"]
+    assert "1 fail" not in table.text
+    assert not parse_page(html_page(replace(SAMPLE, results=()))).all("section", id="groups")
+
+
+def test_a_known_failure_that_passes_is_told_on_the_page() -> None:
+    assert "Known to fail, and passed: LS-02" in html_page(SAMPLE, KNOWN)
+    assert "Known to fail, and passed" not in html_page(SAMPLE)
+
+
+def test_why_a_run_says_nothing_of_the_node_is_told_everywhere() -> None:
+    doubtful = replace(SAMPLE, doubt="this EDS is of another device: vendor 1h there, 2h here")
+    for write in (html_page, report_json, report_junit, text_report):
+        assert doubtful.doubt in write(doubtful)
+    assert text_report(doubtful).splitlines()[0] == doubtful.doubt
+    (told,) = parse_page(html_page(doubtful)).all("header")[0].all("b")[-1:]
+    assert told.text == doubtful.doubt
+
+
 def test_only_our_style_is_let_in_and_nothing_is_fetched() -> None:
     text = html_page(SAMPLE)
     page = parse_page(text)
