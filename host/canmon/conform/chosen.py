@@ -2,17 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from tickrig.host.canopen.conform.check import Check, Level
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.cli.refused import Refused
-from tickrig.host.text.names import near
+from tickrig.host.text.names import closest
 
 OBJECTS: Final = "OD"
 """Checks that are made of an EDS, which nobody knows before it is read."""
+
+
+def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
+    """Return the groups and ids that were named, each for itself.
+
+    >>> patterns("NMT,HB"), patterns(["PR-*", "UE-01"])
+    (('NMT', 'HB'), ('PR-*', 'UE-01'))
+    """
+    words = (only,) if isinstance(only, str) else tuple(only)
+    return tuple(part.strip() for word in words for part in word.split(","))
+
+
+def unknown(words: Iterable[str]) -> list[str]:
+    """Say of each word that names no check that it does not, and what could be meant.
+
+    Args:
+        words: groups or ids, with * and ?.
+    """
+    suite = _suite()
+
+    def is_one(word: str) -> bool:
+        plan = Plan(Level.INTRUSIVE, (word,))
+        return word.startswith(OBJECTS) or any(map(plan.chooses, suite))
+
+    none = (word for word in words if not is_one(word))
+    return [f"{word}: no such group or check; {_near(word, suite)}" for word in none]
 
 
 def chosen(only: Sequence[str]) -> list[Check]:
@@ -24,11 +50,18 @@ def chosen(only: Sequence[str]) -> list[Check]:
     Raises:
         Refused: a word that names none.
     """
-    suite = [check for group in read_suite() for check in group.checks]
-    for word in only:
-        plan = Plan(Level.INTRUSIVE, (word,))
-        if not word.startswith(OBJECTS) and not any(map(plan.chooses, suite)):
-            names = {name for check in suite for name in (check.group, check.id)}
-            hint = near(word, sorted(names))
-            raise Refused(f"--only {word}: no such group or check; {hint}; see --list")
-    return list(filter(Plan(Level.INTRUSIVE, tuple(only)).chooses, suite))
+    for text in unknown(only):
+        raise Refused(f"--only {text}; see --list")
+    return list(filter(Plan(Level.INTRUSIVE, tuple(only)).chooses, _suite()))
+
+
+def _near(word: str, suite: list[Check]) -> str:
+    """Say which name could be meant, or which groups there are."""
+    groups = list(dict.fromkeys(check.group for check in suite))
+    if close := closest(word, sorted([*groups, *(check.id for check in suite)])):
+        return f"did you mean {close[0]!r}?"
+    return f"groups: {', '.join(groups)}"
+
+
+def _suite() -> list[Check]:
+    return [check for group in read_suite() for check in group.checks]

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.conform.chosen import chosen
-from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
+from tickrig.host.canmon.conform.chosen import chosen, patterns, unknown
+from tickrig.host.canmon.conform.conform_source import RIG_FILE, ConformSource, open_conform_source
 from tickrig.host.canmon.conform.consent import Consent, Progress
-from tickrig.host.canmon.conform.nodes_heard import LISTEN_US, listed, nodes_heard
-from tickrig.host.canmon.conform.report_files import check_files, write_files
-from tickrig.host.canmon.conform.stimulus import open_stimulus
+from tickrig.host.canmon.conform.nodes_heard import list_nodes, nodes_heard
+from tickrig.host.canmon.conform.report_files import check_files, keep_inputs, write_files
+from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.check import Level
@@ -28,10 +29,12 @@ from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import VERSION
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.monitor.views.conform_frames import decoded_frames
+from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
 
@@ -57,7 +60,9 @@ class Conformance:
             f"--{name.replace('_', '-')}": options[name] for name in FILES if options[name]
         }
         check_files(self._files)
-        chosen(options["only"])
+        keep_inputs(self._files, self._inputs())
+        self._only = patterns(options["only"])
+        chosen(self._only)
         self._baseline = _read_baseline(options["baseline"])
         self._allow = frozenset(map(_index, options["allow"]))
         self._level = Level[options["level"].upper().replace("-", "_")]
@@ -66,14 +71,30 @@ class Conformance:
         if self._eds is not None:
             _read_eds(self._eds)
 
+    def _inputs(self) -> Iterator[Path]:
+        """Yield the files that are read; a baseline may be written anew."""
+        options = self._options
+        if self._word and self._word.lower().endswith(RIG_FILE):
+            yield Path(self._word)
+        if options["eds"]:
+            yield options["eds"]
+        if options["baseline"] and options["baseline"] != options["write_baseline"]:
+            yield options["baseline"]
+        if options["stimulus"]:
+            words = options["stimulus"].removeprefix(CONTROL)
+            yield from map(Path, (words, *words.split()))
+
     def run(self) -> int:
         """Do it; return the exit status."""
         node_id: int | None = self._options["node"]
+        if node_id is None and (self._files or self._options["as_json"]):
+            raise Refused("--node is missing: without it nothing is judged, and nothing reported")
         with ExitStack() as held:
             source = open_conform_source(self._word, node_id, self._bus)
             held.callback(source.close)
             if node_id is None:
-                _say_who_is_there(source)
+                return list_nodes(source)
+            keep_inputs(self._files, [Path(eds.name) for eds in source.eds.values()])
             report = self._judge(source, node_id)
         return INTERRUPTED if report is None else self._show(report)
 
@@ -109,7 +130,7 @@ class Conformance:
             stimulus = source.stimulus(node_id)
         return Plan(
             level=self._level,
-            only=tuple(options["only"]),
+            only=self._only,
             allow=self._allow,
             bit_rate=source.bit_rate,
             max_load=options["max_load"] / 100,
@@ -145,19 +166,6 @@ class Conformance:
         return shlex.join(words)
 
 
-def _say_who_is_there(source: ConformSource) -> NoReturn:
-    """Say which nodes there are, for who did not name one."""
-    if source.virtual:
-        nodes = ", ".join(f"{node_id} ({name})" for node_id, name in source.nodes.items())
-        raise Refused(f"--node is missing; nodes of {source.name}: {nodes}")
-    heard: dict[int, int] = {}
-    with until_interrupted():
-        heard.update(nodes_heard(source.link))
-    what = listed(heard) or "nobody"
-    span = f"heard within {LISTEN_US / 1e6:.1f} s: {what}"
-    raise Refused(f"--node is missing; {span} (who says nothing by itself is not heard)")
-
-
 def _completed(report: Report, source: ConformSource, eds: EdsFile | None) -> Report:
     """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
     settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
@@ -172,11 +180,14 @@ def _read_baseline(path: Path | None) -> Baseline:
     if path is None:
         return NONE_KNOWN
     try:
-        return Baseline.read(path)
+        baseline = Baseline.read(path)
     except OSError as error:
         refuse_path("--baseline", error)
     except ValueError as error:
         raise Refused(f"--baseline {error}") from None
+    for text in unknown(sorted(baseline.known)):
+        say(one_line(f"--baseline {path}: {text}"))
+    return baseline
 
 
 def _read_eds(path: Path) -> EdsFile:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -38,6 +38,26 @@ def check_files(files: Mapping[str, Path]) -> None:
     places = [path.resolve() for path in files.values()]
     if len(set(places)) < len(places):
         raise Refused("two reports cannot go into one file")
+
+
+def keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
+    """See that no report goes into what the run reads; Refused if one would.
+
+    Args:
+        files: by the option that names it.
+        inputs: what is read; what is no file is none.
+    """
+    for option, path in files.items():
+        for each in inputs:
+            if _are_one(path, each):
+                raise Refused(f"{option} {path}: the run reads this file, it would be overwritten")
+
+
+def _are_one(path: Path, other: Path) -> bool:
+    try:
+        return path.samefile(other)
+    except (OSError, ValueError):
+        return False
 
 
 def write_files(

@@ -59,7 +59,7 @@ _choice: Final[Decorator] = add_options(
         multiple=True,
         metavar="GROUP|ID",
         shell_complete=_complete_only,
-        help="As NMT, UE-01, PR-*.",
+        help="As NMT, or UE-01,PR-*.",
     ),
     click.option("--list", "lists", is_flag=True, help="List the checks; judge nothing."),
     click.option(
@@ -98,7 +98,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     canmon conform bench.toml --node 5 --intrusive --junit out.xml
     canmon conform can0 --node 5 --communication --yes --baseline known.txt
     canmon conform udp --node 5 --intrusive --stimulus control:/tmp/5.ctl
-    canmon conform --list --only NMT
+    canmon conform --list --only NMT,HB
 
     \b
     --stimulus CMD is called as CMD input 6000:01 01, CMD output 6200:01,
@@ -120,8 +120,8 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
 
 
 def _list(only: Sequence[str]) -> None:
-    from tickrig.host.canmon.conform.chosen import chosen  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.conform.chosen import chosen, patterns  # noqa: PLC0415 - slow
 
     with until_unread():
-        for check in chosen(only):
+        for check in chosen(patterns(only)):
             click.echo(f"{check.id:<8}{check.level.word:<15}{check.title}")

@@ -10,7 +10,10 @@ from xml.etree.ElementTree import parse
 import pytest
 from click.testing import CliRunner, Result
 
+from tickrig.device import make_epos
 from tickrig.host.canmon.cli import main
+from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIG = """\
 [device.board]
@@ -84,8 +87,81 @@ def test_a_node_without_power_is_blocked_not_failed(tmp_path: Path) -> None:
 
 def test_without_a_node_it_says_who_is_there(rig: str) -> None:
     result = conform(rig)
-    assert result.exit_code == 2
-    assert result.stderr.endswith(f"--node is missing; nodes of {rig}: 5 (board)\n")
+    assert (result.exit_code, result.stdout, result.stderr) == (0, "node 5  board\n", "")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("{rig}", "--html", "{rig}"),
+        ("{rig}", "--junit", "{eds}", "--eds", "{eds}"),
+        ("{rig}", "--badge", "{link}", "--eds", "{eds}"),
+        ("{rig}", "--badge", "{eds}"),
+        ("{rig}", "--html", "{known}", "--baseline", "{known}"),
+        ("{rig}", "--html", "{known}", "--stimulus", "cat {known}"),
+    ],
+)
+def test_no_report_goes_into_what_the_run_reads(words: tuple[str, ...], tmp_path: Path) -> None:
+    paths = {name: tmp_path / name for name in ("rig.toml", "x.eds", "link", "known")}
+    paths["x.eds"].write_bytes(EDS.read_bytes())
+    paths["rig.toml"].write_text(RIG.format(eds=paths["x.eds"]))
+    paths["link"].symlink_to(paths["x.eds"])
+    paths["known"].write_text("NMT-03\n")
+    before = {name: path.read_bytes() for name, path in paths.items()}
+    named = {name.partition(".")[0]: str(path) for name, path in paths.items()}
+    named["eds"] = named["x"]
+    result = conform(*(word.format(**named) for word in words), "--node", "5", *NMT)
+    assert result.exit_code == 2, result.output
+    assert "the run reads this file, it would be overwritten" in result.stderr
+    assert {name: path.read_bytes() for name, path in paths.items()} == before
+
+
+def test_a_baseline_may_be_written_anew(rig: str, tmp_path: Path) -> None:
+    path = tmp_path / "known.txt"
+    path.write_text("NMT-03\n")
+    words = ("--baseline", str(path), "--write-baseline", str(path))
+    result = conform(rig, "--node", "5", *NMT, *words)
+    assert result.exit_code == 0, result.output
+    assert "known to fail, and passed: NMT-03" in result.stdout
+    assert "NMT-03" not in path.read_text()
+
+
+def test_a_baseline_with_ids_that_are_none_is_told(rig: str, tmp_path: Path) -> None:
+    path = tmp_path / "known.txt"
+    path.write_text("NMT-03\nNTM-04\nNMT-\x1b[2J\nOD-1000h-read\n")
+    result = conform(rig, "--node", "5", *NMT, "--baseline", str(path))
+    assert result.exit_code == 0, result.output
+    told = result.stderr.splitlines()
+    assert len(told) == 2
+    assert f"--baseline {path}: NTM-04: no such group or check; did you mean 'NMT-04'?" in told
+    assert all(line.isprintable() for line in told)
+
+
+def test_several_groups_are_named_at_once(rig: str) -> None:
+    result = conform(rig, "--node", "5", "--communication", "--only", "NMT-0[34], HB-01")
+    assert "3 checks:" in result.stdout, result.output
+    listed = conform("--list", "--only", "NMT,HB").stdout.splitlines()
+    assert {line.partition("-")[0] for line in listed} == {"NMT", "HB"}
+    assert "NMT, or UE-01,PR-*" in " ".join(conform("--help").stdout.split())
+
+
+def test_who_names_no_group_is_told_the_groups(rig: str) -> None:
+    told = conform(rig, "--node", "5", "--only", "XYZQ").stderr
+    groups = ", ".join(group.name for group in read_suite())
+    assert told.endswith(f"--only XYZQ: no such group or check; groups: {groups}; see --list\n")
+
+
+def test_an_eds_of_another_device_is_told_first(rig: str, tmp_path: Path) -> None:
+    other, page = tmp_path / "other.eds", tmp_path / "page.html"
+    other.write_text(write_eds(make_epos(5).dictionary.description), "utf-8")
+    words = ("--eds", str(other), "--html", str(page), *NMT)
+    result = conform(rig, "--node", "5", *words)
+    first, *_, last = result.stdout.splitlines()
+    assert first.startswith("this EDS is of another device: ")
+    assert "device type 00020192h there, 000F0191h here, product 00006210h there" in first
+    assert last == first
+    assert "this EDS is of another device: " in page.read_text("utf-8")
+    assert "another device" not in conform(rig, "--node", "5", "--eds", str(EDS), *NMT).stdout
 
 
 @pytest.mark.parametrize(
@@ -105,6 +181,7 @@ def test_without_a_node_it_says_who_is_there(rig: str) -> None:
         (("--node", "0"), "0 is not in the range 1<=x<=127"),
         (("--node", "5", "--max-load", "0"), "0 is not in the range 0<x<=100"),
         (("--node", "5", "--junit", "/tmp/a", "--html", "/tmp/a"), "cannot go into one file"),
+        (("--json",), "--node is missing: without it nothing is judged"),
     ],
 )
 def test_what_cannot_be_is_told_before_the_run(rig: str, words: tuple[str, ...], why: str) -> None:
