@@ -14,6 +14,7 @@ from tickrig.emulators.testing.bench.bench_device import BenchDevice
 from tickrig.emulators.testing.conformance.bench_source import bench_source
 from tickrig.emulators.testing.conformance.slave import CalledSlave, Slave, SlaveCall
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
+from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canmon.conform.conform_source import ConformSource
 from tickrig.host.canmon.conform.consent import Consent
 from tickrig.host.canopen.conform.check import Level
@@ -52,8 +53,9 @@ def conformance(  # noqa: PLR0913 - by keyword
             which takes the time in microseconds and frames, and returns frames.
         node_id: 1..127; that of the slave unless given, if it has one.
         eds: its EDS, DCF or XDD; without one our slaves tell of themselves, others are asked.
-        level: `read-only`, `communication` or `intrusive`; in virtual time nothing can move.
-        only: groups or ids of checks, with * and ?; all unless given.
+        level: `read-only`, `communication` or `intrusive`. Unless given it is `intrusive`, where
+            `canmon conform` only reads: in virtual time nothing can move.
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
         stimulus: moves inputs: takes `"input", "6000:01", "01"`, `"emergency", "5000", "01"` and
             such, returns what `"output", NAME` asks for; of a `Slave` power is switched here.
@@ -64,7 +66,7 @@ def conformance(  # noqa: PLR0913 - by keyword
         What was judged; `tickrig.testing.conformance(node).exit_status` is 0 where all passed.
 
     Raises:
-        ValueError: a node-ID or level that cannot be, or that nobody knows.
+        ValueError: a node-ID, level or check that cannot be, or that nobody knows.
         OSError: the EDS cannot be read.
 
     >>> from tickrig.device import make_epos
@@ -73,11 +75,14 @@ def conformance(  # noqa: PLR0913 - by keyword
     """
     if level not in LEVELS:
         raise ValueError(f"level {level!r} is none of {', '.join(LEVELS)}")
+    names = patterns(only)
+    for text in unknown(names):
+        raise ValueError(f"only {text}")
     with closing(_source(node, bit_rate, stimulus)) as source:
         number = _node_id(node, source, node_id)
         plan = Plan(
             level=Level(LEVELS.index(level)),
-            only=(only,) if isinstance(only, str) else tuple(only),
+            only=names,
             allow=frozenset(allow),
             bit_rate=source.bit_rate,
             seed=seed,

@@ -13,6 +13,7 @@ from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked
 from tickrig.emulators.testing.conformance.bench_source import eds_of
 from tickrig.emulators.testing.conformance.conformance import Node, conformance
+from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
@@ -50,20 +51,22 @@ def conformance_tests(
         node: makes what is judged, as `conformance` takes it; or the name of a device of the
             fixture `bench`, which then is judged check by check, each on a fresh bench.
         eds: its EDS, DCF or XDD; its objects have tests of their own.
-        level: `read-only`, `communication` or `intrusive`.
-        only: groups or ids of checks, with * and ?; all unless given.
+        level: `read-only`, `communication` or `intrusive`, as `conformance` has it.
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
         options: further arguments of `conformance`.
 
     Raises:
-        ValueError: the level is none.
+        ValueError: the level is none, or a word of `only` names no check.
         OSError: the EDS cannot be read.
 
     >>> from tickrig.device import make_epos
     >>> test_drive = conformance_tests(lambda: make_epos(5), only="NMT")
     """
     options |= {"eds": eds, "level": level}
-    patterns = (only,) if isinstance(only, str) else tuple(only)
-    plan = Plan(Level[level.upper().replace("-", "_")], patterns)
+    words = patterns(only)
+    for text in unknown(words):
+        raise ValueError(f"only {text}")
+    plan = Plan(Level[level.upper().replace("-", "_")], words)
     known = _eds(node, eds)
     objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
     suite = [check for group in read_suite() for check in group.checks]
@@ -124,7 +127,6 @@ def _selected(item: pytest.Function) -> Iterable[str]:
 
 def _judge(report: Report, check_id: str) -> None:
     """Pass, fail, skip or be blocked, as a check was."""
-    __tracebackhide__ = True
     result = next((one for one in report.results if one.check.id == check_id), None)
     if result is None:
         raise BenchBlocked(report.aborted or f"{check_id} was not judged")
@@ -145,4 +147,4 @@ def _text(result: Result, node_id: int) -> str:
     frames = cut(decoded_frames({})(result.outcome.evidence), MOST_LINES)
     where = [f"look at {text}"] if (text := hint(result)) else []
     head = f"{check.id}: {check.title}"
-    return "\n".join([head, check.source, result.outcome.reason, *frames, *where])
+    return "\n".join([result.outcome.reason, head, check.source, *frames, *where])

@@ -9,6 +9,7 @@ from tickrig.device import make_epos
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.conformance.conformance import conformance
 from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
+from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.verdict import Verdict
 from tickrig.wire.can import CanFrame, Frames
@@ -64,7 +65,20 @@ def test_what_cannot_be_is_refused() -> None:
         conformance(make_epos(5), level="careful")
     with pytest.raises(ValueError, match=r"node_id is 1\.\.127, not None"):
         conformance(local_node())
+    for only in ("XX", "NMT,NTM", "", ["NMT", "NMT-99"]):
+        with pytest.raises(ValueError, match="no such group or check"):
+            conformance(make_epos(5), only=only)
     with pytest.raises(OSError, match=r"nosuch\.eds"):
         conformance(make_epos(5), eds="nosuch.eds")
     with Bench(make_epos(5), mode="real") as bench, pytest.raises(ValueError, match="virtual time"):
         conformance(bench)
+
+
+def test_several_groups_may_be_one_word() -> None:
+    report = conformance(make_epos(5), only="NMT-03,UE-01")
+    assert [result.check.id for result in report.results] == ["UE-01", "NMT-03"]
+
+
+def test_the_level_is_intrusive_unless_given() -> None:
+    assert conformance(make_epos(5), only="NMT-03").level is Level.INTRUSIVE
+    assert "Unless given it is `intrusive`" in (conformance.__doc__ or "")

@@ -53,6 +53,8 @@ def test_a_failure_tells_clause_and_frames_and_no_traceback(
     result.stdout.fnmatch_lines(
         ["NMT-03: Start remote node*", "CiA 301 *", "* > *000   [[]2]  01 05 *start, node 5"]
     )
+    result.stdout.fnmatch_lines(["FAILED *test_deaf[[]NMT-03] - Failed: step *: *want *"])
+    result.stdout.no_fnmatch_line("*--full-trace*")
     result.stdout.no_fnmatch_line("*Traceback*")
     result.stdout.no_fnmatch_line("*pytest_suite.py*")
 
@@ -90,3 +92,4 @@ def test_a_dead_node_is_blocked_not_failed(pytester: pytest.Pytester, run: Run) 
     )
     result = run()
     result.stdout.fnmatch_lines(["*BenchBlocked: blocked: *"])
+    result.stdout.no_fnmatch_line("*--full-trace*")
