@@ -92,6 +92,7 @@ def conformance(  # noqa: PLR0913 - by keyword
         file = _eds(eds) or source.eds.get(number)
         device = None if file is None else read_device(file)
         run = ConformRun(source.link, number, plan, device=device, eds=file, source=source.name)
+        source.watch_crashes(run.crash)
         return run.run()
 
 

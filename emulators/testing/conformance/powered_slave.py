@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from tickrig.emulators.testing.conformance.crash import crash_lines, crash_text
 from tickrig.emulators.testing.conformance.slave import Slave
+from tickrig.host.canmon.conform.conform_source import Crash
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
@@ -10,13 +12,20 @@ from tickrig.wire.instant import NEVER
 class PoweredSlave:
     """A slave that can be switched off and on.
 
+    What it raises is told, and then its program begins anew, as after a watchdog; one that cannot
+    is dead until the power is switched.
+
     Args:
         slave: what is judged; it is on.
+
+    Attributes:
+        on_crash: is told what it has raised, and where.
     """
 
     def __init__(self, slave: Slave) -> None:
         self.slave, self._on = slave, True
-        self._woken = False
+        self._woken = self._dead = False
+        self.on_crash: Crash = lambda reason, where: None
 
     @property
     def tick_us(self) -> int:
@@ -26,7 +35,7 @@ class PoweredSlave:
     @property
     def due_us(self) -> int:
         """That of the slave, `NEVER` while it is off."""
-        if not self._on:
+        if not self._on or self._dead:
             return NEVER
         return 0 if self._woken else self.slave.due_us
 
@@ -37,11 +46,28 @@ class PoweredSlave:
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Let the slave do what it does, if it is on."""
         self._woken = False
-        return self.slave.tick(now_us, rx) if self._on else ()
+        if not self._on or self._dead:
+            return ()
+        try:
+            return self.slave.tick(now_us, rx)
+        except Exception as error:
+            self._begin_anew(error)
+            return ()
 
     def switch(self, *, on: bool) -> None:
         """Switch the power; on when it is on does nothing."""
         if on and not self._on:
-            self.slave.reset()
-            self._woken = True
+            self._reset()
         self._on = on
+
+    def _begin_anew(self, error: Exception) -> None:
+        self.on_crash(crash_text(error), crash_lines(error))
+        self._reset()
+
+    def _reset(self) -> None:
+        self._woken, self._dead = True, False
+        try:
+            self.slave.reset()
+        except Exception as error:
+            self._dead = True
+            self.on_crash(crash_text(error), crash_lines(error))

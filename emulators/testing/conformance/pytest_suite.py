@@ -99,7 +99,7 @@ class _Run:
 
     def __init__(self, make: Callable[[], Node], options: dict[str, Any]) -> None:
         self._make, self._options = make, options
-        self._reports: dict[frozenset[str], Report] = {}
+        self._reports: dict[frozenset[str], Report | Exception] = {}
 
     def test(self) -> Test:
         """Return the test function."""
@@ -113,9 +113,18 @@ class _Run:
     def _report(self, item: pytest.Function, check_id: str) -> Report:
         wanted = frozenset(_selected(item)) or frozenset({check_id})
         if wanted not in self._reports:
-            made = conformance(self._make(), only=sorted(wanted), **self._options)
-            self._reports[wanted] = made
-        return self._reports[wanted]
+            self._reports[wanted] = self._judged(wanted)
+        report = self._reports[wanted]
+        if isinstance(report, Exception):
+            raise report
+        return report
+
+    def _judged(self, wanted: Iterable[str]) -> Report | Exception:
+        """Judge once; what cannot be made is not tried again for each test."""
+        try:
+            return conformance(self._make(), only=sorted(wanted), **self._options)
+        except Exception as error:
+            return error
 
 
 def _selected(item: pytest.Function) -> Iterable[str]:

@@ -43,6 +43,14 @@ def _leave() -> None:
     """Leave all as it is."""
 
 
+Crash = Callable[[str, list[str]], object]
+"""Takes what the program of the node has raised, and the lines at which it did."""
+
+
+def _watch_no_crash(crash: Crash) -> None:
+    """Nobody sees into the program of the node."""
+
+
 def _watch_nothing(disturb: Disturb) -> None:
     """Nothing disturbs here."""
 
@@ -62,6 +70,7 @@ class ConformSource:
         stimulus: makes what moves the inputs of a node; None where nobody can.
         close: gives the bus back.
         watch: has somebody told, from now on, what disturbs on the bus.
+        watch_crashes: the same of what the program of the node raises, where that can be known.
     """
 
     link: StampedLink
@@ -74,6 +83,7 @@ class ConformSource:
     stimulus: Callable[[int], Stimulus] | None = None
     close: Callable[[], object] = _leave
     watch: Callable[[Disturb], None] = _watch_nothing
+    watch_crashes: Callable[[Crash], None] = _watch_no_crash
 
 
 def open_conform_source(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -17,6 +18,23 @@ if TYPE_CHECKING:
 
 LEVELS: Final = ("read-only", "communication", "intrusive")
 """In the order of `Level`."""
+
+
+LEAST_LOAD: Final = 1
+"""In percent: with less an answer takes longer than a check may."""
+
+
+class Percent(click.FloatRange):
+    """A share in percent; `nan`, which is in no range, is refused too."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the number."""
+        number = float(super().convert(value, param, ctx))
+        if isnan(number):
+            self.fail(f"{value} is no number from {self.min:g} to {self.max:g}", param, ctx)
+        return number
 
 
 def _complete_only(
@@ -48,7 +66,7 @@ _choice: Final[Decorator] = add_options(
     click.option("--allow", multiple=True, metavar="INDEX", help="May be written, as 6200h."),
     click.option(
         "--max-load",
-        type=click.FloatRange(0, 100, min_open=True),
+        type=Percent(LEAST_LOAD, 100),
         default=30,
         metavar="PERCENT",
         help="Of the bus, by this tester; 30.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from random import Random
 from typing import Final
@@ -35,6 +35,9 @@ LISTEN_MS: Final = 1_000
 
 EXAMINE_US: Final = 120_000_000
 """So long may it take to read the node before the first check."""
+
+MOST_CRASHES: Final = 20
+"""So many ways in which the program of the node crashed are told."""
 
 
 class ConformRun:
@@ -80,10 +83,22 @@ class ConformRun:
         self._longest_us = round(plan.longest_s * 1e6)
         self._results: list[Result] = []
         self._subject: Subject | None = None
+        self._crashes: dict[str, None] = {}
 
     def disturb(self, reason: str) -> None:
         """Let the check under way be inconclusive if it fails: the adapter lost frames, or such."""
         self._exchange.disturb(reason)
+
+    def crash(self, reason: str, where: Iterable[str] = ()) -> None:
+        """Let the check under way fail: the program of the node has raised, and begins anew.
+
+        Args:
+            reason: what it raised, in a line.
+            where: the lines of the program at which it did.
+        """
+        if len(self._crashes) < MOST_CRASHES:
+            self._crashes[reason] = None
+        self._exchange.crash(reason, where)
 
     def run(self) -> Report:
         """Judge the node and return the report; whatever happens, what was changed is restored.
@@ -167,6 +182,7 @@ class ConformRun:
     def _report(self, aborted: str) -> Report:
         subject = self._subject
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
+        findings = (*self._crashes, *findings)
         return Report(
             self._source,
             self._node_id,

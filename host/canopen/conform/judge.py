@@ -93,8 +93,11 @@ class Judge:
         start_us, begun_us = self._exchange.now_us, self._exchange.start_us
         verdict, reason = self._play(bound)
         self._end(bound)
+        crashed = bool(self._exchange.crashes)
+        if crashed:
+            verdict, reason = Verdict.FAIL, next(iter(self._exchange.crashes))
         lines, end_us = self._exchange.evidence.lines(), self._exchange.now_us
-        if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL:
+        if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL and not crashed:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
         return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict, deque
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.evidence import Evidence
+from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
 from tickrig.host.canopen.conform.verdict import Direction
@@ -56,6 +55,7 @@ class Exchange:
     Attributes:
         evidence: of the check under way.
         disturbances: why the check under way cannot fail, each once.
+        crashes: why the check under way has failed whatever it saw, each once.
         boots: boot-up messages of the node so far.
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
@@ -83,6 +83,7 @@ class Exchange:
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
+        self.crashes: dict[str, None] = {}
 
     @property
     def now_us(self) -> int:
@@ -100,7 +101,7 @@ class Exchange:
         self._listen(self.now_us)
         self.deadline_us, self._watched = self.now_us + within_us, watched
         self._unread.clear()
-        self.evidence, self.disturbances = Evidence(), {}
+        self.evidence, self.disturbances, self.crashes = Evidence(), {}, {}
         self._busy_us = self.now_us
 
     def remark(self, text: str) -> None:
@@ -112,6 +113,12 @@ class Exchange:
         if reason not in self.disturbances:
             self.disturbances[reason] = None
             self.remark(reason)
+
+    def crash(self, reason: str, where: Iterable[str] = ()) -> None:
+        """Let the check under way fail: the program of the node has crashed, and begins anew."""
+        self.crashes[reason] = None
+        for line in (reason, *where):
+            self.remark(line)
 
     def send(self, frame: CanFrame) -> None:
         """Send a frame, when the load allows it; NotAllowed if the level does not."""
@@ -266,25 +273,6 @@ class Exchange:
             self.disturb(f"somebody else sent {text}")
         if self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
-
-
-def can_id_of(pattern: str) -> str:
-    """Return the CAN-ID of a frame or a pattern in text."""
-    return pattern.partition("#")[0]
-
-
-def matches(pattern: str, text: str) -> bool:
-    """Compare frames; a dot stands for any digit, [..] for one of some, * for any rest.
-
-    >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
-    (True, True)
-    """
-    return _compiled(pattern).fullmatch(text) is not None
-
-
-@cache
-def _compiled(pattern: str) -> re.Pattern[str]:
-    return re.compile(pattern.replace("*", ".*"))
 
 
 def _queue() -> deque[tuple[int, str]]:

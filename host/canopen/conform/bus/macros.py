@@ -6,7 +6,7 @@ from binascii import crc_hqx
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.exchange import matches
+from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 
 import pytest
@@ -53,6 +54,74 @@ def test_a_bare_callable_is_judged() -> None:
 
     report = conformance(make, node_id=3, only="NMT-03")
     assert [result.outcome.verdict for result in report.results] == [Verdict.BLOCKED]
+
+
+class Fragile:
+    """A slave of ours whose program does not expect an NMT command of one byte."""
+
+    def __init__(self) -> None:
+        self.slave, self.tick_us, self.resets = ours(), 1_000, 0
+
+    @property
+    def due_us(self) -> int:
+        return self.slave.due_us
+
+    def reset(self) -> None:
+        self.resets += 1
+        self.slave.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        for frame in rx:
+            if frame.can_id == 0:
+                struct.unpack("<BB", frame.data)
+        return self.slave.tick(now_us, rx)
+
+
+def test_what_a_slave_raises_is_the_verdict_and_the_others_go_on() -> None:
+    fragile = Fragile()
+    report = conformance(fragile, node_id=5, eds=R1_EDS, only="NMT-*")
+    failed = [result for result in report.results if result.outcome.verdict is Verdict.FAIL]
+    assert failed
+    for result in failed:
+        reason = "your slave raised struct.error: unpack requires a buffer of 2 bytes"
+        assert result.outcome.reason == reason
+        remarks = [line.text for line in result.outcome.evidence if line.direction == "#"]
+        assert any("in tick: struct.unpack" in text for text in remarks), remarks
+    assert report.count(Verdict.PASS) > len(failed)
+    assert report.count(Verdict.BLOCKED) == 0
+    assert report.findings[0].startswith("your slave raised struct.error")
+    assert fragile.resets >= 2 * len(failed), "each is tried again, and it begins anew"
+    assert report.unrestored == ()
+
+
+def test_a_slave_that_raises_from_the_beginning_ends_the_run() -> None:
+    def make() -> SlaveCall:
+        def call(now_us: int, frames: Frames) -> Frames:
+            raise RuntimeError(f"at {now_us}")
+
+        return call
+
+    report = conformance(make, node_id=3, only="NMT-03")
+    assert report.exit_status == 4
+    assert report.findings[0] == "your slave raised RuntimeError: at 1000"
+    assert len(report.findings) < 30
+
+
+def test_a_slave_that_cannot_begin_anew_is_dead() -> None:
+    made = []
+
+    def make() -> SlaveCall:
+        made.append(1)
+        if len(made) > 1:
+            raise ValueError("no second time")
+
+        def call(now_us: int, frames: Frames) -> Frames:
+            raise RuntimeError("once")
+
+        return call
+
+    report = conformance(make, node_id=3, only="NMT-03")
+    assert report.findings[1] == "your slave raised ValueError: no second time"
 
 
 def test_the_same_slave_gives_the_same_bytes() -> None:

@@ -79,6 +79,28 @@ def test_a_device_of_the_bench_is_judged_check_by_check(
     assert outcomes["passed"] > 2
 
 
+def test_a_run_that_cannot_be_is_not_repeated_for_each_test(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(
+        """
+        from tickrig.testing import conformance_tests
+
+        made = []
+
+        def make():
+            made.append(1)
+            if len(made) > 1:
+                raise RuntimeError(f"made {len(made)} times")
+
+        test_broken = conformance_tests(make, node_id=5, only="NMT-0[345]")
+        """
+    )
+    result = run()
+    result.assert_outcomes(failed=3)
+    result.stdout.no_fnmatch_line("*made 3 times*")
+
+
 def test_a_dead_node_is_blocked_not_failed(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makepyfile(
         """
