@@ -11,7 +11,9 @@ from tickrig.host.canopen.conform.binding.pdo_binding import PDO_NAMES, BoundPdo
 from tickrig.host.canopen.conform.binding.probing import probe_device
 from tickrig.host.canopen.conform.binding.wanted import (
     COMMUNICATION_AREA,
+    GENERIC_IO,
     HARMLESS,
+    PLAIN_OUTPUTS,
     PROFILE_AREA,
     WANTED,
     Use,
@@ -21,6 +23,7 @@ from tickrig.host.canopen.conform.check import Level
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
+DEVICE_TYPE: Final = 0x1000
 ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
 ABSENT_SUBS: Final = (0x1018, 0x1016, 0x1010, 0x1200)
 LAST_SUB: Final = 0xFE
@@ -143,9 +146,12 @@ def _bind_object(search: _Search, wanted: Wanted) -> None:
         where = "the EDS has no" if search.known else "without an EDS nobody knows of a"
         search.reasons[wanted.name] = f"{where} {wanted.what}"
         return
-    safe = [entry for entry in fitting if wanted.use is Use.READ or _may_write(search, entry.index)]
+    free = [entry for entry in fitting if wanted.use is not Use.WRITE or _is_free(search, entry)]
+    safe = [entry for entry in free if wanted.use is Use.READ or _may_write(search, entry.index)]
     if not safe:
-        search.reasons[wanted.name] = _unsafe(wanted, fitting[0])
+        search.reasons[wanted.name] = (
+            _unsafe(wanted, free[0]) if free else _not_free(wanted, fitting)
+        )
         return
     for entry in sorted(safe, key=lambda entry: _order(wanted, entry)):
         value = search.reader.read(entry) if entry.readable else None
@@ -161,6 +167,19 @@ def _unsafe(wanted: Wanted, entry: EntryDescription) -> str:
     if entry.index in PROFILE_AREA:
         return f"{where} is the only {wanted.what}; writing it may move something (--allow {where})"
     return f"{where} is the only {wanted.what}, and it must not be written"
+
+
+def _not_free(wanted: Wanted, fitting: list[EntryDescription]) -> str:
+    where = f"{fitting[0].index:04X}h"
+    return f"no {wanted.what} takes any value: what {where} and its like hold means something"
+
+
+def _is_free(search: _Search, entry: EntryDescription) -> bool:
+    """Say whether an object takes any value of its type: in the profile area few do."""
+    if entry.index not in PROFILE_AREA:
+        return True
+    profile = (search.reader.number(DEVICE_TYPE, 0) or 0) & 0xFFFF
+    return profile == GENERIC_IO and entry.index in PLAIN_OUTPUTS
 
 
 def _may_write(search: _Search, index: int) -> bool:

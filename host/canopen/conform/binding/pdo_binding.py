@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader
@@ -68,6 +69,17 @@ class BoundPdo:
         """Whether it exists: bit 31 is 0."""
         return not self.cob_id & INVALID
 
+    def place(self, address: tuple[int, int]) -> tuple[int, int] | None:
+        """Return how many bytes are before an object that it carries, and how many behind."""
+        before = 0
+        for mapped in self.mapping:
+            bits = mapped & 0xFF
+            if (mapped >> 16, mapped >> 8 & 0xFF) == address:
+                whole = not before % 8 and not bits % 8
+                return (before // 8, self.size - (before + bits) // 8) if whole else None
+            before += bits
+        return None
+
     @property
     def size(self) -> int:
         """Its length in bytes."""
@@ -106,12 +118,35 @@ def _kinds(way: str) -> Iterator[PdoKind]:
     )
 
 
+CARRIED: Final[dict[str, tuple[int, int]]] = {
+    "tpdo_di1": (0x6000, 1),
+    "tpdo_ai1": (0x6401, 1),
+    "rpdo_do1": (0x6200, 1),
+    "rpdo_ao1": (0x6411, 1),
+}
+"""Names of event-driven PDOs that carry the first input or output of a module of CiA 401."""
+
+
+def _carrying(way: str) -> Iterator[PdoKind]:
+    """Give the kinds that carry an object."""
+    for name, (index, sub) in CARRIED.items():
+        if name.startswith(way):
+            what = f"{way.upper()} that is enabled, event-driven and carries {index:04X}h:{sub:02X}"
+            yield PdoKind(name, what, partial(_carries, (index, sub)))
+
+
+def _carries(address: tuple[int, int], pdo: BoundPdo) -> bool:
+    driven = pdo.enabled and pdo.transmission_type in EVENT_DRIVEN
+    return driven and pdo.place(address) is not None
+
+
 def _is_remappable(pdo: BoundPdo) -> bool:
     return pdo.remappable
 
 
 TPDO_KINDS: Final = (
     *_kinds("tpdo"),
+    *_carrying("tpdo"),
     PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: INHIBIT in pdo.subs),
     PdoKind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: SYNC_START in pdo.subs),
     PdoKind(
@@ -120,7 +155,7 @@ TPDO_KINDS: Final = (
         lambda pdo: pdo.enabled and bool(pdo.mapping) and not pdo.cob_id & FLAG_30,
     ),
 )
-RPDO_KINDS: Final = tuple(_kinds("rpdo"))
+RPDO_KINDS: Final = (*_kinds("rpdo"), *_carrying("rpdo"))
 MAPPED_RPDO: Final = "mapped_rpdo"
 PDO_NAMES: Final = (*(kind.name for kind in (*TPDO_KINDS, *RPDO_KINDS)), MAPPED_RPDO)
 

@@ -13,6 +13,11 @@ COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 PROFILE_AREA: Final = range(0x6000, 0xA000)
 """Where a write may move something."""
 
+GENERIC_IO: Final = 401
+"""The low word of 1000h of a module of CiA 401."""
+PLAIN_OUTPUTS: Final = (0x6200, 0x6300, 0x6320, 0x6410, 0x6411, 0x6412)
+"""Outputs of CiA 401 take any value; all else of a profile means something: a mode, a position."""
+
 HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
 """Communication objects that take any value, and that stand for others of their size."""
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
+from tickrig.host.canopen.conform.bus.position import follow
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING
@@ -258,4 +259,5 @@ MACROS: Final[dict[str, Callable[..., object]]] = {
     "map": remap,
     "fastscan": fastscan,
     "guard": guard,
+    "follow": follow,
 }

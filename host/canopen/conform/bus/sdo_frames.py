@@ -74,11 +74,13 @@ class SdoFrames:
 
     def read_other(self, at: Address, data: str) -> None:
         """Read an object of at most 4 bytes; StepFailed if it holds what it must not."""
-        self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
-        head = f"{_sized(UPLOADED, len(data) // 2):02X}{multiplexer(at)}"
-        got = self.answer(f"{head}........")[4 : 4 + len(data) // 2]
-        if got == bytes.fromhex(data):
+        if self.read_data(at, len(data) // 2) == bytes.fromhex(data):
             raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
+
+    def read_data(self, at: Address, size: int) -> bytes:
+        """Read an object of 1 to 4 bytes, whatever it holds."""
+        self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
+        return self.answer(f"{_sized(UPLOADED, size):02X}{multiplexer(at)}........")[4 : 4 + size]
 
     def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
         """Read an object; StepFailed unless it is refused with one of the codes."""

@@ -9,6 +9,7 @@ from typing import Any, Final
 from tickrig.host.canopen.conform.check import Check, Step
 from tickrig.host.canopen.conform.notation.macro_words import longest_ms, written_by
 from tickrig.host.canopen.conform.notation.names import (
+    ADDRESS,
     NAME,
     Address,
     Names,
@@ -109,7 +110,9 @@ def _bind(key: str, value: object, names: Names) -> object:
 
 
 def _bind_word(word: str, names: Names) -> object:
-    """Bind a word of a macro: a name without attribute is an object."""
+    """Bind a word of a macro: an address, or a name without attribute, is an object."""
+    if ADDRESS.fullmatch(word):
+        return resolve_address(word, names)
     match = NAME.fullmatch(word)
     if match is None or match[3]:
         return resolve(word, names)
@@ -152,6 +155,7 @@ def _used(step: Mapping[str, Any]) -> Iterator[Address]:
     yield from (step[key] for key in ("write", "keep", "read") if key in step)
     if "macro" in step:
         yield from (word for word in step["macro"] if isinstance(word, tuple) and word[1])
+        yield from written_by(*step["macro"])
 
 
 def _is_download(command: int) -> bool:

@@ -9,6 +9,7 @@ from tickrig.host.canopen.conform.notation.names import Address
 
 DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
 MAP: Final = "map"
+FOLLOW: Final = "follow"
 TO_MAPPING: Final = 0x200
 """A mapping parameter is so far behind its communication parameter."""
 
@@ -23,7 +24,7 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
     >>> written_by("segdn", (0x2008, 0), "1000"), written_by("segup", (0x2008, 0), "1000")
     (((8200, 0),), ())
     """
-    if name in DOWNLOADS:
+    if name in DOWNLOADS or name == FOLLOW:
         return (words[0],)
     if name == MAP:
         communication = words[0][0]
@@ -54,4 +55,5 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "fastscan": lambda words: 10_000,
     "guard": lambda words: 1_500 * len(words),
     MAP: lambda words: TRANSFER_MS,
+    FOLLOW: lambda words: TRANSFER_MS + 4 * int(words[4]),
 }

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject, BoundPlace
-from tickrig.host.canopen.conform.binding.pdo_binding import BoundPdo
+from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
 from tickrig.host.canopen.conform.notation.names import Address, Unbound
 from tickrig.host.canopen.conform.subject.sample_values import sample_value
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
@@ -21,6 +21,8 @@ TPDO1: Final = 0x180
 TPDO2: Final = 0x280
 FREE_CAN_ID: Final = 0x6A2
 """A CAN-ID that is neither restricted nor of the pre-defined connection set."""
+DRIVE: Final = range(0x603F, 0x6100)
+"""Of CiA 402: modes, states and positions."""
 HIGHEST_NODE_ID: Final = 127
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
@@ -125,7 +127,11 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
     if not pdo.can_id:
         raise Unbound(name, f"{pdo.index:04X}h has no CAN-ID")
     cob_id = pdo.cob_id & ~INVALID
+    before, behind = pdo.place(CARRIED.get(name, (0, 0))) or (0, 0)
+    other = "00" if pdo.index in RPDOS else ".."
     texts = {
+        "before": other * before,
+        "behind": other * behind,
         "comm": f"{pdo.index:04X}",
         "map": f"{pdo.mapping_index:04X}",
         "id": f"{pdo.can_id:03X}",
@@ -136,15 +142,21 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
         "long": _u32(cob_id | EXTENDED),
         "moved": _u32(cob_id & ~CAN_ID_MASK | FREE_CAN_ID),
         "movedid": f"{FREE_CAN_ID:03X}",
-        "first": _first(pdo),
+    }
+    return texts[attribute] if attribute in texts else _first(name, attribute, pdo)
+
+
+def _first(name: str, attribute: str, pdo: BoundPdo) -> str:
+    """Return the first object that a PDO carries, as `6000:01`, or the zeros behind its byte 0."""
+    mapped = pdo.mapping[0] if pdo.mapping else 0
+    index, bits = mapped >> 16, mapped & 0xFF
+    if index in DRIVE:
+        raise Unbound(name, f"{index:04X}h tells what a drive does: nobody can set it")
+    texts = {
+        "first": f"{index:04X}:{mapped >> 8 & 0xFF:02X}",
+        "padding": "00" * ((bits + 7) // 8 - 1),
     }
     return texts[attribute]
-
-
-def _first(pdo: BoundPdo) -> str:
-    """Return the first object that a PDO carries, as `6000:01`."""
-    mapped = pdo.mapping[0] if pdo.mapping else 0
-    return f"{mapped >> 16:04X}:{mapped >> 8 & 0xFF:02X}"
 
 
 def _u32(number: int) -> str:

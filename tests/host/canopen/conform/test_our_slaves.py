@@ -10,6 +10,7 @@ from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import Judged, not_harmless
 from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.emulators.testing.conformance.slave_stimulus import SlaveStimulus
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Verdict
@@ -17,7 +18,13 @@ from tickrig.host.canopen.conform.verdict import Verdict
 EXAMPLES = Path(__file__).parents[4] / "examples"
 FILES = sorted(EXAMPLES.rglob("*.eds"))
 MODELS = ("f-palette", "motor-core-unit", "epos")
+PROFILE = frozenset(range(0x6000, 0xA000))
 ALL = Plan(Level.INTRUSIVE, confirm=yes)
+MUST_PASS = {
+    "f-palette": {"PR-01", "PR-11", *(f"IO-{number:02}" for number in range(2, 8))},
+    "epos": {"D4-11", "D4-13"},
+}
+"""Checks of models that are not applicable without a hand, or without leave to write."""
 
 
 class StrictEcho(CanopenEcho):
@@ -69,3 +76,14 @@ def test_the_component_of_the_report_leaves_error_by_a_reset_alone() -> None:
     report = Judged.of("rtc-echo").judge(ALL, eds_of("rtc-echo"))
     failed = [r.check.id for r in report.results if r.outcome.verdict is Verdict.FAIL]
     assert failed == ["NMT-13", "NMT-17"]
+
+
+@pytest.mark.parametrize("device", [*MODELS, *FILES], ids=lambda device: Path(device).stem)
+def test_nothing_fails_with_all_allowed_and_hands_at_the_inputs(device: Path | str) -> None:
+    judged = Judged.of(device)
+    path = device if isinstance(device, Path) else eds_of(device)
+    plan = Plan(Level.INTRUSIVE, (), PROFILE, stimulus=SlaveStimulus(judged.slave), confirm=yes)
+    report = judged.judge(plan, path)
+    assert not_harmless(report) == []
+    passed = {each.check.id for each in report.results if each.outcome.verdict is Verdict.PASS}
+    assert passed >= MUST_PASS.get(str(device), set())

@@ -22,7 +22,7 @@ from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.object_table import RW, WO, DeviceInfo, EntryDescription
+from tickrig.wire.canopen.eds.object_table import RO, RW, WO, DeviceInfo, EntryDescription
 
 ROOT = Path(__file__).parents[5]
 R1 = ROOT / "tests/golden/canopen/r1.eds"
@@ -57,6 +57,11 @@ OF_R1 = {
     "tpdo_disabled": "1802.00",
     "rpdo_remappable": "1400.00",
 }
+
+MODULE, DRIVE = (
+    EntryDescription(0x1000, 0, "Device type", DataType.UNSIGNED32, RO, default=profile)
+    for profile in (401, 402)
+)
 
 
 def r1_device() -> EdsDevice:
@@ -131,12 +136,26 @@ def test_without_an_eds_only_what_cia_301_knows_is_bound() -> None:
 
 def test_an_object_of_the_profile_is_bound_only_if_it_is_allowed() -> None:
     output = EntryDescription(0x6200, 1, "Output", DataType.UNSIGNED8, RW)
-    binding = bound_to(output)
+    binding = bound_to(MODULE, output)
     assert binding.reasons["rw_u8"] == (
         "6200h is the only integer of 8 bits that may be read and written; "
         "writing it may move something (--allow 6200h)"
     )
-    assert place(bound_to(output, allow={0x6200}), "rw_u8") == "6200.01"
+    assert place(bound_to(MODULE, output, allow={0x6200}), "rw_u8") == "6200.01"
+
+
+@pytest.mark.parametrize(
+    ("profile", "index"), [(MODULE, 0x6421), (MODULE, 0x6060), (DRIVE, 0x6060), (DRIVE, 0x6200)]
+)
+def test_what_means_something_in_its_profile_stands_for_nothing(
+    profile: EntryDescription, index: int
+) -> None:
+    mode = EntryDescription(index, 0, "Mode", DataType.UNSIGNED8, RW)
+    for allow in (set[int](), {index}):
+        assert bound_to(profile, mode, allow=allow).reasons["rw_u8"] == (
+            "no integer of 8 bits that may be read and written takes any value: "
+            f"what {index:04X}h and its like hold means something"
+        )
 
 
 def test_an_object_that_the_user_calls_unsafe_is_not_bound() -> None:
