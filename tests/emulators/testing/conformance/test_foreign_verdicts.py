@@ -44,8 +44,9 @@ def test_the_verdicts_are_those_of_the_public_checks(
 
 def test_the_page_tells_of_these_stacks() -> None:
     text = PAGE.read_text("utf-8")
-    for _, name, _ in FOREIGN:
+    for stack, name, _ in FOREIGN:
         assert f"## {name}\n" in text, "run tools/conform-stacks"
+        assert f"For {len(read_table(stack)) - 1} of the checks there are verdicts" in text
     known = {check.id for group in read_suite() for check in group.checks}
     named = set(re.findall(r"^\| ([A-Z0-9]+-\d+): ", text, re.MULTILINE))
     assert named

@@ -95,8 +95,8 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     found = compare(report, read_table(stack))
     yield f"## {name}\n"
     yield (
-        f"Of the 172 public checks {found.both} were judged here and there:"
-        f" {found.same} verdicts are the same."
+        f"For {len(read_table(stack)) - 1} of the checks there are verdicts of another tester:"
+        f" {found.both} were judged here and there, {found.same} verdicts are the same."
     )
     for one in found.differences:
         yield f"{one.check_id} differs: {one.public} there, {one.here} here: {one.reason}."

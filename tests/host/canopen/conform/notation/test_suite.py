@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from tests.environment import ROOT
 from tests.host.canopen.conform.r1 import R1
 from tickrig.host.canopen.conform.check import Check, Level
 from tickrig.host.canopen.conform.notation.names import NAME
@@ -68,3 +69,9 @@ def test_a_line_that_is_no_step_is_refused(line: str) -> None:
 def test_a_file_that_is_no_group_is_refused(text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=re.escape(reason)):
         parse_group(text)
+
+
+def test_the_readme_says_how_many_there_are() -> None:
+    said = re.search(r"more than (\d+) checks by clause", (ROOT / "README.md").read_text("utf-8"))
+    assert said is not None
+    assert 0 < sum(len(group.checks) for group in read_suite()) - int(said[1]) < 30
