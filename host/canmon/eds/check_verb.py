@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import click
 
@@ -20,8 +20,15 @@ from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.junit import junit
 from tickrig.host.text.whole_file import check_file, write_whole
 
+if TYPE_CHECKING:
+    from tickrig.host.canopen.data_sheet.document import Document
+
 FOUND: Final = 1
 """Exit status where a finding counts."""
+
+
+UNREAD: Final = "unread"
+"""The test case of a file that cannot be read."""
 
 
 class Case(NamedTuple):
@@ -53,7 +60,7 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
     canmon eds check drive.eds --json | jq .rule
     """  # noqa: D301 - click wants the backspace
     _check_report(report)
-    documents = [read_document(path) for path in file]
+    documents, unread = _read(file)
     counted: list[RuleFinding] = []
     tally: Counter[str] = Counter()
     for document in documents:
@@ -63,10 +70,25 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
         with until_unread():
             for one in found:
                 click.echo(finding_json(one) if as_json else str(one))
-    _write(report, file, counted)
-    click.echo(_summary(len(documents), tally), err=True)
+    _write(report, documents, unread, counted)
+    if documents:
+        click.echo(_summary(len(documents), tally), err=True)
+    if unread:
+        click.get_current_context().exit(Refused.exit_code)
     if counted:
         click.get_current_context().exit(FOUND)
+
+
+def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
+    """Read the files; what cannot be read is told, and is no reason to leave out the others."""
+    documents, unread = [], []
+    for path in files:
+        try:
+            documents.append(read_document(path))
+        except Refused as error:
+            error.show()
+            unread.append(Case(f"{path}: {UNREAD}", error.message))
+    return documents, unread
 
 
 def _summary(files: int, tally: Counter[str]) -> str:
@@ -105,12 +127,18 @@ def _check_report(report: Path | None) -> None:
             raise Refused(str(error)) from None
 
 
-def _write(report: Path | None, files: Sequence[Path], counted: Sequence[RuleFinding]) -> None:
-    """Write a test case for each rule of each file."""
+def _write(
+    report: Path | None,
+    documents: Sequence[Document],
+    unread: Sequence[Case],
+    counted: Sequence[RuleFinding],
+) -> None:
+    """Write a test case for each rule of each file, and one for each that was not read."""
     if report is None:
         return
-    cases = [Case(f"{one.file}: {one.rule.name}", str(one)) for one in counted]
-    names = list(dict.fromkeys(f"{path}: {name}" for path in files for name in RULES))
+    cases = [*unread, *(Case(f"{one.file}: {one.rule.name}", str(one)) for one in counted)]
+    rules = (f"{document.name}: {name}" for document in documents for name in RULES)
+    names = list(dict.fromkeys((*(case.rule for case in unread), *rules)))
     try:
         write_whole(report, junit("canmon eds check", names, cases))
     except OSError as error:

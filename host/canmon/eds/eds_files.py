@@ -11,9 +11,6 @@ if TYPE_CHECKING:
 
     from tickrig.host.canopen.data_sheet.document import Document
 
-MOST_BYTES = 32_000_000
-"""A larger file is no EDS."""
-
 LOOKED_AT = 4096
 """Characters at its beginning by which a binary file is known."""
 
@@ -21,16 +18,17 @@ LOOKED_AT = 4096
 def read_document(path: Path) -> Document:
     """Read a file; Refused if it cannot be read, or is too large."""
     from tickrig.host.canopen.data_sheet.document import Document  # noqa: PLC0415 - slow
+    from tickrig.host.canopen.eds import read_eds_bytes  # noqa: PLC0415 - slow
+    from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415 - slow
 
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+        data = read_eds_bytes(path)
     except OSError as error:
         refuse_path("FILE", error)
+    except EdsError as error:
+        raise Refused(f"FILE {error}") from None
     except ValueError as error:
         _refuse(path, str(error))
-    if len(data) > MOST_BYTES:
-        _refuse(path, f"more than {MOST_BYTES:,} bytes: no EDS")
     if _is_binary(data):
         _refuse(path, "a binary file: no EDS")
     return Document(str(path), data)

@@ -41,7 +41,7 @@ def command(file: Path, output: Path | None, dry_run: bool) -> None:
 
     if (output is None) is not dry_run:
         raise Refused("give -o OUT, or --dry-run")
-    document = read_document(file)
+    document = _mendable(file)
     fixed = fix(document)
     with until_unread():
         if dry_run:
@@ -56,6 +56,16 @@ def command(file: Path, output: Path | None, dry_run: bool) -> None:
     say(f"{len(fixed.mended)} mended, {len(fixed.left)} left")
     if fixed.left:
         click.get_current_context().exit(LEFT)
+
+
+def _mendable(file: Path) -> Document:
+    """Read a file that can be mended; Refused if it is XML, or describes no object."""
+    document = read_document(file)
+    if document.file.is_xml:
+        raise Refused(f"FILE {file}: XDD files are not mended")
+    if not document.rows:
+        raise Refused(f"FILE {file}: no EDS: it describes no object")
+    return document
 
 
 def _differences(old: Document, new: Document) -> Iterator[str]:

@@ -12,7 +12,10 @@ from click.testing import CliRunner, Result
 
 from tests.host.canopen.data_sheet.corpus import GOOD, NAME
 from tests.wire.canopen.eds.xdd_text import XDD
+from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canmon.cli import main
+from tickrig.host.canopen.eds import MOST_BYTES, read_sound
+from tickrig.wire.canopen.eds.eds_file import EdsError
 
 DEFECT = GOOD.replace("NrOfRXPDO=4", "NrOfRXPDO=7").replace("DefaultValue=0x10", "DefaultValue=9")
 COUNT = (
@@ -35,6 +38,13 @@ def odd(tmp_path: Path) -> Path:
 
 def write(path: Path, text: str) -> Path:
     path.write_bytes(text.encode())
+    return path
+
+
+def make_large(path: Path) -> Path:
+    """Make a file, with a hole, that is larger than any EDS."""
+    with path.open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
     return path
 
 
@@ -105,7 +115,9 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
         ),
         (("fix", "empty.eds"), "give -o OUT, or --dry-run"),
         (("fix", "empty.eds", "-o", "a.eds", "--dry-run"), "give -o OUT, or --dry-run"),
-        (("fix", "empty.eds", "-o", "no/a.eds"), "-o no/a.eds: No such file or directory"),
+        (("fix", "empty.eds", "-o", "a.eds"), "FILE empty.eds: no EDS: it describes no object"),
+        (("fix", "a.xdd", "-o", "a.eds"), "FILE a.xdd: XDD files are not mended"),
+        (("show", "large.eds"), "FILE large.eds: more than 32,000,000 bytes: no EDS"),
         (("show", "empty.eds"), "empty.eds: has no objects (no-objects)"),
         (("diff", "empty.eds", "empty.eds"), "empty.eds: has no objects (no-objects)"),
         (
@@ -122,9 +134,47 @@ def test_what_cannot_be_done_is_one_line_and_2(
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "empty.eds", "")
     write(tmp_path / "r1.eds", GOOD)
+    write(tmp_path / "a.xdd", XDD)
+    make_large(tmp_path / "large.eds")
     write(tmp_path / "bomb.xdd", '<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>')
     result = run(*words)
     assert (result.exit_code, result.stderr) == (2, f"Error: {reason}\n")
+    assert not Path("a.eds").exists()
+
+
+def test_where_a_mended_file_cannot_be_written_is_one_line_and_2(good: Path) -> None:
+    result = run("fix", good, "-o", "no/a.eds")
+    assert (result.exit_code, result.stderr) == (
+        *(2, "Error: -o no/a.eds: No such file or directory\n"),
+    )
+
+
+def test_files_that_cannot_be_read_do_not_hide_the_others(odd: Path, tmp_path: Path) -> None:
+    report = tmp_path / "eds.xml"
+    result = run("check", tmp_path, odd, "none.eds", "--strict", "--junit", report)
+    assert result.exit_code == 2
+    assert f"{odd}{COUNT}" in result.stdout.splitlines()
+    assert result.stderr.splitlines() == [
+        f"Error: FILE {tmp_path}: Is a directory",
+        "Error: FILE none.eds: No such file or directory",
+        "1 file: 0 errors, 2 warnings, 0 notes",
+    ]
+    (suite,) = ET.parse(report).getroot()
+    failed = [case.attrib["name"] for case in suite if case.find("failure") is not None]
+    unread = [f"{tmp_path}: unread", "none.eds: unread"]
+    assert failed == [*unread, f"{odd}: pdo-count", f"{odd}: {OUT_OF_LIMITS}"]
+
+
+def test_a_file_too_large_for_an_eds_is_refused_by_hosts_too(tmp_path: Path) -> None:
+    path = make_large(tmp_path / "large.eds")
+    words = ["conform", "none.toml", "--node", "5", "--eds", str(path)]
+    result = CliRunner().invoke(main, words)
+    assert (result.exit_code, result.stderr) == (
+        *(2, f"Error: --eds {path}: more than 32,000,000 bytes: no EDS\n"),
+    )
+    for read in (read_sound, read_eds):
+        with pytest.raises(EdsError, match="more than 32,000,000 bytes"):
+            read(path)
 
 
 def test_fix_writes_a_file_and_tells_what_is_left(odd: Path, tmp_path: Path) -> None:
@@ -148,12 +198,6 @@ def test_a_dry_run_shows_lines_and_writes_nothing(odd: Path) -> None:
     result = run("fix", odd, "--dry-run")
     assert "-NrOfRXPDO=7\n+NrOfRXPDO=4\n" in result.stdout
     assert odd.read_bytes() == DEFECT.encode()
-
-
-def test_xdd_files_are_not_mended(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.xdd", XDD)
-    result = run("fix", path, "-o", tmp_path / "b.xdd")
-    assert (result.exit_code, (tmp_path / "b.xdd").read_bytes()) == (1, XDD.encode())
 
 
 def test_files_of_one_device_do_not_differ(good: Path, tmp_path: Path) -> None:
