@@ -16,8 +16,10 @@ from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.subject.subject import Subject
-from tickrig.host.canopen.conform.verdict import Outcome, Result, Verdict
+from tickrig.host.canopen.conform.verdict import Line, Outcome, Result, Verdict
 
+LSS_ANSWER: Final = "7E4#"
+"""Begins what LSS slaves say: it does not tell which one."""
 HISTORY: Final = (0x1003, 0)
 EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 
@@ -96,7 +98,7 @@ class Judge:
         crashed = bool(self._exchange.crashes)
         if crashed:
             verdict, reason = Verdict.FAIL, next(iter(self._exchange.crashes))
-        lines, end_us = self._exchange.evidence.lines(), self._exchange.now_us
+        lines, end_us = self._lines(), self._exchange.now_us
         if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL and not crashed:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
         return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
@@ -123,9 +125,16 @@ class Judge:
                 with suppress(StepFailed, Disturbed, NotAllowed):
                     self._player.play(step)
 
+    def _lines(self) -> tuple[Line, ...]:
+        return self._exchange.evidence.lines()
+
     def _failed(self, bound: BoundCheck, reason: str) -> tuple[Verdict, str]:
         if self._exchange.disturbances:
             return Verdict.INCONCLUSIVE, f"{reason}; {', '.join(self._exchange.disturbances)}"
+        others = self._permission.others
+        if others and any(line.text.startswith(LSS_ANSWER) for line in self._lines()):
+            known = ", ".join(map(str, sorted(others)))
+            return Verdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
         if bound.check.choice:
             return Verdict.IMPLEMENTATION_DEFINED, f"{bound.check.choice}; {reason}"
         return Verdict.FAIL, reason

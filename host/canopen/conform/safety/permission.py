@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.notation.bound_check import NMT_TO_ALL, SYNC_TO_ALL
 from tickrig.wire.can import CanFrame
@@ -30,6 +30,9 @@ PROFILE: Final = 0x6000
 MANUFACTURER: Final = 0x2000
 PROGRAMS: Final = range(0x1F50, 0x1F5A)
 """Program download and control: nothing here is for a tester."""
+SWITCH_GLOBAL, CONFIGURATION = 0x04, 0x01
+CONFIGURES: Final = (0x11, 0x13, 0x15, 0x17)
+"""LSS services that change a node: node-ID, bit timing, its activation, both stored."""
 STORAGE: Final = (0x1010, 0x1011)
 
 Confirm = Callable[[str], bool]
@@ -55,9 +58,15 @@ class Permission:
         self._confirm = confirm
         self._answers: dict[str, bool] = {}
         self.others: frozenset[int] = frozenset()
+        self._all_configured = False
 
     def check(self, frame: CanFrame) -> None:
-        """Let a frame pass, or raise NotAllowed."""
+        """Let a frame pass.
+
+        Raises:
+            NotAllowed: the level does not allow it.
+            Disturbed: it would change other nodes as well.
+        """
         is_request = frame.can_id == REQUEST_COB_ID + self._node_id and not frame.extended
         if self._level is Level.READ_ONLY:
             if not is_request or frame.remote or not _is_upload(frame.data):
@@ -66,6 +75,8 @@ class Permission:
             self._check_nmt(frame.data)
         elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:
             raise NotAllowed("LSS may change the node-ID: --intrusive")
+        elif frame.can_id == LSS_MASTER_COB_ID and not frame.extended:
+            self._check_lss(frame.data)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
         """Let an object be written, or raise NotAllowed.
@@ -99,6 +110,14 @@ class Permission:
             raise NotAllowed("resets the node: --intrusive")
         if data[1:2] == bytes([ALL_NODES]):
             self.check_confirmed(NMT_TO_ALL)
+
+    def _check_lss(self, data: bytes) -> None:
+        """Keep from the other nodes what all take that are in LSS configuration."""
+        if data[:1] == bytes([SWITCH_GLOBAL]):
+            self._all_configured = data[1:2] == bytes([CONFIGURATION])
+        elif self._all_configured and self.others and data[:1] and data[0] in CONFIGURES:
+            others = ", ".join(map(str, sorted(self.others)))
+            raise Disturbed(f"the other nodes would take LSS {data[0]:02X}h too: {others}")
 
 
 def _is_upload(data: bytes) -> bool:

@@ -23,19 +23,16 @@ HARMLESS = {Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.IMPLEMENTATION_DEFINED
 class Judged:
     """A slave that has booted, and the host's end of its bus."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: CanopenSlave, *others: CanopenSlave) -> None:
         self.slave, self.wire = slave, CanWire()
-        self.rig = Rig(Station(slave, self.wire.end()))
+        self.rig = Rig(*(Station(each, self.wire.end()) for each in (slave, *others)))
         self.link = CanHost(self.rig, self.wire.end())
         self.rig.run_for(100_000)
 
     @classmethod
-    def of(cls, device: Path | str) -> Judged:
+    def of(cls, device: Path | str, *others: CanopenSlave) -> Judged:
         """Make a model by its name, or a device of its EDS."""
-        described = describe(EdsCache(), device)
-        node_id = described.node_id or 5
-        dictionary = described.make_dictionary()
-        return cls(make_slave(dictionary, node_id, application=described.application))
+        return cls(slave_of(device), *others)
 
     def values(self) -> dict[tuple[int, int], bytes]:
         """Return what all its objects hold."""
@@ -46,6 +43,14 @@ class Judged:
         file = open_eds(eds) if eds else None
         device = read_device(file) if file else None
         return ConformRun(self.link, self.slave.node_id, plan, device=device, eds=file).run()
+
+
+def slave_of(device: Path | str) -> CanopenSlave:
+    """Make a slave of a model, or of an EDS."""
+    described = describe(EdsCache(), device)
+    node_id = described.node_id or 5
+    dictionary = described.make_dictionary()
+    return make_slave(dictionary, node_id, application=described.application)
 
 
 def not_harmless(report: Report) -> list[str]:
