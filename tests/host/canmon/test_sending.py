@@ -86,7 +86,7 @@ def test_a_frame_is_sent_again_with_counter_and_checksum(wire: Wire) -> None:
         (["080#", "--eds", "5"], "--eds '5' is not NODE=FILE with a node-ID 1..127"),
         (["080#", "--eds", "200=a"], "--eds '200=a' is not NODE=FILE"),
         (["080#", "--eds", "5=nowhere.eds"], "--eds nowhere.eds: No such file or directory"),
-        (["080#", "--eds", f"5={__file__}"], "line 1 is no keyword with a value"),
+        (["080#", "--eds", f"5={__file__}"], ".py: has no objects"),
         (["080#", "--count", "3"], "--count says how often --every sends; give --every TIME"),
         (["080#", "--every", "soon"], "--every 'soon' is not a time"),
         (["080#", "--every", "0s"], "a period of 0 us; 1 us is the least"),

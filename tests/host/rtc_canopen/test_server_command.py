@@ -41,9 +41,10 @@ def test_what_is_wrong_in_an_eds_and_not_used_is_said(tmp_path: Path) -> None:
     file.write_text("nodes: [{id: 16, name: A, eds: odd.eds, role: device}]\n", "utf-8")
     result = run(file, "--check")
     assert result.exit_code == 0
+    line = len(text.splitlines()) + 1
     assert result.stderr.splitlines() == [
-        f"{eds}: [5000] DataType is missing",
-        f"{eds}: [5000] AccessType is missing",
+        f"{eds}:{line}: [5000] DataType is missing: DOMAIN is taken (data-type-missing)",
+        f"{eds}:{line}: [5000] AccessType is missing: rw is taken (access-missing)",
     ]
 
 

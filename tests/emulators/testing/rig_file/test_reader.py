@@ -428,7 +428,7 @@ def test_a_store_that_is_none_is_told(tmp_path: Path) -> None:
 
 
 def test_what_an_eds_has_wrong_is_told(tmp_path: Path) -> None:
-    (tmp_path / "a.eds").write_text("[DeviceInfo]\nno\n[1000]\nDataType=x\n")
+    (tmp_path / "a.eds").write_text("[DeviceInfo]\nno\n[1000]\nDataType=7\nDefaultValue=x\n")
     with pytest.raises(RigFileError) as caught:
         parse_rig_file('\n[device.a]\ntype = "a.eds"\nnode_id = 1', tmp_path / "rig.toml")
     assert {line for line, _ in caught.value.mistakes} == {3}

@@ -75,8 +75,7 @@ def test_a_file_that_is_no_eds_is_one_line(tmp_path: Path) -> None:
     path.write_text("no EDS at all")
     result = nodes(str(TRACE), "--eds", f"5={path}")
     assert result.exit_code == 2
-    assert f"--eds {path}: line 1 is no keyword with a value: " in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    assert result.stderr == f"Error: --eds {path}: has no objects (no-objects)\n"
 
 
 def test_the_help_shows_examples_and_sources() -> None:
