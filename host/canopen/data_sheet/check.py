@@ -39,6 +39,12 @@ UNREADABLE: Final = frozenset({"xml", "no-objects"})
 
 def check(document: Document) -> list[RuleFinding]:
     """Return all findings of a file, by line."""
+    if document.findings is None:  # `fix` and its caller ask again: a quarter of their time
+        document.findings = _check(document)
+    return list(document.findings)
+
+
+def _check(document: Document) -> list[RuleFinding]:
     found = list(dict.fromkeys(one for rule in CHECKS for one in rule(document)))
     if document.file.is_xml and any(one.rule.name in UNREADABLE for one in found):
         found = [one for one in found if one.rule.name in UNREADABLE]

@@ -80,6 +80,9 @@ def _number(document: Document, key: str) -> str:
 
 def _objects(one: Document, other: Document) -> Iterator[Change]:
     old, new = one.device.objects, other.device.objects
+    all_subs: dict[int, set[int]] = {}
+    for at, sub in (*one.rows, *other.rows):
+        all_subs.setdefault(at, set()).add(sub)
     for index in sorted({*old, *new}):
         place = f"{index:04X}h"
         before, after = old.get(index), new.get(index)
@@ -91,11 +94,10 @@ def _objects(one: Document, other: Document) -> Iterator[Change]:
             yield Change(place, "name", before.name, after.name)
         if before.code is not after.code:
             yield Change(place, "kind", before.code.name, after.code.name)
-        yield from _entries(one, other, index)
+        yield from _entries(one, other, index, all_subs.get(index, set()))
 
 
-def _entries(one: Document, other: Document, index: int) -> Iterator[Change]:
-    subs = {sub for document in (one, other) for at, sub in document.rows if at == index}
+def _entries(one: Document, other: Document, index: int, subs: set[int]) -> Iterator[Change]:
     for sub in sorted(subs):
         before, after = one.rows.get((index, sub)), other.rows.get((index, sub))
         place = f"{index:04X}h:{sub:02X}"

@@ -34,6 +34,7 @@ class Document:
         file: its sections.
         device: what they describe.
         rows: the entries of the device by index and sub-index.
+        findings: of `check`, None until it is asked.
     """
 
     def __init__(self, name: str, data: bytes) -> None:
@@ -45,6 +46,7 @@ class Document:
         self.file = EdsFile(name, decode_text(data))
         self.device = read_device(self.file)
         self.rows = {(row.index, row.sub): row for row in self.device.entries}
+        self.findings: list[RuleFinding] | None = None
         self._keywords: dict[tuple[str, str], EdsLine] = {}
         for line in self.file.lines:
             if line.is_keyword:

@@ -95,6 +95,7 @@ class EdsFile:
         self.is_xml = is_xml(text)
         self.lines: list[EdsLine] = []
         self._places: dict[tuple[str, str], int] = {}
+        self._objects: list[tuple[str, int, int | None]] = []  # each rule goes through them
         self._errors: dict[Finding, None] = {}
         self._warnings: dict[Finding, None] = {}
         try:
@@ -130,7 +131,8 @@ class EdsFile:
 
     def value(self, section: str, key: str) -> str:
         """Return the text of a keyword, empty if it is not there."""
-        return self.sections.get(section, {}).get(key.lower(), "")
+        found = self.sections.get(section)
+        return "" if found is None else found.get(key.lower(), "")
 
     def has(self, section: str, key: str) -> bool:
         """Return whether a keyword is there, with a text or without."""
@@ -183,9 +185,7 @@ class EdsFile:
 
     def objects(self) -> Iterator[tuple[str, int, int | None]]:
         """Give the sections of objects, with index and sub-index; None for the object itself."""
-        for section in self.sections:
-            if place := object_section(section):
-                yield section, *place
+        return iter(self._objects)
 
     def _parse(self) -> None:
         section: Section = {}
@@ -197,6 +197,8 @@ class EdsFile:
             elif line.content and describes_device(line.section):
                 self._skip(line)
         self._take_comments()
+        places = ((section, object_section(section)) for section in self.sections)
+        self._objects = [(section, *place) for section, place in places if place]
 
     def _take_comments(self) -> None:
         """Learn what CiA 306 has no keyword for from comments, as `write_eds` writes it."""

@@ -26,6 +26,7 @@ _C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECAS
 _SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
 _ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f]*)h", re.IGNORECASE | re.ASCII)
 _UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
+_OCTAL: Final = re.compile(r"0[0-7]+")
 _NO_OCTAL: Final = re.compile(r"\b0+([0-9]*[89][0-9]*)\b", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
 
@@ -74,7 +75,7 @@ def parse_number(text: str) -> int:
     """
     if not text.isascii() or "_" in text:
         raise ValueError(f"{text!r} is no number")
-    return int(text, 8) if re.fullmatch(r"0[0-7]+", text) else int(text, 0)
+    return int(text, 8) if _OCTAL.fullmatch(text) else int(text, 0)
 
 
 def plain_numbers(text: str) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from random import Random
 
 import pytest
 
+from tests.host.canopen.data_sheet.corpus import ROOT
 from tests.host.canopen.data_sheet.mutations import SMALL, judge, mutated
 
 
@@ -15,6 +18,16 @@ def test_a_mutated_eds_is_judged_read_and_mended(seed: int) -> None:
     chance = Random(seed)
     for _ in range(25):
         judge(*mutated(chance))
+
+
+def test_the_files_of_a_seed_are_judged_alike_by_several_processes() -> None:
+    told = []
+    for jobs in ("1", "2"):
+        words = [sys.executable, str(ROOT / "tools" / "fuzz-eds"), "--files", "120", "-j", jobs]
+        said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        told.append(said.partition(";")[0])
+    assert told[0] == told[1]
+    assert told[0].startswith("seed 1: 120 files, {")
 
 
 def test_noise_is_no_eds() -> None:
