@@ -65,3 +65,13 @@ def _near(word: str, suite: list[Check]) -> str:
 
 def _suite() -> list[Check]:
     return [check for group in read_suite() for check in group.checks]
+
+
+def check_chosen(only: Sequence[str], level: Level) -> None:
+    """Refused if a word names no check, or none that this level allows."""
+    chosen(only)
+    for word in only:
+        named = chosen([word])
+        least = min((check.level for check in named), default=level)
+        if least > level:
+            raise Refused(f"--only {word} needs --{least.word}")

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.conform.chosen import chosen, patterns, unknown
+from tickrig.host.canmon.conform.chosen import check_chosen, patterns, unknown
 from tickrig.host.canmon.conform.conform_source import RIG_FILE, ConformSource, open_conform_source
 from tickrig.host.canmon.conform.consent import Consent, Progress
 from tickrig.host.canmon.conform.nodes_heard import list_nodes, nodes_heard
@@ -62,10 +62,10 @@ class Conformance:
         check_files(self._files)
         keep_inputs(self._files, self._inputs())
         self._only = patterns(options["only"])
-        chosen(self._only)
         self._baseline = _read_baseline(options["baseline"])
         self._allow = frozenset(map(_index, options["allow"]))
         self._level = Level[options["level"].upper().replace("-", "_")]
+        check_chosen(self._only, self._level)
         self._stimulus = open_stimulus(options["stimulus"]) if options["stimulus"] else None
         self._eds: Path | None = options["eds"]
         if self._eds is not None:
@@ -145,11 +145,14 @@ class Conformance:
         with until_unread():
             if self._options["as_json"]:
                 click.echo(report_json(report, self._baseline), nl=False)
-            else:
+            elif not report.absent:
                 show = decoded_frames(eds)
                 text = text_report(report, self._baseline, show, self._again(report))
                 click.echo(text, nl=False)
         written = write_files(report, self._files, self._baseline, decoded_frames(eds))
+        if report.absent:
+            say(f"Error: {report.aborted}")
+            return report.exit_status if written else BUS_FAILED
         if report.aborted:
             return INTERRUPTED if report.aborted == "interrupted" else BUS_FAILED
         status = self._baseline.exit_status(report)

@@ -8,8 +8,9 @@ from random import Random
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.presence import Presence
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
-from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
 from tickrig.host.canopen.conform.check import Check
@@ -84,6 +85,7 @@ class ConformRun:
         self._results: list[Result] = []
         self._subject: Subject | None = None
         self._crashes: dict[str, None] = {}
+        self._absent = False
 
     def disturb(self, reason: str) -> None:
         """Let the check under way be inconclusive if it fails: the adapter lost frames, or such."""
@@ -108,7 +110,7 @@ class ConformRun:
         """
         aborted = ""
         try:
-            self._run()
+            aborted = self._run()
         except KeyboardInterrupt:
             aborted = "interrupted"
         except LinkClosed as error:
@@ -117,24 +119,48 @@ class ConformRun:
             self._restore(patient=not aborted)
         return self._report(aborted)
 
-    def _run(self) -> None:
+    def _run(self) -> str:
+        """Judge; return why nothing could be, empty if it could."""
         self._exchange.begin(min(EXAMINE_US, self._longest_us))
         self._exchange.wait(LISTEN_MS)
         self._permission.others = frozenset(self._exchange.others)
+        self._exchange.end_listening()
         try:
             self._examine()
-        except (SdoFailed, StepFailed) as error:
-            self._block([*_suite()], str(error))
-            return
+        except (SdoFailed, StepFailed, Disturbed) as error:
+            return self._give_up(error)
         assert self._subject is not None
         checks = [*_suite(), *self._object_checks()]
         self._judge_all([check for check in checks if self._plan.chooses(check)])
+        return ""
+
+    def _give_up(self, error: Exception) -> str:
+        """Judge nothing; return why, where no node, or more than one, has the node-ID."""
+        presence = self._exchange.presence
+        crashed = next(iter(self._crashes), "")
+        if crashed or presence is Presence.ONE:
+            self._block([*_suite()], crashed or str(error))
+            return ""
+        self._absent = True
+        if presence is Presence.NONE:
+            verdict, reason = Verdict.BLOCKED, self._nobody()
+        else:
+            reason = f"each request is answered twice: two nodes have ID {self._node_id}?"
+            verdict = Verdict.INCONCLUSIVE
+        self._block([*_suite()], reason, verdict)
+        return reason
+
+    def _nobody(self) -> str:
+        heard = ", ".join(map(str, sorted(self._exchange.others - {0}))) or "nobody"
+        return f"node {self._node_id} does not answer; heard here: {heard}"
 
     def _examine(self) -> None:
         self._subject = examine(
             *(self._client, self._node_id, self._plan),
             *(self._device, self._eds, self._exchange.others),
         )
+        if self._exchange.presence is Presence.TWO:
+            raise Disturbed("two nodes answer")
         self._care.prepare(self._subject.restorable(self._plan.level))
 
     def _object_checks(self) -> list[Check]:
@@ -158,10 +184,10 @@ class ConformRun:
                 return
             self._keep(self._judge.result(check, self._subject))
 
-    def _block(self, checks: list[Check], reason: str) -> None:
+    def _block(self, checks: list[Check], reason: str, verdict: Verdict = Verdict.BLOCKED) -> None:
         for check in checks:
             if self._plan.chooses(check):
-                self._keep(Result(check, Outcome(Verdict.BLOCKED, reason)))
+                self._keep(Result(check, Outcome(verdict, reason)))
 
     def _keep(self, result: Result) -> None:
         self._results.append(result)
@@ -194,6 +220,7 @@ class ConformRun:
             unrestored=self._care.unrestored,
             duration_us=self._exchange.now_us - self._exchange.start_us,
             aborted=aborted,
+            absent=self._absent,
             doubt=other_device(self._device, subject.about) if subject else "",
         )
 

@@ -95,6 +95,7 @@ class Report:
         duration_us: of the run, in bus time.
         aborted: why it ended before its end; empty if it did not.
         doubt: why all of it may say nothing of the node; empty if it does.
+        absent: nothing was judged, as nobody, or more than one node, answers to the node-ID.
     """
 
     source: str
@@ -108,6 +109,7 @@ class Report:
     duration_us: int = 0
     aborted: str = ""
     doubt: str = ""
+    absent: bool = False
 
     def count(self, verdict: Verdict) -> int:
         """Return how many checks gave this verdict."""

@@ -8,6 +8,7 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.evidence import Evidence
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
+from tickrig.host.canopen.conform.bus.presence import Answers, Presence
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
 from tickrig.host.canopen.conform.verdict import Direction
@@ -31,7 +32,8 @@ PERIOD_TOLERANCE: Final = 0.05
 NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
 
-NODES: Final = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
+HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
+NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
 """CAN-IDs of the pre-defined connection set that belong to a node."""
 
 MULTIPLEXER: Final = slice(1, 4)
@@ -80,6 +82,7 @@ class Exchange:
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
         self._multiplexer, self.transfer = b"", (0, 0)
+        self._answers, self._others_by = Answers(), NODES
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -103,6 +106,15 @@ class Exchange:
         self._unread.clear()
         self.evidence, self.disturbances, self.crashes = Evidence(), {}, {}
         self._busy_us = self.now_us
+
+    @property
+    def presence(self) -> Presence:
+        """How many nodes have answered so far."""
+        return self._answers.presence
+
+    def end_listening(self) -> None:
+        """From now on the node may send anything anywhere: others are told by their heartbeat."""
+        self._others_by = HEARTBEATS
 
     def remark(self, text: str) -> None:
         """Add a line of our own to the evidence."""
@@ -129,6 +141,7 @@ class Exchange:
         self._allowance.use(self.now_us, frame)
         if frame.can_id == self._request:
             self._multiplexer = frame.data[MULTIPLEXER]
+            self._answers.count_request(frame.data)
         self._link.send((frame,))
 
     def expect(self, patterns: list[str], within_ms: int) -> str:
@@ -262,12 +275,13 @@ class Exchange:
         if own:
             if frame.can_id == self._response:
                 self._allowance.use(at_us, frame)
+                self._answers.count_response(frame.data)
             self.boots += text == self._boot_up
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
             if answered and frame.data[MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
             return
-        if not frame.extended and any(frame.can_id in ids for ids in NODES):
+        if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
             self.others.add(frame.can_id & NODE_ID_MASK)
         if can_id in self._reserved:
             self.disturb(f"somebody else sent {text}")

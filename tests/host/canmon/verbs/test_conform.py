@@ -82,7 +82,10 @@ def test_a_node_without_power_is_blocked_not_failed(tmp_path: Path) -> None:
     path.write_text(RIG.format(eds=EDS) + '[fault]\nboard = "power_off@50ms"\n')
     result = conform(str(path), "--node", "5", *NMT)
     assert result.exit_code == 4, result.output
-    assert "BLOCKED" in result.stdout
+    assert result.stderr == "Error: node 5 does not answer; heard here: nobody\n"
+    assert not result.stdout, "no wall of what was not judged"
+    said = json.loads(conform(str(path), "--node", "5", *NMT, "--json").stdout)
+    assert said["counts"]["blocked"] == 3
 
 
 def test_without_a_node_it_says_who_is_there(rig: str) -> None:
@@ -170,6 +173,8 @@ def test_an_eds_of_another_device_is_told_first(rig: str, tmp_path: Path) -> Non
         (("--node", "7"), "has no node 7; its nodes: 5"),
         (("--node", "5", "--eds", "nosuch.eds"), "--eds nosuch.eds: No such file"),
         (("--node", "5", "--only", "NTM"), "--only NTM: no such group or check; did you mean"),
+        (("--node", "5", "--only", "NMT-03"), "--only NMT-03 needs --communication"),
+        (("--node", "5", "--only", "UE", "--only", "LS"), "--only LS needs --intrusive"),
         (("--node", "5", "--allow", "600"), "--allow '600' is no index as 6200h"),
         (("--node", "5", "--html", "/nosuch/x.html"), "--html /nosuch/x.html: no directory"),
         (("--node", "5", "--badge", "/"), "--badge /: it is a directory"),

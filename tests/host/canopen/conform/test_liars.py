@@ -60,10 +60,51 @@ def judge(liar: Liar, *only: str, longest_s: float = LONGEST_S) -> Report:
     return report
 
 
+def late(r1: R1, late_us: int) -> Liar:
+    """Let what R1 sends be so much late."""
+    waiting, tick = list[tuple[int, Frames]](), r1.slave.tick
+
+    def lie(now_us: int, rx: Frames) -> Frames:
+        waiting.append((now_us + late_us, tick(now_us, rx)))
+        return waiting.pop(0)[1] if waiting[0][0] <= now_us else ()
+
+    return Liar(lie, busy=True)
+
+
+def settings(r1: R1) -> dict[tuple[int, int], bytes]:
+    """Return what the tester could have written: no history of errors."""
+    return {at: value for at, value in r1.values().items() if at[0] != 0x1003}
+
+
 def test_a_node_that_never_answers_blocks_all_at_once() -> None:
     report = judge(Liar(lambda now_us, rx: ()))
     assert {r.outcome.verdict for r in report.results} == {Verdict.BLOCKED}
     assert report.duration_us < 10_000_000
+    assert report.aborted == "node 5 does not answer; heard here: nobody"
+    assert report.absent
+
+
+def test_who_is_heard_is_named_where_nobody_answers() -> None:
+    def beat(now_us: int, rx: Frames) -> Frames:
+        return (data_frame(0x710, b"\x05"),) if now_us % 100_000 == 0 else ()
+
+    report = judge(Liar(beat, busy=True))
+    assert report.aborted == "node 5 does not answer; heard here: 16"
+
+
+@pytest.mark.parametrize("level", [Level.READ_ONLY, Level.INTRUSIVE])
+def test_two_nodes_of_one_id_are_told_and_neither_has_failed(level: Level) -> None:
+    first, second = R1(), R1()
+    wire = CanWire()
+    rig = Rig(Station(first.slave, wire.end()), Station(late(second, 2_000), wire.end()))
+    link = CanHost(rig, wire.end())
+    rig.run_for(2_000_000)
+    before = settings(first), settings(second)
+    report = ConformRun(link, 5, Plan(level, confirm=yes)).run()
+    assert {r.outcome.verdict for r in report.results} == {Verdict.INCONCLUSIVE}
+    assert report.aborted == "each request is answered twice: two nodes have ID 5?"
+    assert report.exit_status == 4
+    assert (settings(first), settings(second)) == before
 
 
 def test_a_node_that_answers_by_chance() -> None:
@@ -101,14 +142,7 @@ def test_a_node_whose_transfers_never_end(segments: bytes) -> None:
 
 @pytest.mark.parametrize("late_us", [200_000, 1_500_000])
 def test_a_node_that_answers_late(late_us: int) -> None:
-    r1, waiting = R1(), list[tuple[int, Frames]]()
-    tick = r1.slave.tick
-
-    def late(now_us: int, rx: Frames) -> Frames:
-        waiting.append((now_us + late_us, tick(now_us, rx)))
-        return waiting.pop(0)[1] if waiting[0][0] <= now_us else ()
-
-    judge(Liar(late, busy=True), "NMT", "UE", "US", longest_s=60)
+    judge(late(R1(), late_us), "NMT", "UE", "US", longest_s=60)
 
 
 def test_a_node_that_resets_by_itself() -> None:
@@ -147,6 +181,26 @@ def test_a_full_bus_accuses_nobody() -> None:
     report = r1.judge(plan, link=SpyLink(r1, fill))
     assert failing(report) == []
     assert report.settings["other nodes"].startswith("16, 17, 18")
+
+
+def test_a_pdo_of_the_node_on_another_can_id_is_no_other_node() -> None:
+    r1 = R1()
+    r1.slave.dictionary[0x1800, 1].value = 0x0000_01A2
+    r1.slave.dictionary[0x1800, 2].value = 255
+    r1.slave.dictionary[0x1800, 5].value = 10
+    report = r1.judge(Plan(Level.COMMUNICATION, ("NMT",)))
+    assert report.settings["other nodes"] == "none"
+
+
+def test_a_node_that_comes_late_is_told_by_its_heartbeat() -> None:
+    def beat(receives: int) -> None:
+        if r1.rig.now_us > 5_000_000:
+            other.send((data_frame(0x733, b"\x05"),))
+
+    r1 = R1()
+    other = CanHost(r1.rig, r1.wire.end())
+    report = r1.judge(Plan(Level.COMMUNICATION, ("NMT",)), link=SpyLink(r1, beat))
+    assert report.settings["other nodes"] == "51"
 
 
 def test_another_server_of_the_node_is_no_other_node() -> None:
