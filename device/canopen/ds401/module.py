@@ -106,6 +106,9 @@ class Ds401(Application):
         slot: its place in the tick.
         inputs: converters of the analogue inputs, from the first one on; plain counts without.
         outputs: those of the analogue outputs.
+
+    Attributes:
+        analogue_inputs: its analogue inputs.
     """
 
     def __init__(
@@ -120,10 +123,10 @@ class Ds401(Application):
         dictionary = node.dictionary
         self._digital_inputs = DigitalInputs(dictionary)
         self._digital_outputs = DigitalOutputs(dictionary)
-        self._analogue_inputs = _analogue_inputs(dictionary, inputs)
+        self.analogue_inputs = _analogue_inputs(dictionary, inputs)
         self._analogue_outputs = _analogue_outputs(dictionary, outputs)
         self._channels = {
-            entry.key: channel for channel in self._analogue_inputs for entry in channel.entries
+            entry.key: channel for channel in self.analogue_inputs for entry in channel.entries
         }
         self._source = InterruptSource(dictionary)
         self._digital_enable = dictionary.find(DIGITAL_INTERRUPT_ENABLE)
@@ -150,7 +153,7 @@ class Ds401(Application):
         """Judge what is an event from now on; look for faults anew."""
         self._faults.forget()
         self._fail(failed=False)
-        for channel in self._analogue_inputs:
+        for channel in self.analogue_inputs:
             channel.begin(self.inputs[channel.name])
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
@@ -198,7 +201,7 @@ class Ds401(Application):
 
     def _read_analogue(self) -> None:
         enabled = bool(number_of(self._analogue_enable, 1))
-        for channel in self._analogue_inputs:
+        for channel in self.analogue_inputs:
             if channel.update(self.inputs[channel.name], enabled=enabled):
                 self._source.note(channel.number)
                 self._cause_events(channel.entries)
@@ -221,7 +224,7 @@ class Ds401(Application):
 
     def _make_faults(self) -> FaultDetector:
         faults = [INTERNAL_FAILURE]
-        if self._analogue_inputs:
+        if self.analogue_inputs:
             faults.append(INPUT_OVERCURRENT)
         if self._digital_outputs.lines or self._analogue_outputs:
             faults.append(OUTPUT_OVERLOAD)
@@ -229,7 +232,7 @@ class Ds401(Application):
 
     def _has_physical_inputs(self) -> None:
         lines = digital_inputs(self._lines)
-        analogue = (channel.input for channel in self._analogue_inputs)
+        analogue = (channel.input for channel in self.analogue_inputs)
         faults = (fault.input for fault in self._faults.faults)
         self.has_inputs((*lines, *analogue, *faults), groups(self._lines))
 
@@ -237,7 +240,7 @@ class Ds401(Application):
         self.watch(self._digital_inputs.settings())
         self.watch(self._digital_outputs.objects())
         self.watch([self._analogue_enable] if self._analogue_enable is not None else [])
-        for channel in self._analogue_inputs:
+        for channel in self.analogue_inputs:
             self.watch(channel.objects())
         for output in self._analogue_outputs:
             self.watch(output.objects())

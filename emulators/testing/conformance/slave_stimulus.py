@@ -80,7 +80,7 @@ def _module(module: Ds401, words: tuple[str, ...]) -> str:
                     line = LINES * (number - 1) + bit + 1
                     module.inputs.set(f"di{line}", int(data, 16) >> bit & 1)
             case "input", "ai", number, (data,):
-                module.inputs.set(f"ai{number}", int(data))
+                _set_counts(module, number, int(data))
             case "output", "do", number, ():
                 return f"{int(module.read('do')) >> LINES * (number - 1) & 0xFF:02X}"
             case "output", "ao", number, ():
@@ -90,6 +90,19 @@ def _module(module: Ds401, words: tuple[str, ...]) -> str:
     except (ValueError, KeyError) as error:
         raise NotAllowed(f"{' '.join(words)}: {error}") from None
     return ""
+
+
+def _set_counts(module: Ds401, number: int, counts: int) -> None:
+    """Let an analogue input have what its converter turns into these counts."""
+    found = (each.channel for each in module.analogue_inputs if each.number == number)
+    channel = next(found, None)
+    if channel is None:
+        raise ValueError(f"there is no analogue input {number}")
+    converter = channel.converter
+    value = converter.quantity(counts) if converter else counts
+    if converter and converter.counts(value) != counts:
+        raise ValueError(f"the converter of {channel.name} has no step of {counts} counts")
+    module.inputs.set(channel.name, value)
 
 
 def _unknown(words: tuple[str, ...]) -> NotAllowed:

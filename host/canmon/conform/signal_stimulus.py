@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
+from collections.abc import Collection
+from typing import Final
 
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.control.client import ControlRefused
@@ -13,6 +16,12 @@ from tickrig.wire.errors import FieldError
 
 HEX = "hex:"
 """Begins the bytes of an octet string or a domain."""
+
+LINES: Final = 8
+"""`di1` is lines 1 to 8, `di2` those that follow."""
+CHANNEL: Final = re.compile(r"(di|do|ai)([1-9][0-9]{0,2})")
+INPUTS: Final = {"6000": "di", "6401": "ai"}
+"""Objects of CiA 401 that show what is at the inputs."""
 
 
 class SignalStimulus(ABC):
@@ -28,7 +37,9 @@ class SignalStimulus(ABC):
         try:
             return self._act(*words)
         except (ControlRefused, KeyError) as error:
-            raise NotAllowed(f"{' '.join(words)}: {one_line(str(error))}") from None
+            known = any(signal_name(word) in self.names() for word in words[1:2])
+            kind = Disturbed if known else NotAllowed
+            raise kind(f"{' '.join(words)}: {one_line(str(error))}") from None
         except (OSError, ValueError, FieldError) as error:
             text = getattr(error, "strerror", None) or str(error) or type(error).__name__
             raise Disturbed(f"{' '.join(words)}: {one_line(text)}") from None
@@ -36,11 +47,9 @@ class SignalStimulus(ABC):
     def _act(self, *words: str) -> str:
         match words:
             case ("input", name, value):
-                signal = signal_name(name)
-                self.set(signal, _value(value, self.unit(signal)))
+                self._input(name, value)
             case ("output", name):
-                signal = signal_name(name)
-                return _hex(self.get(signal), self.unit(signal))
+                return self._output(name)
             case ("emergency", code, *_):
                 self._set_emergency(int(code, 16))
             case ("emergency-clear", *_):
@@ -50,6 +59,45 @@ class SignalStimulus(ABC):
             case _:
                 raise NotAllowed(f"{' '.join(words)}: the device has nothing of the kind")
         return ""
+
+    def _input(self, name: str, value: str) -> None:
+        """Set an input; of a CiA 401 module eight lines or counts, as an object of it too."""
+        module = "di1" in self.names() or self._channels("ai1")
+        index, _, sub = name.partition(":")
+        if module and index in INPUTS:
+            data = int.from_bytes(bytes.fromhex(value), "little", signed=INPUTS[index] == "ai")
+            name = f"{INPUTS[index]}{int(sub, 16)}"
+            value = f"{data:02X}" if INPUTS[index] == "di" else f"{data}"
+        channel = CHANNEL.fullmatch(name) if module else None
+        if channel and channel[1] == "di":
+            self._set_lines(int(channel[2]), int(value, 16))
+        elif channel and name not in self.names() and (others := self._channels(name)):
+            unit = self.unit(others[0])
+            raise ValueError(f"{others[0]} takes {unit}, and its counts are not known here")
+        else:
+            signal = signal_name(name)
+            self.set(signal, _value(value, self.unit(signal)))
+
+    def _channels(self, name: str) -> list[str]:
+        """Return an analogue input that has a unit: `ai1_v` is `ai1`."""
+        return [each for each in self.names() if each.startswith(f"{name}_")]
+
+    def _set_lines(self, number: int, levels: int) -> None:
+        """Set eight lines; those that there are not can only be low."""
+        for bit in range(LINES):
+            line, level = f"di{LINES * (number - 1) + bit + 1}", levels >> bit & 1
+            if line in self.names():
+                self.set(line, level)
+            elif level:
+                raise NotAllowed(f"the device has no input {line}")
+
+    def _output(self, name: str) -> str:
+        channel = CHANNEL.fullmatch(name)
+        if channel and channel[1] == "do" and "do" in self.names():
+            levels = self.get("do")
+            return f"{int(levels) >> LINES * (int(channel[2]) - 1) & 0xFF:02X}"
+        signal = signal_name(name)
+        return _hex(self.get(signal), self.unit(signal))
 
     def _set_emergency(self, code: int) -> None:
         """Let an error come or go: there is one at a time."""
@@ -64,6 +112,10 @@ class SignalStimulus(ABC):
     @abstractmethod
     def get(self, name: str) -> Setting:
         """Return the value of a signal; ValueError if there is none."""
+
+    @abstractmethod
+    def names(self) -> Collection[str]:
+        """Return the names of all its signals."""
 
     @abstractmethod
     def unit(self, name: str) -> str:

@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final
 
@@ -132,6 +133,10 @@ class ControlStimulus(SignalStimulus):
         values: Any = self._request("get", names=[name])["values"]
         value: Setting = values[name]
         return value
+
+    def names(self) -> Collection[str]:
+        """Return the names that the emulator tells."""
+        return self._units.keys()
 
     def unit(self, name: str) -> str:
         """Return the unit that the emulator names."""

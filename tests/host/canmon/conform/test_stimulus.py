@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
@@ -45,21 +46,29 @@ class Board(SignalStimulus):
 
     def __init__(self) -> None:
         self.values: dict[str, Setting] = {
-            "0x6000:1": 0,
+            "0x2000:1": 0,
             "0x2007": "short",
             "di1": 0,
+            "di2": 0,
+            "ai1_v": 0,
+            "do": 0x5A,
             "emergency": 0,
         }
-        self.units = {"0x6000:1": "UNSIGNED16", "0x2007": "VISIBLE_STRING"}
+        self.units = {"0x2000:1": "UNSIGNED16", "0x2007": "VISIBLE_STRING", "ai1_v": "V"}
         self.on = True
 
     def set(self, name: str, value: Setting) -> None:
         if name not in self.values:
             raise ControlRefused(f"no input {name}")
+        if isinstance(value, str) != isinstance(self.values[name], str):
+            raise ControlRefused(f"{name} takes something else")
         self.values[name] = value
 
     def get(self, name: str) -> Setting:
         return self.values[name]
+
+    def names(self) -> Collection[str]:
+        return self.values.keys()
 
     def unit(self, name: str) -> str:
         return self.units.get(name, "")
@@ -70,12 +79,27 @@ class Board(SignalStimulus):
 
 def test_objects_are_set_and_read_as_they_go_over_the_bus() -> None:
     board = Board()
-    board("input", "6000:01", "3412")
-    assert board.values["0x6000:1"] == 0x1234
-    assert board("output", "6000:01") == "3412"
+    board("input", "2000:01", "3412")
+    assert board.values["0x2000:1"] == 0x1234
+    assert board("output", "2000:01") == "3412"
     assert board("output", "2007:00") == b"short".hex().upper()
-    board("input", "di1", "1")
-    assert board("output", "di1") == "1"
+
+
+def test_lines_of_a_module_are_set_eight_at_once() -> None:
+    board = Board()
+    board("input", "di1", "03")
+    assert (board.values["di1"], board.values["di2"]) == (1, 1)
+    board("input", "6000:01", "02")
+    assert (board.values["di1"], board.values["di2"]) == (0, 1)
+    with pytest.raises(NotAllowed, match="the device has no input di3"):
+        board("input", "di1", "0F")
+    assert board("output", "do1") == "5A"
+
+
+@pytest.mark.parametrize("words", [("input", "ai1", "1000"), ("input", "6401:01", "E803")])
+def test_counts_of_an_input_with_a_unit_are_inconclusive(words: tuple[str, ...]) -> None:
+    with pytest.raises(Disturbed, match="ai1_v takes V, and its counts are not known here"):
+        Board()(*words)
 
 
 def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
@@ -96,6 +120,7 @@ def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
     "words",
     [
         ("input", "7000:01", "01"),
+        ("input", "ai2", "1000"),
         ("output", "nosuch"),
         ("power", "half"),
         ("node-id", "FF"),
@@ -109,6 +134,8 @@ def test_what_a_device_has_not_is_not_applicable(words: tuple[str, ...]) -> None
 def test_what_a_device_does_not_do_disturbs_the_check() -> None:
     with pytest.raises(Disturbed, match="input 6000:01 x"):
         Board()("input", "6000:01", "x")
+    with pytest.raises(Disturbed, match="do takes something else"):
+        Board()("input", "do", "high")
 
 
 def test_a_command_says_that_it_has_no_such_input(tmp_path: Path) -> None:
