@@ -120,6 +120,7 @@ class Conformance:
                 on_result=progress.take,
             )
             source.watch(run.disturb)
+            progress.begin(node_id)
             judged.append(run.run())
         progress.end()
         return _completed(judged[0], source, eds) if judged else None

@@ -83,6 +83,11 @@ class Progress:
     def __init__(self, *, shown: bool) -> None:
         self._shown, self._judged, self._failed = shown, 0, 0
 
+    def begin(self, node_id: int) -> None:
+        """Say what lasts before the first result."""
+        if self._shown:
+            click.echo(f"\r\x1b[Knode {node_id} is read", nl=False, err=True)
+
     def take(self, result: Result) -> None:
         """Count a result."""
         self._judged += 1
@@ -94,5 +99,5 @@ class Progress:
 
     def end(self) -> None:
         """Clear the line."""
-        if self._shown and self._judged:
+        if self._shown:
             click.echo("\r\x1b[K", nl=False, err=True)

@@ -26,6 +26,10 @@ SLICE_US: Final = 20_000
 HOST_GAP_US: Final = 10_000
 """By so much a wait, or what is between two waits, may last too long before the host is late."""
 
+HELD_US: Final = 20_000
+"""A frame that is sent so much later than its check wants it may change what the node does."""
+TOO_LOW: Final = "your --max-load is too low for this check"
+
 PERIOD_TOLERANCE: Final = 0.05
 """By this share may the mean of periods be off: CiA 301 says nothing; crystals are far better."""
 
@@ -102,6 +106,7 @@ class Exchange:
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
+        within_us = round(within_us * self._allowance.slowness)
         self.deadline_us, self._watched = self.now_us + within_us, watched
         self._unread.clear()
         self.evidence, self.disturbances, self.crashes = Evidence(), {}, {}
@@ -136,7 +141,10 @@ class Exchange:
         """Send a frame, when the load allows it; NotAllowed if the level does not."""
         self._permit(frame)
         self._listen(self.now_us)
-        self._listen_until(self.now_us + self._allowance.wait_us(self.now_us))
+        held_us = self._allowance.wait_us(self.now_us)
+        self._listen_until(self.now_us + held_us)
+        if held_us > HELD_US and self._allowance.slowness > 1:
+            self.disturb(TOO_LOW)
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
         if frame.can_id == self._request:

@@ -16,6 +16,9 @@ WINDOW_US: Final = 100_000
 LONGEST_WAIT_US: Final = 1_000_000
 """A node that floods the bus with answers does not keep the tester from sending."""
 
+PLENTY_BIT_S: Final = 12_500
+"""With less for the tester, in bit/s, all takes longer: so may a check."""
+
 FOREIGN_LOAD: Final = 0.5
 """With more of it by other nodes, a late or missing answer says nothing of the node."""
 
@@ -26,12 +29,16 @@ class Allowance:
     Args:
         bit_rate: of the bus in bit/s.
         max_load: share of it, above 0 to 1.
+
+    Attributes:
+        slowness: so many times as long as usual may all take.
     """
 
     def __init__(self, bit_rate: int, max_load: float) -> None:
         self._bits_us = bit_rate * max_load / 1e6
         self._most = self._left = self._bits_us * WINDOW_US
         self._at_us = 0
+        self.slowness = max(1.0, PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
         """Count a frame of the tester, or an answer to one."""

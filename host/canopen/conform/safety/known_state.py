@@ -25,6 +25,9 @@ QUIET: Final = (
 )
 """Objects that are 0 when a check begins: no SYNC, guarding or heartbeat by itself."""
 CONSUMERS: Final = 0x1016
+TEXTS: Final = range(0x1008, 0x100B)
+NUMBERS: Final = range(9)
+"""So many bytes are a number, not a text."""
 
 
 class KnownState:
@@ -37,6 +40,7 @@ class KnownState:
     Attributes:
         original: what objects held before the run.
         changed: what the check under way may have changed.
+        written: what checks wrote, or tried to, in this run.
         unrestored: what could not be written back, one a line.
     """
 
@@ -45,6 +49,7 @@ class KnownState:
         self.original: Values = {}
         self._begin: Values = {}
         self.changed: frozenset[Address] = frozenset()
+        self.written: set[Address] = set()
         self.unrestored: dict[str, None] = {}
 
     def learn(self, addresses: Iterable[Address]) -> None:
@@ -76,14 +81,19 @@ class KnownState:
     def restore(self) -> None:
         """Bring all objects into the state before the run, and tell what could not be."""
         for at in self._write_back(self.original, self.original):
-            value = self.original[at].hex().upper()
-            self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value}"] = None
+            self.unrestored[self._was(at)] = None
 
     def give_up(self) -> None:
-        """Tell all that is not as it was, as far as anybody knows: the node is gone."""
+        """Tell what was written and may not be as it was: the node is gone."""
         for at, value in self.original.items():
-            if self._begin[at] != value or at in self.changed:
-                self.unrestored[f"{at[0]:04X}h:{at[1]:02X} was {value.hex().upper()}"] = None
+            if at in self.written and (self._begin[at] != value or at in self.changed):
+                self.unrestored[f"{self._was(at)}; not verified: the node was lost"] = None
+
+    def _was(self, at: Address) -> str:
+        value = self.original[at]
+        text = value.decode("latin-1")
+        is_text = at[0] in TEXTS or (len(value) not in NUMBERS and text.isprintable())
+        return f"{at[0]:04X}h:{at[1]:02X} was {repr(text) if is_text else value.hex().upper()}"
 
     def _write_back(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
         """Write what differs; return what differs still."""
@@ -91,6 +101,7 @@ class KnownState:
         if not wrong:
             return []
         for at, value in in_order({at: target[at] for at in wrong}, self._number):
+            self.written.add(at)
             try:
                 self._client.download(*at, value)
             except (SdoAborted, NotAllowed):

@@ -101,6 +101,7 @@ class NodeCare:
         self._stored = self._stored or bool(STORAGE & {index for index, _ in bound.changed})
         try:
             self._state.learn(bound.written)
+            self._state.written |= bound.written
             self._state.changed = frozenset(self._state.original) if bound.resets else bound.written
         except (SdoFailed, StepFailed):
             self._recover()

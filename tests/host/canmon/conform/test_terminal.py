@@ -39,6 +39,7 @@ def test_no_begins_nothing() -> None:
 def test_yes_begins_and_shows_how_far_it_is() -> None:
     child = at_terminal()
     child.sendline("y")
+    child.expect_exact("node 5 is read")
     child.expect_exact("1 check, 0 failures: NMT-03")
     child.expect_exact("Error: node 5 does not answer; heard here: nobody")
     child.expect(pexpect.EOF)

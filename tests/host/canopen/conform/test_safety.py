@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
@@ -10,11 +11,16 @@ from tests.device.canopen.actions import SlaveActions
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.safety.known_state import KnownState
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.canopen.nmt import NmtState
+
+if TYPE_CHECKING:
+    from tickrig.host.canopen.conform.bus.exchange import Exchange
+    from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 
 HEARTBEAT = (0x1017, 0)
 
@@ -130,7 +136,7 @@ def test_a_second_ctrl_c_leaves_the_node_and_tells_it() -> None:
     r1 = configured()
     report = r1.judge(Plan(Level.COMMUNICATION, ("PC",)), link=SpyLink(r1, act))
     assert report.aborted == "interrupted"
-    assert "1017h:00 was E803" in report.unrestored
+    assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
 
 
 def test_an_error_of_whoever_is_told_leaves_the_node_as_it_was() -> None:
@@ -158,7 +164,35 @@ def test_a_node_that_is_lost_blocks_the_rest_at_once() -> None:
     assert verdicts["PC-06"] is verdicts["PC-29"] is Verdict.BLOCKED
     assert r1.rig.now_us - times[0] < 30_000_000
     assert failing(report) == []
-    assert "1017h:00 was E803" in report.unrestored
+    assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
+
+
+def test_of_a_lost_node_only_what_was_written_is_told() -> None:
+    def pull_the_plug(receives: int) -> None:
+        if link.sent and str(link.sent[-1]).startswith("000#81"):
+            r1.power(on=False)
+
+    r1 = configured()
+    link = SpyLink(r1, pull_the_plug)
+    report = r1.judge(Plan(Level.INTRUSIVE, ("NMT",), confirm=yes), link=link)
+    assert report.count(Verdict.BLOCKED)
+    assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
+    untouched = ("1014h", "1029h", "2003h")
+    assert not [line for line in report.unrestored if line.startswith(untouched)]
+
+
+def test_a_text_that_was_lost_is_told_as_text() -> None:
+    state = KnownState(cast("Exchange", None), cast("SdoClient", None))
+    values = {(0x1008, 0): b"reference", (0x2005, 0): b"a longer text", (0x1014, 0): b"abcd"}
+    state.original.update(values)
+    state._begin.update(dict.fromkeys(values, b""))
+    state.written |= values.keys() | {(0x2001, 0)}
+    state.give_up()
+    assert [line.partition(";")[0] for line in state.unrestored] == [
+        "1008h:00 was 'reference'",
+        "2005h:00 was 'a longer text'",
+        "1014h:00 was 61626364",
+    ]
 
 
 def test_a_node_that_comes_back_is_restored_then() -> None:
@@ -213,3 +247,33 @@ def test_the_bus_is_not_loaded_more_than_allowed() -> None:
     report = r1.judge(plan, link=link)
     sent_us = sum(frame_bits(frame) for frame in link.sent) * 8
     assert 0.05 < sent_us / report.duration_us < 0.3
+
+
+@pytest.mark.parametrize("level", [Level.READ_ONLY, Level.COMMUNICATION])
+def test_a_load_that_is_too_low_accuses_nobody_and_blocks_nothing(level: Level) -> None:
+    plan = Plan(level, ("NMT", "HB", "UE", "US"), bit_rate=125_000, max_load=0.01, confirm=yes)
+    report = R1().judge(plan)
+    assert failing(report) == []
+    assert report.count(Verdict.BLOCKED) == 0
+    assert report.count(Verdict.PASS) > 3
+    doubted = [r.outcome for r in report.results if r.outcome.verdict is Verdict.INCONCLUSIVE]
+    assert all("your --max-load is too low for this check" in one.reason for one in doubted)
+    assert report.unrestored == ()
+
+
+class DeafLink(SpyLink):
+    """A link that loses what starts the node."""
+
+    def send(self, traffic: Frames, /) -> None:
+        super().send(tuple(frame for frame in traffic if str(frame)[:6] != "000#01"))
+
+
+@pytest.mark.parametrize(
+    ("max_load", "verdict"), [(0.3, Verdict.FAIL), (0.01, Verdict.INCONCLUSIVE)]
+)
+def test_a_failure_with_too_low_a_load_is_none(max_load: float, verdict: Verdict) -> None:
+    r1 = R1()
+    plan = Plan(Level.COMMUNICATION, ("NMT-03",), bit_rate=125_000, max_load=max_load)
+    outcome = r1.judge(plan, link=DeafLink(r1)).results[0].outcome
+    assert outcome.verdict is verdict
+    assert ("your --max-load is too low for this check" in outcome.reason) == (max_load < 0.1)
