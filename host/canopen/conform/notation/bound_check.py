@@ -152,7 +152,7 @@ def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
 
 
 def _used(step: Mapping[str, Any]) -> Iterator[Address]:
-    yield from (step[key] for key in ("write", "keep", "read") if key in step)
+    yield from (step[key] for key in ("write", "read") if key in step)
     if "macro" in step:
         yield from (word for word in step["macro"] if isinstance(word, tuple) and word[1])
         yield from written_by(*step["macro"])

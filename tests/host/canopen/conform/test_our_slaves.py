@@ -21,7 +21,7 @@ MODELS = ("f-palette", "motor-core-unit", "epos")
 PROFILE = frozenset(range(0x6000, 0xA000))
 ALL = Plan(Level.INTRUSIVE, confirm=yes)
 MUST_PASS = {
-    "f-palette": {"PR-01", "PR-11", *(f"IO-{number:02}" for number in (*range(2, 8), 15))},
+    "f-palette": {"PR-01", "PR-11", *(f"IO-{number:02}" for number in (*range(2, 13), 15))},
     "epos": {"D4-11", "D4-13"},
 }
 """Checks of models that are not applicable without a hand, or without leave to write."""
