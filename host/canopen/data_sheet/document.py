@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
@@ -91,12 +91,23 @@ class Document:
         kept = () if self.file.is_xml else edits
         return RuleFinding(RULES[rule], self.name, number, shorten(section), text, kept)
 
-    def changes(self, edits: Iterable[Edit]) -> bool:
-        """Return whether edits would leave another file."""
-        return any(
+    def changes(self, edits: Sequence[Edit]) -> bool:
+        """Return whether edits would leave another file, in letters that its encoding has."""
+        added = "".join(text for edit in edits for text in edit.lines)
+        return self._can_hold(added) and any(
             place is not Place.REPLACE or lines != (self.texts[line - 1],)
             for line, place, lines in edits
         )
+
+    def _can_hold(self, text: str) -> bool:
+        """Return whether a text can be written; of a byte without a letter, nobody knows it."""
+        if self.encoding.startswith("utf-16"):
+            return True
+        try:
+            text.encode(self.encoding, "surrogateescape")
+        except UnicodeEncodeError:
+            return False
+        return True
 
     def with_value(self, line: EdsLine, value: str) -> Edit:
         """Return the edit that gives a keyword another value; blanks and comment stay."""

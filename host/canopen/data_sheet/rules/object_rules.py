@@ -126,6 +126,11 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
         return ()
     index, _ = place
     rows = [row for (at, _), row in sorted(document.rows.items()) if at == index]
+    told = set(document.subs(index))
+    try:
+        texts = [text for row in rows if row.sub not in told for text in _section_of(row)]
+    except ValueError:  # a name with control characters, which are mended first
+        return ()
     edits = [
         Edit(line.number)
         for key in (*OF_ELEMENTS, "SubNumber")
@@ -139,7 +144,5 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     count = document.keyword(section, "CompactSubObj")
     if count is not None:
         edits.append(Edit(count.number, lines=(f"SubNumber={len(rows)}",)))
-    told = set(document.subs(index))
-    texts = [text for row in rows if row.sub not in told for text in _section_of(row)]
     after = document.add_to(section, texts)
     return (*edits, Edit(after.line, Place.AFTER, after.lines))

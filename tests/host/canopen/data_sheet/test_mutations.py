@@ -30,6 +30,19 @@ def test_the_files_of_a_seed_are_judged_alike_by_several_processes() -> None:
     assert told[0].startswith("seed 1: 120 files, {")
 
 
+def test_a_compact_object_with_a_name_that_cannot_be_written_is_judged() -> None:
+    assert judge("a.eds", SMALL.replace("=map\n", "=m\x18ap\n").encode()) == "left"
+
+
+def test_a_byte_without_a_letter_is_not_written_into_another_section() -> None:
+    data = (
+        SMALL.encode()
+        .replace(b"=map\n", b"=m\x81ap\n")
+        .replace(b"HighLimit=5", b"HighLimit=5UL\x81")
+    )
+    assert judge("a.eds", data) == "left"
+
+
 def test_noise_is_no_eds() -> None:
     chance = Random(0)
     for size in (0, 1, 2, 3, 10, 1_000, 20_000):
