@@ -17,29 +17,41 @@ from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.show import entries, head, pdos
 from tickrig.wire.canopen.eds.eds_file import EdsError
 
-SMALL: Final = (
+HEAD: Final = (
     "[FileInfo]\nFileName=s.eds\n[DeviceInfo]\nVendorName=x\nBaudRate_125=1\nNrOfRXPDO=1\n"
     "[Comments]\nLines=1\nLine1=MaxBytes of 2001 is 64\n"
-    "[MandatoryObjects]\nSupportedObjects=3\n1=0x1000\n2=0x1001\n3=0x1018\n"
-    "[OptionalObjects]\nSupportedObjects=2\n1=0x1400\n2=0x1600\n"
-    "[ManufacturerObjects]\nSupportedObjects=3\n1=0x2000\n2=0x2001\n3=0x2002\n"
+)
+IDENTITY: Final = (
     "[1000]\nParameterName=Device type\nDataType=0x0007\nAccessType=ro\nDefaultValue=0x191\n"
     "[1001]\nParameterName=Error\nDataType=5\nAccessType=ro\nPDOMapping=1\n"
     "[1018]\nParameterName=Identity\nObjectType=9\nSubNumber=2\n"
     "[1018sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=1\n"
     "[1018sub1]\nParameterName=vendor\nDataType=7\nAccessType=ro\nDefaultValue=0x7\n"
+)
+PDO: Final = (
     "[1400]\nParameterName=RPDO\nObjectType=9\nSubNumber=3\n"
     "[1400sub0]\nParameterName=n\nDataType=5\nAccessType=ro\nDefaultValue=2\n"
     "[1400sub1]\nParameterName=id\nDataType=7\nAccessType=rw\nDefaultValue=$NODEID+0x200\n"
     "[1400sub2]\nParameterName=type\nDataType=5\nAccessType=rw\nDefaultValue=255\n"
     "[1600]\nParameterName=map\nObjectType=9\nDataType=7\nAccessType=rw\nCompactSubObj=8\n"
     "[1600Value]\nNrOfEntries=1\n1=0x20000010\n"
+)
+OWN: Final = (
     "[2000]\nParameterName=speed\nDataType=3\nAccessType=rww\nPDOMapping=1\nLowLimit=-5\n"
     "HighLimit=5\n[2001]\nParameterName=text\nDataType=9\nAccessType=rw\nDefaultValue=abc\n"
     "[2002]\nParameterName=real\nObjectType=8\nDataType=8\nAccessType=rw\nCompactSubObj=3\n"
     "[2002Name]\nNrOfEntries=1\n2=second\n"
 )
-SMALL_ONES: Final = (*([SMALL.encode()] * 4), XDD.encode())
+LISTS: Final = (
+    "[MandatoryObjects]\nSupportedObjects=3\n1=0x1000\n2=0x1001\n3=0x1018\n",
+    "[OptionalObjects]\nSupportedObjects=2\n1=0x1400\n2=0x1600\n",
+    "[ManufacturerObjects]\nSupportedObjects=3\n1=0x2000\n2=0x2001\n3=0x2002\n",
+)
+PARTS: Final = (LISTS[0] + IDENTITY, LISTS[1] + PDO, LISTS[2] + OWN)
+SMALL: Final = HEAD + "".join((*LISTS, IDENTITY, PDO, OWN))
+SMALL_ONES: Final = tuple(
+    text.encode() for text in (SMALL, XDD, *PARTS, *PARTS, PARTS[0] + PARTS[2], HEAD)
+)
 LARGE: Final = (
     (ROOT / "examples" / "io_module.eds").read_bytes(),
     *(each.data for each in CORPUS[::7]),
@@ -75,7 +87,7 @@ _TITLE: Final = re.compile(r"\[[^\]\n]*\]|<[A-Za-z:]+")
 
 def mutated(chance: Random) -> tuple[str, bytes]:
     """Return a file with a few things done to it, and its name."""
-    data = chance.choice(LARGE if chance.random() < 0.02 else SMALL_ONES)
+    data = chance.choice(LARGE if chance.random() < 0.004 else SMALL_ONES)
     text = data.decode("utf-8", "replace")
     for _ in range(chance.choice([1, 1, 2, 3, 8])):
         change = chance.choice([_piece, _line, _value, _value, _key, _title, _section])
