@@ -23,8 +23,14 @@ from tickrig.wire.canopen.sdo.sdo import (
 from tickrig.wire.canopen.sdo.sdo_command import EXPEDITED_BYTES, SEGMENT_BYTES
 
 
-def upload(index: int, sub: int) -> Script[bytes]:
+def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
     """Read an object.
+
+    Args:
+        index: of the object.
+        sub: its sub-index.
+        size: of the object in bytes, 0 if nobody knows: so many are taken of an expedited answer
+            that does not say how many of its four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
         SdoAborted: the device refuses, or answers something else.
@@ -34,7 +40,7 @@ def upload(index: int, sub: int) -> Script[bytes]:
     match answer:
         case UploadInitiateResponse():
             if answer.data is not None:
-                return answer.data
+                return answer.data if answer.size or not size else answer.data[:size]
             return (yield from _upload_segments(index, sub))
     return (yield from _fail(index, sub, answer))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
-from tickrig.host.canopen.conform.binding.script_runner import ScriptRunner
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.wire.canopen.eds.eds_file import EdsFile
@@ -72,7 +72,7 @@ class Features:
     findings: tuple[str, ...] = ()
 
 
-def find_features(binding: Binding, runner: ScriptRunner, file: EdsFile | None = None) -> Features:
+def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = None) -> Features:
     """Find out what a node can do; the node is only read.
 
     Whether it has LSS can only be said by its EDS: to try it would change the state of all
@@ -80,7 +80,7 @@ def find_features(binding: Binding, runner: ScriptRunner, file: EdsFile | None =
 
     Args:
         binding: its objects.
-        runner: reads it.
+        client: reads it.
         file: its EDS.
     """
     info = file.sections.get("DeviceInfo", {}) if file else {}
@@ -96,16 +96,16 @@ def find_features(binding: Binding, runner: ScriptRunner, file: EdsFile | None =
         )
     if not _number(info.get("lss_supported", "")):
         reasons |= dict.fromkeys(LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
-    if not has_block_upload(runner):
+    if not has_block_upload(client):
         reasons["block"] = "it refuses a block upload of 1000h"
     words = {*OF_OBJECTS, *PROFILES, *LSS, "dummy", "block"} - reasons.keys()
     return Features(frozenset(words), reasons, tuple(findings))
 
 
-def has_block_upload(runner: ScriptRunner) -> bool:
+def has_block_upload(client: SdoClient) -> bool:
     """Return whether a node begins a block upload of 1000h, which is then aborted."""
     with suppress(SdoTimeout):
-        return runner.run(_try_block_upload())
+        return client.run(_try_block_upload())
     return False
 
 

@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
-from tickrig.host.canopen.conform.binding.script_runner import ScriptRunner
+from collections.abc import Callable
+from typing import TypeVar
+
 from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.canopen.sdo_transfer import download
-from tickrig.host.links.link import StampedFrames
-from tickrig.wire.can import Frames, data_frame
+from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+
+T = TypeVar("T")
+
+SizeOf = Callable[[int, int], int]
+"""Tells the bytes of an object by index and sub-index, 0 where nobody knows."""
 
 
-class SdoClient(ScriptRunner):
-    """The client of the default SDO server of a node.
+class SdoClient:
+    """The client of the default SDO server of a node, which does nothing else meanwhile.
+
+    Frames that are no answers of the node are passed over.
 
     Args:
         exchange: the bus.
         node_id: of the node, 1..127.
+
+    Attributes:
+        size_of: so many bytes are taken of what the node sends without saying how many.
     """
 
     def __init__(self, exchange: Exchange, node_id: int) -> None:
-        super().__init__(ExchangeLink(exchange), node_id)
-        self._exchange, self._request = exchange, REQUEST_COB_ID + node_id
+        self._exchange, self._node_id = exchange, node_id
+        self.size_of: SizeOf = lambda index, sub: 0
+
+    def upload(self, index: int, sub: int) -> bytes:
+        """Read an object.
+
+        Raises:
+            SdoAborted: the node refuses.
+            SdoTimeout: it does not answer.
+            LinkClosed: the bus is gone.
+        """
+        return self.run(upload(index, sub, self.size_of(index, sub)))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write an object; raises as `upload`."""
@@ -39,32 +61,22 @@ class SdoClient(ScriptRunner):
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
         frame = Abort(*self._exchange.transfer, AbortCode.GENERAL).encode()
-        self._exchange.send(data_frame(self._request, frame))
+        self._send(REQUEST_COB_ID + self._node_id, frame)
 
+    def run(self, script: Script[T]) -> T:
+        """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
+        ended: list[T | Exception] = []
+        talk = Dialogue(self._node_id, self._send)
+        talk.start(self._exchange.now_us, QueuedScript("", script, ended.append, ended.append))
+        while not ended:
+            now_us, frames = self._exchange.listen(talk.due_us)
+            for _, frame in frames:
+                if frame[:1] + frame[2:4] == (RESPONSE_COB_ID + self._node_id, False, False):
+                    talk.receive_sdo(now_us, frame.data)
+            talk.tick(now_us)
+        if isinstance(ended[0], Exception):
+            raise ended[0]
+        return ended[0]
 
-class ExchangeLink:
-    """The exchange as a `StampedLink`, with its limits, for who talks beside the checks."""
-
-    def __init__(self, exchange: Exchange) -> None:
-        self._exchange = exchange
-
-    @property
-    def now_us(self) -> int:
-        """Bus time."""
-        return self._exchange.now_us
-
-    def send(self, traffic: Frames, /) -> None:
-        """Send, when load and level allow it."""
-        for frame in traffic:
-            self._exchange.send(frame)
-
-    def receive(self, timeout_us: int, /) -> Frames:
-        """Return what arrives first."""
-        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
-
-    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Return what arrives first, with its time."""
-        return self._exchange.listen(self.now_us + timeout_us)
-
-    def close(self) -> None:
-        """Leave the bus open: it is not ours."""
+    def _send(self, can_id: int, data: bytes) -> None:
+        self._exchange.send(data_frame(can_id, data))

@@ -62,7 +62,7 @@ class SdoFrames:
         size = len(data) // 2
         self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         if 1 <= size <= EXPEDITED_BYTES:
-            self.answer(f"{_sized(UPLOADED, size):02X}{multiplexer(at)}{data:.<8}")
+            self.answer(f"{_uploaded(size)}{multiplexer(at)}{data:.<8}")
             return
         self.answer(f"41{multiplexer(at)}{size.to_bytes(4, 'little').hex().upper()}")
         for number, start in enumerate(range(0, max(1, size), SEGMENT_BYTES)):
@@ -80,7 +80,7 @@ class SdoFrames:
     def read_data(self, at: Address, size: int) -> bytes:
         """Read an object of 1 to 4 bytes, whatever it holds."""
         self.say(bytes([UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
-        return self.answer(f"{_sized(UPLOADED, size):02X}{multiplexer(at)}........")[4 : 4 + size]
+        return self.answer(f"{_uploaded(size)}{multiplexer(at)}........")[4 : 4 + size]
 
     def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
         """Read an object; StepFailed unless it is refused with one of the codes."""
@@ -122,6 +122,11 @@ def aborts(at: Address, codes: Sequence[str]) -> list[str]:
     """
     mux = multiplexer(at)
     return [f"{ABORTED:02X}{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
+
+
+def _uploaded(size: int) -> str:
+    """Return a pattern: a server may leave out how many bytes are data (CiA 301, 7.2.4.3.5)."""
+    return f"4[2{_sized(UPLOADED, size) & 0xF:X}]"
 
 
 def _sized(command: int, size: int) -> int:

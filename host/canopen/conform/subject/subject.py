@@ -8,12 +8,13 @@ from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, bind
 from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient, SizeOf
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
 from tickrig.host.canopen.conform.subject.node_names import NodeNames
+from tickrig.host.canopen.data_sheet.rules.standard_objects import standard_object
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
@@ -72,10 +73,23 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     Raises:
         SdoTimeout: it does not answer.
     """
+    client.size_of = _standard_size if device is None else _sizes(device)
     binding = bind(device, client.upload, allow=plan.allow)
     features = find_features(binding, client, eds)
     names = NodeNames(node_id, binding, client.number, others)
     return Subject(binding, features, names, dict(_about(client)))
+
+
+def _sizes(device: EdsDevice) -> SizeOf:
+    """Take the sizes of the EDS; those of texts from their defaults."""
+    sizes = {(entry.index, entry.sub): len(entry.default) for entry in device.entries}
+    return lambda index, sub: sizes.get((index, sub), 0)
+
+
+def _standard_size(index: int, sub: int) -> int:
+    known = standard_object(index)
+    kind = known and known.types.get(sub, known.others)
+    return kind.size if kind else 0
 
 
 def _about(client: SdoClient) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,8 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
-from tickrig.host.canopen.conform.binding.script_runner import ScriptRunner
+from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 
 NODE_ID = 5
 
@@ -25,11 +26,14 @@ class Bench:
     link: CanHost
 
     @property
-    def runner(self) -> ScriptRunner:
-        return ScriptRunner(self.link, NODE_ID)
+    def client(self) -> SdoClient:
+        exchange = Exchange(
+            self.link, NODE_ID, bit_rate=1_000_000, max_load=1, permit=lambda frame: None
+        )
+        return SdoClient(exchange, NODE_ID)
 
     def upload(self, index: int, sub: int) -> bytes:
-        return self.runner.upload(index, sub)
+        return self.client.upload(index, sub)
 
 
 def make_bench(dictionary: Dictionary) -> Bench:

@@ -29,7 +29,7 @@ OF_R1 = {*WITHOUT_EDS, "dummy", "bits", "lss", "lssident", "unconfigured"}
 
 def features(bench: Bench, file: EdsFile | None) -> Features:
     binding = bind(read_device(file) if file else None, bench.upload)
-    return find_features(binding, bench.runner, file)
+    return find_features(binding, bench.client, file)
 
 
 def test_r1_has_all_but_what_it_has_no_objects_for() -> None:
@@ -68,7 +68,7 @@ def test_lss_without_an_address_is_a_finding() -> None:
     bare = [entry for entry in make_dictionary() if (entry.index, entry.sub) != (0x1018, 4)]
     bench = make_bench(Dictionary(entry.description for entry in bare))
     device = EdsDevice(DeviceInfo(), tuple(entry.description for entry in bare), {})
-    found = find_features(bind(device, bench.upload), bench.runner, open_eds(R1))
+    found = find_features(bind(device, bench.upload), bench.client, open_eds(R1))
     assert found.reasons["lss"] == "1018h has not the four numbers of an LSS address"
     assert found.findings == (
         "the EDS says that it has LSS, and 1018h has not the numbers of its address",

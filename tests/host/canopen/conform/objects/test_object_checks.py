@@ -55,7 +55,7 @@ def play(bench: Bench, check: Check) -> None:
             key: resolve_address(str(value), NoNames()) if key in OBJECT_STEPS else value
             for key, value in step.items()
         }
-        if not play_object_step(bench.runner, bound):
+        if not play_object_step(bench.client, bound):
             play_refusal(bench, bound)
 
 
@@ -65,7 +65,7 @@ def play_refusal(bench: Bench, step: Step) -> None:
             case {"refuse read": (index, sub)}:
                 bench.upload(index, sub)
             case {"refuse write": (index, sub), "data": data}:
-                bench.runner.download(index, sub, bytes.fromhex(data))
+                bench.client.download(index, sub, bytes.fromhex(data))
     except SdoAborted as error:
         if f"{error.code:08X}" not in step["codes"]:
             raise StepFailed(str(error)) from error
