@@ -9,6 +9,7 @@ from typing import Any, Final
 from tests.device.canopen.actions import SlaveActions
 from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
+from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Ds401
@@ -22,6 +23,7 @@ from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.errors import WireError
 
 EDS: Final = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 
@@ -40,7 +42,7 @@ class Stimulus:
     def __call__(self, verb: str, *words: str) -> str:
         try:
             return self._act(verb, *words)
-        except (AssertionError, StopIteration) as error:
+        except (AssertionError, StopIteration, KeyError, SdoAbort, WireError) as error:
             raise ValueError(str(error)) from error
 
     def _act(self, verb: str, *words: str) -> str:
