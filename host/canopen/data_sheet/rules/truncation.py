@@ -9,6 +9,7 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.host.canopen.data_sheet.rules.list_rules import LISTS, ObjectList, described
+from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import object_section
 
 SIGNS: Final = 2
@@ -25,7 +26,7 @@ def truncated(document: Document) -> Iterator[RuleFinding]:
     signs = len(lost) + (document.texts[-1] != "") + _is_short(document, last)
     if signs >= SIGNS and (lost or _is_short(document, last)):
         rest = f"; {lost[0]:04X}h and {len(lost) - 1} more are listed" if lost else ""
-        what = f"the file looks truncated: it ends in [{last}]{rest}"
+        what = f"the file looks truncated: it ends in [{shorten(last)}]{rest}"
         yield document.found("truncated", what, "", lines[-1].number)
 
 

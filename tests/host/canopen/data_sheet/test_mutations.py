@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from tests.host.canopen.data_sheet.corpus import ROOT
-from tests.host.canopen.data_sheet.mutations import SMALL, judge, mutated
+from tests.host.canopen.data_sheet.mutations import PARTS, SMALL, judge, mutated
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -41,6 +41,11 @@ def test_a_byte_without_a_letter_is_not_written_into_another_section() -> None:
         .replace(b"HighLimit=5", b"HighLimit=5UL\x81")
     )
     assert judge("a.eds", data) == "left"
+
+
+def test_a_last_section_that_cannot_be_printed_is_told() -> None:
+    data = PARTS[0].encode().replace(b"[1018sub1]", b"[1018\xd0\xa4\x1a\x8fsub1]")
+    assert judge("a.eds", data) == "refused"
 
 
 def test_noise_is_no_eds() -> None:
