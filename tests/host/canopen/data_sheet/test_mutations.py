@@ -10,7 +10,9 @@ from random import Random
 import pytest
 
 from tests.host.canopen.data_sheet.corpus import ROOT
-from tests.host.canopen.data_sheet.mutations import PARTS, SMALL, judge, mutated
+from tests.host.canopen.data_sheet.mutations import LISTS, SMALL, judge, mutated
+from tickrig.host.canopen.data_sheet.check import check
+from tickrig.host.canopen.data_sheet.document import Document
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -44,8 +46,9 @@ def test_a_byte_without_a_letter_is_not_written_into_another_section() -> None:
 
 
 def test_a_last_section_that_cannot_be_printed_is_told() -> None:
-    data = PARTS[0].encode().replace(b"[1018sub1]", b"[1018\xd0\xa4\x1a\x8fsub1]")
-    assert judge("a.eds", data) == "refused"
+    data = f"{LISTS[0]}[1018\x1asub1]\nParameterName=vendor\n".encode()
+    assert "ends in [1018?sub1]" in str(check(Document("a.eds", data)))
+    judge("a.eds", data)
 
 
 def test_noise_is_no_eds() -> None:
