@@ -13,7 +13,12 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
-from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
+from tickrig.wire.canopen.nmt import (
+    ERROR_CONTROL_COB_ID,
+    NMT_COB_ID,
+    NmtCommand,
+    NmtState,
+)
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
@@ -61,18 +66,36 @@ class AwaitState:
 
 
 @dataclass(frozen=True, slots=True)
+class AwaitReport:
+    """Wait for any heartbeat, or answer to guarding; gives its state, None without one.
+
+    Attributes:
+        timeout_us: how long to wait.
+        boot_up: a boot-up counts as well.
+    """
+
+    timeout_us: int
+    boot_up: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """Ask for the state by node guarding."""
+
+
+@dataclass(frozen=True, slots=True)
 class Pause:
     """Let time pass."""
 
     duration_us: int
 
 
-Step = SdoRequest | SdoFrame | Command | AwaitState | Pause
+Step = SdoRequest | SdoFrame | Command | AwaitState | AwaitReport | Guard | Pause
 
 T = TypeVar("T")
 
 Script = Generator[Step, Any, T]
-"""A script that returns a T; it is sent the `Response` of an `SdoRequest`, else None."""
+"""A script that returns a T; it is sent what its step gives, None if that gives nothing."""
 
 Answer = Response | None
 
@@ -82,6 +105,10 @@ Send = Callable[[int, bytes], None]
 
 def _nothing() -> None:
     """Tell nobody."""
+
+
+def _guard_nobody(can_id: int) -> None:
+    """Send no remote frame: this host guards no node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,14 +137,23 @@ class Dialogue:
     Args:
         node_id: the node.
         send: takes CAN-ID and data.
+        guard: takes the CAN-ID of a remote frame.
+        sdo_timeout_us: how long to wait for an SDO response.
 
     Attributes:
         due_us: when a time-out or a pause ends, `NEVER` if there is none.
         job: what is under way.
     """
 
-    def __init__(self, node_id: int, send: Send) -> None:
-        self._node_id, self._send = node_id, send
+    def __init__(
+        self,
+        node_id: int,
+        send: Send,
+        guard: Callable[[int], None] = _guard_nobody,
+        sdo_timeout_us: int = SDO_TIMEOUT_US,
+    ) -> None:
+        self._node_id, self._send, self._guard = node_id, send, guard
+        self._sdo_timeout_us = sdo_timeout_us
         self._now_us, self.due_us = 0, NEVER
         self.job: QueuedScript | None = None
         self._step: Step | None = None
@@ -163,8 +199,13 @@ class Dialogue:
     def receive_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
         self._now_us = now_us
-        if isinstance(self._step, AwaitState) and self._step.state is state:
-            self._go_on(None)
+        match self._step:
+            case AwaitState() as wait if wait.state is state:
+                self._go_on(None)
+            case AwaitReport() as wait if wait.boot_up or state is not NmtState.INITIALISING:
+                self._go_on(state)
+            case _:
+                pass
 
     def tick(self, now_us: int) -> None:
         """End what lasts too long."""
@@ -211,13 +252,15 @@ class Dialogue:
         match step:
             case SdoRequest():
                 self._say(step.request)
-                self._step, self.due_us = step, self._now_us + SDO_TIMEOUT_US
-            case AwaitState():
+                self._step, self.due_us = step, self._now_us + self._sdo_timeout_us
+            case AwaitState() | AwaitReport():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
             case Pause():
                 self._step, self.due_us = step, self._now_us + step.duration_us
             case SdoFrame():
                 self._say(step.request)
+            case Guard():
+                self._guard(ERROR_CONTROL_COB_ID + self._node_id)
             case Command():
                 self._send(NMT_COB_ID, bytes((step.command, self._node_id)))
         return self._step is not None

@@ -1,0 +1,146 @@
+"""A master on a bus: what a test or a script holds in its hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Final, Self, cast
+
+from tickrig.host.canopen.master.assignment import MasterPlan
+from tickrig.host.canopen.master.network_slave import NetworkSlave
+from tickrig.host.canopen.master.nmt_master import NmtMaster
+from tickrig.host.links.link import Link, StampedLink
+
+STARTED_US: Final = 2_000
+"""By then a command to start has been heard."""
+
+
+class CanopenMaster:
+    """A master; time passes only in its calls, and meanwhile it does what is due.
+
+    Args:
+        link: the bus, as `bench.link` or a `CanLink`; the master closes it.
+        plan: what it does, and its slaves.
+
+    Attributes:
+        nmt: the NMT master that is run.
+
+    Raises:
+        TypeError: a link to a serial line.
+    """
+
+    def __init__(self, link: Link[Any], plan: MasterPlan) -> None:
+        if not hasattr(link, "receive_stamped"):
+            raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
+        self._link = cast(StampedLink, link)  # what has receive_stamped is one
+        self.nmt = NmtMaster(plan)
+        self._by_name = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the bus; the slaves stay as they are."""
+        self._link.close()
+
+    @property
+    def now_us(self) -> int:
+        """The time on the clock of the bus."""
+        return self._link.now_us
+
+    def slave(self, name: str | int) -> NetworkSlave:
+        """Return a slave by its name or node-ID; KeyError if there is none."""
+        if isinstance(name, int):
+            return self.nmt.slaves[name]
+        return self._by_name[name]
+
+    def boot(self, within_us: int = 10_000_000) -> None:
+        """Start the network: let time pass until each slave has booted.
+
+        Args:
+            within_us: for how long at most.
+
+        Raises:
+            BootFailed: some have not; it says which, and why.
+        """
+        self.wait_until(self._all_booted, within_us)
+        if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
+            raise BootFailed(failed)
+        self.run_for(STARTED_US)
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+        self.wait_until(_never, duration_us)
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so.
+
+        Args:
+            done: says whether it is.
+            within_us: for how long at most.
+
+        Returns:
+            False if the time was over first.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        until_us = self.now_us + within_us
+        while not done():
+            if self.now_us >= until_us:
+                return False
+            self._step(until_us)
+        return True
+
+    def explain(self, name: str | int) -> str:
+        """Return what was asked and answered in the latest boot-up of a slave, line by line."""
+        slave = self.slave(name)
+        first_us = slave.steps[0][0] if slave.steps else 0
+        lines = [f"{(at_us - first_us) / 1e3:8.1f} ms  {step}" for at_us, step in slave.steps]
+        return "\n".join([*lines, _verdict(slave)])
+
+    def _all_booted(self) -> bool:
+        return all(slave.outcome is not None for slave in self.nmt.slaves.values())
+
+    def _step(self, until_us: int) -> None:
+        """Wait for what is heard or due; do it."""
+        wait_us = min(self.nmt.due_us, until_us) - self.now_us
+        now_us, received = self._link.receive_stamped(max(0, wait_us))
+        if sent := self.nmt.tick(now_us, received):
+            self._link.send(sent)
+
+
+class BootFailed(Exception):  # noqa: N818 - what the network did
+    """Slaves that did not boot.
+
+    Attributes:
+        slaves: these.
+    """
+
+    def __init__(self, slaves: list[NetworkSlave]) -> None:
+        super().__init__("; ".join(_verdict(slave) for slave in slaves))
+        self.slaves = slaves
+
+
+def _verdict(slave: NetworkSlave) -> str:
+    """Say in a line how a boot-up ended."""
+    assignment = slave.assignment
+    who = f"node {assignment.node_id}" + (f" {assignment.name}" if assignment.name else "")
+    if slave.outcome is None:
+        return f"{who}: not booted" + (", still tried" if slave.booting else "; nothing was heard")
+    status = slave.outcome.status
+    return f"{who}: {status.value} {status.text}" if status.value else f"{who}: {status.text}"
+
+
+def _never() -> bool:
+    return False

@@ -1,0 +1,207 @@
+"""The NMT master: boots its slaves, starts them, watches them (CiA 302-2, NMT start-up)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
+from tickrig.host.canopen.master.boot_status import BootStatus
+from tickrig.host.canopen.master.network_slave import NetworkSlave
+from tickrig.host.canopen.periodic_timer import PeriodicTimer
+from tickrig.host.links.link import StampedFrames
+from tickrig.wire.can import CanFrame, Frames, data_frame
+from tickrig.wire.canopen.nmt import (
+    ALL_NODES,
+    ERROR_CONTROL_COB_ID,
+    NMT_COB_ID,
+    NmtCommand,
+    NmtState,
+)
+from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
+from tickrig.wire.instant import NEVER
+
+SYNC_COB_ID: Final = 0x080
+EMCY_COB_ID: Final = 0x080
+"""EMCY of node n is on this plus n."""
+
+NODE_IDS: Final = range(1, 128)
+FUNCTION: Final = 0x780
+"""The bits of a CAN-ID that are no node-ID."""
+
+COMMANDED: Final = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+
+
+class NmtMaster:
+    """Boots and starts slaves as Lely's master does; it has no clock and no bus, it is ticked.
+
+    Not emulated: flying master, LSS, TIME, the inhibit time of NMT (102Ah), a dictionary of
+    its own that others could read.
+
+    Args:
+        plan: what it does, and its slaves.
+
+    Attributes:
+        plan: as given.
+        slaves: by node-ID.
+        state: its own NMT state.
+        halted: a mandatory slave could not be booted, so nothing is started any more.
+        strangers: node-IDs that booted and are no slaves: error status A.
+        on_frame: called with the time and each data frame that is no NMT, SDO or EMCY.
+        on_sync: called with the time after each SYNC.
+        now_us: the time it was told last.
+    """
+
+    def __init__(self, plan: MasterPlan) -> None:
+        self.plan, self._out = plan, list[CanFrame]()
+        self.slaves = {slave.node_id: self._slave(slave) for slave in plan.slaves}
+        self.state, self.halted = NmtState.INITIALISING, False
+        self.strangers: list[int] = []
+        self.on_frame: Callable[[int, CanFrame], None] = lambda now_us, frame: None
+        self.on_sync: Callable[[int], None] = lambda now_us: None
+        self._heartbeat, self._sync = PeriodicTimer(plan.heartbeat_us), PeriodicTimer(plan.sync_us)
+        self.now_us = self._sync_count = 0
+
+    def _slave(self, slave: SlaveAssignment) -> NetworkSlave:
+        return NetworkSlave(slave, self.send, self._guard, self.plan, self._booted)
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do."""
+        if self.state is NmtState.INITIALISING:
+            return self.now_us
+        slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
+        return min(slaves, self._heartbeat.due_us, self._sync.due_us)
+
+    def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
+        """Take what was on the bus by now, do what is due; return what is to be sent."""
+        self.now_us = now_us
+        if self.state is NmtState.INITIALISING:
+            self._start_up()
+        for at_us, frame in rx:
+            self._hear(at_us, frame)
+        for slave in self.slaves.values():
+            if slave.tick(now_us):
+                self._lose(slave)
+        self._produce()
+        out, self._out = tuple(self._out), []
+        return out
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Send a frame with this tick."""
+        self._out.append(data_frame(can_id, data))
+
+    def command(self, command: NmtCommand, node_id: int = ALL_NODES) -> None:
+        """Send an NMT command, and expect of the slaves what it commands."""
+        self.send(NMT_COB_ID, bytes((command, node_id)))
+        for slave in self.slaves.values():
+            if node_id in (ALL_NODES, slave.assignment.node_id) and command in COMMANDED:
+                slave.expect(COMMANDED[command])
+
+    def _guard(self, can_id: int) -> None:
+        self._out.append(CanFrame(can_id, remote=True, remote_length=1))
+
+    def _start_up(self) -> None:
+        """Boot oneself, reset the slaves, boot those that are not waited for."""
+        self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((NmtState.INITIALISING,)))
+        self.state = NmtState.PRE_OPERATIONAL
+        self._heartbeat.start(self.now_us)
+        self._sync.start(self.now_us)
+        self._reset_slaves()
+        for slave in self._slaves():
+            slave.forget()
+            if slave.assignment.mandatory or not slave.assignment.reset_communication:
+                slave.boot(self.now_us)
+        self._go_on()
+
+    def _reset_slaves(self) -> None:
+        """Reset all communication; one by one if some slave is to be kept alive."""
+        slaves = self.plan.slaves
+        kept = {slave.node_id for slave in slaves if not slave.reset_communication}
+        if not kept:
+            self.command(NmtCommand.RESET_COMMUNICATION)
+            return
+        for node_id in NODE_IDS:
+            if node_id not in kept and node_id != self.plan.node_id:
+                self.command(NmtCommand.RESET_COMMUNICATION, node_id)
+
+    def _hear(self, at_us: int, frame: CanFrame) -> None:
+        if frame.extended or frame.remote:
+            return
+        function, node_id = frame.can_id & FUNCTION, frame.can_id & ~FUNCTION
+        slave = self.slaves.get(node_id)
+        if function == ERROR_CONTROL_COB_ID and frame.data:
+            if slave is not None:
+                slave.report(at_us, frame.data[0])
+            elif node_id != self.plan.node_id and frame.data[0] == NmtState.INITIALISING:
+                self.strangers.append(node_id)
+        elif function == RESPONSE_COB_ID and slave is not None:
+            slave.dialogue.receive_sdo(at_us, frame.data)
+        elif function == EMCY_COB_ID and slave is not None:
+            slave.emergencies.append(int.from_bytes(frame.data[:2], "little"))
+        else:
+            self.on_frame(at_us, frame)
+
+    def _booted(self, slave: NetworkSlave) -> None:
+        """Start a slave that has booted, and go on if it was waited for."""
+        assignment, outcome, plan = slave.assignment, slave.outcome, self.plan
+        assert outcome is not None
+        alone = not plan.starts_all or self.state is NmtState.OPERATIONAL
+        if outcome.status is BootStatus.BOOTED and assignment.boots and plan.starts_nodes and alone:
+            self.command(NmtCommand.START, assignment.node_id)
+        self.halted |= assignment.mandatory and not outcome.status.good
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Become Operational when no mandatory slave is waited for any more."""
+        waits = any(slave.booting and slave.assignment.mandatory for slave in self._slaves())
+        if self.halted or waits or self.state is not NmtState.PRE_OPERATIONAL:
+            return
+        if self.plan.starts:
+            self.state = NmtState.OPERATIONAL
+            if self.plan.starts_all and self.plan.starts_nodes:
+                self._start_all()
+
+    def _start_all(self) -> None:
+        """Start all at once if none has to be booted, else each that has booted, as Lely does."""
+        slaves = self._slaves()
+        if all(slave.good and not slave.assignment.boots for slave in slaves):
+            self.command(NmtCommand.START)
+            return
+        for slave in slaves:
+            if slave.assignment.boots and slave.good and slave.state is not NmtState.OPERATIONAL:
+                self.command(NmtCommand.START, slave.assignment.node_id)
+
+    def _lose(self, slave: NetworkSlave) -> None:
+        """Act on the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
+        mandatory = slave.assignment.mandatory
+        if mandatory and self.plan.stops_all:
+            self.command(NmtCommand.STOP)
+            self.state = NmtState.STOPPED
+        elif mandatory and self.plan.resets_all:
+            self.command(NmtCommand.RESET_NODE)
+            self.state, self.halted = NmtState.INITIALISING, False
+        else:
+            self.command(NmtCommand.RESET_NODE, slave.assignment.node_id)
+
+    def _produce(self) -> None:
+        """Send heartbeat and SYNC when they are due; after a pause once."""
+        if self._heartbeat.advance(self.now_us):
+            self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
+        if self._sync.advance(self.now_us):
+            self.send(SYNC_COB_ID, self._count())
+            self.on_sync(self.now_us)
+
+    def _count(self) -> bytes:
+        """Return the counter of a SYNC, nothing if it has none."""
+        if not self.plan.sync_overflow:
+            return b""
+        self._sync_count = self._sync_count % self.plan.sync_overflow + 1
+        return bytes((self._sync_count,))
+
+    def _slaves(self) -> tuple[NetworkSlave, ...]:
+        return tuple(self.slaves.values())
