@@ -101,7 +101,7 @@ class SlaveBoot:
             if self._slave.boots:
                 yield from self._boot()
             else:
-                self._tell("1F81h", "bit 2 is 0", "not booted by this master")
+                self._record("1F81h", "bit 2 is 0", "not booted by this master")
             yield from self._start_error_control()
         except BootEnded as end:
             return BootOutcome(end.status, self._state)
@@ -165,9 +165,9 @@ class SlaveBoot:
             data = yield from self._try(0x1020, sub, what, tries)
             if isinstance(data, SdoFailed) or not _is(data, expected):
                 found = str(data) if isinstance(data, SdoFailed) else _hex(data)
-                self._tell(what, found, f"not {expected:08X}h: configured anew")
+                self._record(what, found, f"not {expected:08X}h: configured anew")
                 return False
-            self._tell(what, _hex(data), "as expected")
+            self._record(what, _hex(data), "as expected")
         return True
 
     def _configure(self) -> Script[None]:
@@ -206,9 +206,9 @@ class SlaveBoot:
         """Wait for a boot-up or a state; end the boot-up without one."""
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
-            self._tell(what, f"none within {wait_us // 1_000} ms", status.text)
+            self._record(what, f"none within {wait_us // 1_000} ms", status.text)
             raise BootEnded(status)
-        self._tell(what, _STATES[state], "goes on")
+        self._record(what, _STATES[state], "goes on")
         return state
 
     def _read(
@@ -218,7 +218,7 @@ class SlaveBoot:
         what = f"{index:04X}h:{sub:02X} {name}"
         data = yield from self._try(index, sub, what, tries)
         if isinstance(data, SdoFailed):
-            self._tell(what, str(data), status.text)
+            self._record(what, str(data), status.text)
             raise BootEnded(status)
         return data
 
@@ -230,7 +230,7 @@ class SlaveBoot:
             except SdoTimeout as error:
                 if not left:
                     return error
-                self._tell(what, "no answer", "asked again")
+                self._record(what, "no answer", "asked again")
             except SdoFailed as error:
                 return error
         raise AssertionError("a slave is asked at least once")
@@ -239,17 +239,17 @@ class SlaveBoot:
         try:
             yield from script
         except SdoFailed as error:
-            self._tell(what, str(error), BootStatus.CONFIGURATION.text)
+            self._record(what, str(error), BootStatus.CONFIGURATION.text)
             raise BootEnded(BootStatus.CONFIGURATION) from error
-        self._tell(what, "taken", "goes on")
+        self._record(what, "taken", "goes on")
 
     def _compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
         if expected and not _is(data, expected):
-            self._tell(what, _hex(data), f"not {expected:08X}h: {status.text}")
+            self._record(what, _hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
-        self._tell(what, _hex(data), "as expected" if expected else "not looked at")
+        self._record(what, _hex(data), "as expected" if expected else "not looked at")
 
-    def _tell(self, asked: str, answered: str, means: str) -> None:
+    def _record(self, asked: str, answered: str, means: str) -> None:
         self._note(BootStep(asked, answered, means))
 
 
