@@ -1,0 +1,79 @@
+"""All rules for a bus.yml: name, who says so, what breaks, what to do."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.canopen.data_sheet.rule import Rule, Severity
+
+YAML: Final = "YAML 1.1"
+DCFGEN: Final = "dcfgen"
+COGEN: Final = "cogen"
+CONTAINER: Final = "device container of ros2_canopen"
+
+_ERRORS: Final = (
+    ("yaml", YAML, "nothing of it can be read", "write YAML"),
+    ("yaml-twice", YAML, "dcfgen takes the last, the container the first", "keep one"),
+    ("yaml-key", YAML, "readers refuse the file", "give a text or a number"),
+    ("yaml-value", YAML, "readers refuse the file", "write what the tag says, or leave it out"),
+    ("yaml-merge", YAML, "readers refuse the file", "merge a mapping: <<: *name"),
+    ("yaml-loop", YAML, "readers do not end", "write it out"),
+    ("kind", DCFGEN, "dcfgen refuses the file", "write it as it is shown here"),
+    ("no-number", DCFGEN, "dcfgen refuses the file", "write a number, as 10 or 0xA"),
+    ("number-range", DCFGEN, "dcfgen refuses it, or the value is cut off", "give one of its range"),
+    ("no-dcf", DCFGEN, "dcfgen refuses the file", "dcf: the name of its EDS or DCF"),
+    ("no-file", DCFGEN, "dcfgen refuses the file", "put the EDS beside bus.yml"),
+    ("eds", "CiA 306", "the dictionary is another one, or none", "canmon eds check tells more"),
+    ("no-identity", DCFGEN, "dcfgen refuses the EDS", "describe 1000h and 1018h:01"),
+    ("object-missing", DCFGEN, "dcfgen refuses the file", "write to what is there"),
+    ("value-range", DCFGEN, "dcfgen refuses the file", "give a value of its data type"),
+    ("value-type", DCFGEN, "dcfgen cannot write such a type", "write it by the driver"),
+    ("pdo-missing", DCFGEN, "dcfgen refuses the file", "configure a PDO that is there"),
+    ("cob-id-none", DCFGEN, "dcfgen refuses the file", "give COB-IDs of your own"),
+    ("event-deadline", DCFGEN, "dcfgen fails, or writes the event timer", "write 14xxh:05 as sdo"),
+    ("no-node-id", CONTAINER, "the container refuses the node", "node_id: 1 to 127"),
+    ("node-id", "CiA 301 7.2", "no node has it", "node_id: 1 to 127"),
+    ("node-id-twice", "CiA 301 7.2", "two nodes answer to one master", "give each its own"),
+    ("no-driver", CONTAINER, "the container refuses the node", "driver: a class, package: where"),
+    ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
+)
+_WARNINGS: Final = (
+    ("no-master", DCFGEN, "dcfgen and the container refuse the file", "master: node_id: 1"),
+    ("file-elsewhere", DCFGEN, "dcfgen, which runs beside bus.yml, fails", "put the EDS there"),
+    ("not-whole", DCFGEN, "dcfgen cuts it off", "write a whole number"),
+    ("flag-text", DCFGEN, "dcfgen takes any text for true", "true or false, without quotes"),
+    ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),
+    ("section-lost", COGEN, "cogen drops it", "put it under nodes:"),
+    ("defaults-win", COGEN, "cogen overwrites what the node says", "take it out of defaults"),
+    ("identity", DCFGEN, "the master refuses the node", "give bus.yml and EDS one number"),
+    ("no-object", DCFGEN, "dcfgen leaves it out", "leave the key out"),
+    ("read-only", DCFGEN, "the node refuses it at boot-up", "leave it out, or mend the EDS"),
+    (
+        "value-limits",
+        "CiA 306",
+        "the node refuses it at boot-up",
+        "give a value between the limits",
+    ),
+    ("not-mappable", DCFGEN, "the node refuses it at boot-up", "map what can be mapped"),
+    ("direction", "CiA 306", "the node refuses it at boot-up", "map it the other way"),
+    ("pdo-length", DCFGEN, "the node refuses it at boot-up", "map at most 64 bits"),
+    ("mapping-full", "CiA 301", "the node refuses it at boot-up", "map fewer objects"),
+    ("not-enabled", DCFGEN, "the PDO is never sent", "cob_id: auto"),
+    ("not-disabled", DCFGEN, "the master waits for a PDO that does not come", "mapping: []"),
+    ("cob-id-twice", "CiA 301", "one CAN-ID means two things", "cob_id: auto, or another one"),
+    ("cob-id-restricted", "CiA 301", "it clashes with a service", "cob_id: auto, or another one"),
+    ("error-control", DCFGEN, "dcfgen drops guarding", "keep heartbeat or guarding"),
+    ("no-entry", DCFGEN, "the node does not watch the master", "free an entry of 1016h"),
+)
+_NOTES: Final = (("own-key", CONTAINER, "nothing", "leave it, if a driver of your own reads it"),)
+
+RULES: Final = {
+    name: Rule(name, severity, clause, breaks, fix)
+    for severity, rules in (
+        (Severity.ERROR, _ERRORS),
+        (Severity.WARNING, _WARNINGS),
+        (Severity.NOTE, _NOTES),
+    )
+    for name, clause, breaks, fix in rules
+}
+"""By name, errors first."""

@@ -1,0 +1,267 @@
+"""What a bus.yml says of the master and of a slave, with the places where it says so."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canopen.bus_file.item import Item, Place
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.pdo import MappedObject
+
+INVALID: Final = 1 << 31
+"""Bit of a COB-ID: the PDO, or the service, is not there."""
+
+Extra = Mapping[str, Item]
+"""A mapping `tickrig:` of the file, as it stands there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a master checks at boot-up (1F84h to 1F88h); 0 is not checked.
+
+    Attributes:
+        device_type: 1000h.
+        vendor_id: 1018h:01.
+        product_code: 1018h:02.
+        revision_number: 1018h:03.
+        serial_number: 1018h:04.
+    """
+
+    device_type: int = 0
+    vendor_id: int = 0
+    product_code: int = 0
+    revision_number: int = 0
+    serial_number: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class BusWrite:
+    """One entry of a concise DCF: what the master writes at boot-up.
+
+    Attributes:
+        index: 0x0000..0xFFFF.
+        sub_index: 0..255.
+        data: the bytes, little endian.
+        place: what in the file asks for it.
+    """
+
+    index: int
+    sub_index: int
+    data: bytes
+    place: Place
+
+    def encode(self) -> bytes:
+        """Return the bytes of the entry (CiA 302-3, concise DCF)."""
+        return struct.pack("<HBL", self.index, self.sub_index, len(self.data)) + self.data
+
+
+def concise_dcf(writes: Iterable[BusWrite]) -> bytes:
+    """Return a concise DCF (1F22h): how many entries, and the entries."""
+    entries = [write.encode() for write in writes]
+    return struct.pack("<L", len(entries)) + b"".join(entries)
+
+
+@dataclass(frozen=True, slots=True)
+class BusPdo:
+    """A PDO of a slave.
+
+    Attributes:
+        number: 1..512.
+        transmit: whether the slave sends it.
+        cob_id: with its upper bits; bit 31: it is not there.
+        transmission: type, 0..255.
+        inhibit_time_100us: of a TPDO.
+        event_timer_ms: of a TPDO; of an RPDO its deadline.
+        sync_start: SYNC start value of a TPDO.
+        mapping: what it carries; a data type below 0020h is a dummy.
+    """
+
+    number: int
+    transmit: bool
+    cob_id: int
+    transmission: int = 0
+    inhibit_time_100us: int = 0
+    event_timer_ms: int = 0
+    sync_start: int = 0
+    mapping: tuple[MappedObject, ...] = ()
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is sent or taken."""
+        return not self.cob_id & INVALID
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """An axis of a drive as ros2_canopen's 402 driver has it; lengths are its user's units.
+
+    Attributes:
+        name: of the joint.
+        scale_pos_to_dev: device units for a unit of position.
+        scale_pos_from_dev: units of position for a device unit.
+        scale_vel_to_dev: device units for a unit of speed.
+        scale_vel_from_dev: units of speed for a device unit.
+        scale_eff_from_dev: units of effort for a device unit.
+        offset_pos_to_dev: device units that are added.
+        offset_pos_from_dev: units of position that are added.
+    """
+
+    name: str
+    scale_pos_to_dev: float = 1000.0
+    scale_pos_from_dev: float = 0.001
+    scale_vel_to_dev: float = 1000.0
+    scale_vel_from_dev: float = 0.001
+    scale_eff_from_dev: float = 0.001
+    offset_pos_to_dev: float = 0.0
+    offset_pos_from_dev: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BusSlave:
+    """A slave of the bus, and what its master will expect of it and write to it.
+
+    Attributes:
+        name: of its section.
+        node_id: 1..127.
+        place: of its section.
+        sheet: its EDS or DCF.
+        device: what that says.
+        identity: what the master checks.
+        writes: concise DCF, in the order in which the master writes it.
+        pdos: all of the dictionary as they are after these writes, RPDOs first.
+        master_pdos: those that the master's own dictionary is given, TPDOs of the slave first.
+        heartbeat_producer_ms: of the slave after the writes, 0 for none.
+        heartbeat_consumer: whether it shall watch the master's heartbeat.
+        heartbeat_multiplier: times the producer time is how long the master waits.
+        guard_time_ms: 0 for no guarding.
+        life_time_factor: of node guarding.
+        emcy_cob_id: with its upper bits.
+        boot: the master configures and boots it (1F81h, bit 2).
+        mandatory: the master does not start without it (bit 3).
+        reset_communication: the master may reset it at boot-up (bit 4).
+        retry_factor: how often guarding is tried.
+        software_file: firmware, empty for none.
+        software_version: that the master expects (1F55h), 0 for any.
+        restore_configuration: sub-index of 1011h that is restored before the writes, 0 for none.
+        boot_timeout_ms: how long ros2_canopen waits for it, None for its own.
+        driver: class of ros2_canopen, empty for none.
+        package: of the driver.
+        channels: axes, one for a node without `num_channels`.
+        settings: all else that the file gives the driver, as it stands there.
+        extra: what `tickrig:` says.
+    """
+
+    name: str
+    node_id: int
+    place: Place
+    sheet: Path
+    device: EdsDevice
+    identity: Identity
+    writes: tuple[BusWrite, ...] = ()
+    pdos: tuple[BusPdo, ...] = ()
+    master_pdos: tuple[BusPdo, ...] = ()
+    heartbeat_producer_ms: int = 0
+    heartbeat_consumer: bool = False
+    heartbeat_multiplier: float = 3.0
+    guard_time_ms: int = 0
+    life_time_factor: int = 0
+    emcy_cob_id: int = INVALID
+    boot: bool = True
+    mandatory: bool = False
+    reset_communication: bool = True
+    retry_factor: int = 3
+    software_file: str = ""
+    software_version: int = 0
+    restore_configuration: int = 0
+    boot_timeout_ms: int | None = None
+    driver: str = ""
+    package: str = ""
+    channels: tuple[Channel, ...] = ()
+    settings: Mapping[str, Item] = field(default_factory=dict)
+    extra: Extra = field(default_factory=dict)
+
+    @property
+    def num_channels(self) -> int:
+        """How many axes it has."""
+        return len(self.channels)
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """The names of its axes."""
+        return tuple(channel.name for channel in self.channels)
+
+
+@dataclass(frozen=True, slots=True)
+class BusMaster:
+    """The master of the bus.
+
+    Attributes:
+        node_id: 1..127; 255 where the file gives none.
+        place: of its section.
+        baudrate: kbit/s.
+        identity: its own.
+        sync_period_us: 0 for no SYNC.
+        sync_window_us: 1007h.
+        sync_overflow: 1019h.
+        heartbeat_producer_ms: 0 for none.
+        heartbeat_consumer: whether it watches the slaves.
+        heartbeat_multiplier: times its producer time is how long the slaves wait.
+        emcy_inhibit_time_100us: 1015h.
+        nmt_inhibit_time_100us: 102Ah.
+        error_behavior: 1029h by sub-index.
+        start: it goes operational by itself.
+        start_nodes: it starts the slaves.
+        start_all_nodes: all at once.
+        reset_all_nodes: it resets all where a mandatory one is lost.
+        stop_all_nodes: it stops all then.
+        boot_time_ms: how long it waits for the mandatory ones (1F89h), 0 for ever.
+        boot_timeout_ms: how long ros2_canopen waits for all, None for its own.
+        driver: class of ros2_canopen, empty for none.
+        package: of the driver.
+        extra: what `tickrig:` says.
+    """
+
+    node_id: int
+    place: Place
+    baudrate: int = 1000
+    identity: Identity = Identity()
+    sync_period_us: int = 0
+    sync_window_us: int = 0
+    sync_overflow: int = 0
+    heartbeat_producer_ms: int = 0
+    heartbeat_consumer: bool = True
+    heartbeat_multiplier: float = 3.0
+    emcy_inhibit_time_100us: int = 0
+    nmt_inhibit_time_100us: int = 0
+    error_behavior: Mapping[int, int] = field(default_factory=lambda: {1: 0})
+    start: bool = True
+    start_nodes: bool = True
+    start_all_nodes: bool = False
+    reset_all_nodes: bool = False
+    stop_all_nodes: bool = False
+    boot_time_ms: int = 0
+    boot_timeout_ms: int | None = None
+    driver: str = ""
+    package: str = ""
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class BusOptions:
+    """What holds for all nodes that say nothing else.
+
+    Attributes:
+        dcf_path: folder of the files at run time, as the file has it.
+        heartbeat_multiplier: of producer times.
+        retry_factor: of guarding.
+        extra: what `tickrig:` says.
+    """
+
+    dcf_path: str = ""
+    heartbeat_multiplier: float = 3.0
+    retry_factor: int = 3
+    extra: Extra = field(default_factory=dict)

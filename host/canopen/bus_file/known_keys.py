@@ -1,0 +1,72 @@
+"""The keys of a bus.yml, by section."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.canopen.bus_file.notes import Section
+from tickrig.host.text.names import closest
+from tickrig.wire.canopen.eds.eds_file import shorten
+
+EXTRA: Final = "tickrig"
+"""Of each section: what is for us alone."""
+
+OPTIONS: Final = ("dcf_path", "heartbeat_multiplier", "retry_factor", EXTRA)
+BOTH: Final = (
+    *("node_id", "revision_number", "serial_number", "time_cob_id"),
+    *("heartbeat_multiplier", "heartbeat_consumer", "heartbeat_producer", "error_behavior"),
+    *("driver", "package", "namespace", "dcf", "dcf_path", "remappings", "diagnostics", EXTRA),
+    *("non_transmit_timeout", "container_name", "master_dcf", "master_bin", "can_interface_name"),
+)
+MASTER: Final = (
+    *BOTH,
+    *("baudrate", "vendor_id", "product_code", "emcy_inhibit_time", "nmt_inhibit_time"),
+    *("sync_period", "sync_window", "sync_overflow", "start", "start_nodes", "start_all_nodes"),
+    *("reset_all_nodes", "stop_all_nodes", "boot_time", "boot_timeout"),
+)
+SCALES: Final = (
+    *("scale_pos_to_dev", "scale_pos_from_dev", "scale_vel_to_dev", "scale_vel_from_dev"),
+    *("scale_eff_from_dev", "offset_pos_to_dev", "offset_pos_from_dev"),
+)
+DRIVER: Final = (
+    *("enable_lazy_load", "polling", "period", "switching_state", "homing_timeout_seconds"),
+    *("position_mode", "velocity_mode", "effort_mode", "torque_mode", "channel"),
+    *("num_channels", "channel_names", "channels", "sdo_timeout_ms", "boot_timeout_ms", *SCALES),
+)
+"""What ros2_canopen's drivers read of a node."""
+SLAVE: Final = (
+    *BOTH,
+    *("rpdo", "tpdo", "sdo", "boot", "mandatory", "reset_communication", "retry_factor"),
+    *("guard_time", "life_time_factor", "software_file", "software_version"),
+    *("configuration_file", "restore_configuration", *DRIVER),
+)
+PDO: Final = (
+    *("enabled", "cob_id", "transmission", "inhibit_time", "event_timer", "event_deadline"),
+    *("sync_start", "mapping"),
+)
+MAPPED: Final = ("index", "sub_index")
+WRITE: Final = (*MAPPED, "value")
+
+
+def check_keys(section: Section, known: Iterable[str], *, open_to_others: bool = False) -> None:
+    """Note the keys that nobody knows.
+
+    Args:
+        section: which has them.
+        known: all keys that it may have.
+        open_to_others: a driver of the user's may read others: they are noted as such, unless one
+            looks like a slip.
+    """
+    known = tuple(known)
+    for key in section.fields:
+        if key in known:
+            continue
+        close = closest(shorten(str(key)), known)
+        said = f"{shorten(str(key))!r} is no key that is known"
+        if close:
+            section.note("unknown-key", key, f"{said}; did you mean {close[0]!r}?")
+        elif open_to_others:
+            section.note("own-key", key, said)
+        else:
+            section.note("unknown-key", key, f"{said}; known: {', '.join(known)}")

@@ -1,0 +1,144 @@
+"""What is wrong with a bus.yml, collected while its sections are read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from tickrig.host.canopen.bus_file.bus_rules import RULES
+from tickrig.host.canopen.bus_file.item import Item, Key, Place
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.wire.canopen.eds.eds_file import shorten
+
+UNSIGNED8, UNSIGNED16, UNSIGNED32 = 0xFF, 0xFFFF, 0xFFFF_FFFF
+
+
+class Notes:
+    """All findings of a file, each once."""
+
+    def __init__(self) -> None:
+        self._found: dict[RuleFinding, None] = {}
+
+    def note(self, rule: str, place: Place, where: str, text: str) -> None:
+        """Note what breaks a rule.
+
+        Args:
+            rule: its name.
+            place: the line.
+            where: section and keys, as `joint_1.tpdo.1`; empty for the file as a whole.
+            text: what came, and what was allowed.
+        """
+        found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
+        self._found[found] = None
+
+    @property
+    def all(self) -> tuple[RuleFinding, ...]:
+        """All of them in the order of the lines."""
+        return tuple(sorted(self._found, key=lambda one: (one.file, one.line)))
+
+
+class Section:
+    """A mapping of the file, read as dcfgen reads it.
+
+    Args:
+        notes: take what is wrong.
+        name: section and keys, for people.
+        item: the mapping; what is none counts as empty, and is noted.
+        place: of its key.
+    """
+
+    def __init__(self, notes: Notes, name: str, item: Item, place: Place) -> None:
+        self.notes, self.name, self.place = notes, name, place
+        self._item = item
+        if not item.is_mapping:
+            text = f"{item} is no mapping"
+            notes.note("kind", item.place if item.text else place, name, text)
+
+    @property
+    def fields(self) -> Mapping[Key, Item]:
+        """All that it holds."""
+        return self._item.fields
+
+    def __contains__(self, key: object) -> bool:
+        """Return whether it has a key."""
+        return key in self.fields
+
+    def place_of(self, key: Key) -> Place:
+        """Return where a key stands, else the section."""
+        return self._item.keys.get(key, self.place)
+
+    def note(self, rule: str, key: Key, text: str) -> None:
+        """Note what is wrong with a key."""
+        self.notes.note(rule, self.place_of(key), self.name, text)
+
+    def section(self, key: Key) -> Section:
+        """Return a mapping in it; it is empty where there is none."""
+        place = self.place_of(key)
+        item = self.fields.get(key, Item({}, place))
+        return Section(self.notes, f"{self.name}.{key}", item, place)
+
+    def sections(self, key: Key) -> list[Section]:
+        """Return the mappings of a list in it."""
+        item = self.fields.get(key)
+        if item is None:
+            return []
+        if not item.is_list:
+            self.note("kind", key, f"{key}: {item} is no list")
+        name = f"{self.name}.{key}"
+        return [Section(self.notes, name, each, each.place) for each in item.items]
+
+    def whole(self, key: Key, default: int = 0, low: int = 0, high: int = UNSIGNED32) -> int:
+        """Return a whole number, the default where there is none or a wrong one."""
+        item = self.fields.get(key)
+        if item is None:
+            return default
+        number = self._number(key, item)
+        if number is None:
+            return default
+        if isinstance(number, float) and not number.is_integer():
+            self.note("not-whole", key, f"{key}: {item.text} is cut off: {int(number)}")
+        number = int(number)
+        if not low <= number <= high:
+            allowed = f"{low}..{high}" if high <= UNSIGNED16 else f"{low}..0x{high:X}"
+            self.note("number-range", key, f"{key}: {item.text} is not in {allowed}")
+            return default
+        return number
+
+    def real(self, key: Key, default: float) -> float:
+        """Return a number, with a fraction or without."""
+        item = self.fields.get(key)
+        number = None if item is None else self._number(key, item, fraction=True)
+        return default if number is None else float(number)
+
+    def flag(self, key: Key, default: bool) -> bool:
+        """Return a flag; any text is true, as for dcfgen."""
+        item = self.fields.get(key)
+        if item is None:
+            return default
+        if not isinstance(item.value, bool | int):
+            text = f"{key}: {item} is not true or false: {str(bool(item.value)).lower()} is taken"
+            self.note("flag-text", key, text)
+        return bool(item.value)
+
+    def text(self, key: Key, default: str = "") -> str:
+        """Return a text."""
+        item = self.fields.get(key)
+        if item is None:
+            return default
+        if item.is_list or item.is_mapping or item.value is None:
+            self.note("kind", key, f"{key}: {item} is no text")
+            return default
+        return item.value if isinstance(item.value, str) else item.text
+
+    def _number(self, key: Key, item: Item, *, fraction: bool = False) -> int | float | None:
+        """Return what int() of Python, or float(), makes of a value; None if that is nothing."""
+        value = item.value
+        try:
+            if isinstance(value, str):
+                value = float(value) if fraction else int(value)
+            if isinstance(value, int | float) and math.isfinite(value):
+                return value
+        except (ValueError, OverflowError):
+            pass
+        self.note("no-number", key, f"{key}: {item} is no number")
+        return None

@@ -1,0 +1,208 @@
+"""A node of the file and its EDS become a slave."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.canopen.bus_file.bus_values import (
+    INVALID,
+    BusOptions,
+    BusSlave,
+    Channel,
+    Identity,
+)
+from tickrig.host.canopen.bus_file.item import Item
+from tickrig.host.canopen.bus_file.known_keys import (
+    DRIVER,
+    EXTRA,
+    SCALES,
+    SLAVE,
+    WRITE,
+    check_keys,
+)
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
+from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader, pdos_after
+from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet
+from tickrig.host.canopen.bus_file.writes import Writes
+
+HIGHEST_NODE_ID: Final = 127
+MOST_CHANNELS: Final = 8
+TIME, EMCY, HEARTBEAT, GUARD_TIME, LIFE_TIME = 0x1012, 0x1014, 0x1017, 0x100C, 0x100D
+ERROR_BEHAVIOR, RESTORE, SOFTWARE = 0x1029, 0x1011, 0x1F56
+
+
+class SlaveReader:
+    """Reads one node.
+
+    Args:
+        node: its section.
+        sheet: its EDS.
+        options: of the file.
+        cob_ids: of the whole bus.
+    """
+
+    def __init__(self, node: Section, sheet: Sheet, options: BusOptions, cob_ids: CobIds) -> None:
+        self._node, self._sheet, self._options = node, sheet, options
+        self._cob_ids = cob_ids
+        self.writes = Writes(sheet, node.name, node.notes)
+
+    def read(self) -> BusSlave:
+        """Read it all; the writes come in the order of dcfgen."""
+        node, sheet = self._node, self._sheet
+        check_keys(node, SLAVE, open_to_others=True)
+        identity = self._identity()
+        self._changed("time_cob_id", TIME, 0x100)
+        heartbeat = self._changed("heartbeat_producer", HEARTBEAT, 0, UNSIGNED16)
+        guard_time = self._changed("guard_time", GUARD_TIME, 0, UNSIGNED16)
+        life_time = self._changed("life_time_factor", LIFE_TIME, 0, UNSIGNED8)
+        if guard_time and life_time and heartbeat:
+            text = "heartbeat and node guarding cannot be used together: guarding is left out"
+            node.note("error-control", "guard_time", text)
+            guard_time = life_time = 0
+        self._error_behavior()
+        pdo_reader = PdoReader(node, sheet, self.writes, self._cob_ids)
+        rpdos, tpdos = pdo_reader.read("rpdo", RPDO), pdo_reader.read("tpdo", TPDO)
+        version, restore = self._software_version(), self._restore()
+        self._sdo()
+        return BusSlave(
+            name=node.name,
+            node_id=sheet.node_id,
+            place=node.place,
+            sheet=sheet.path,
+            device=sheet.device,
+            identity=identity,
+            writes=self.writes.all,
+            pdos=pdos_after(sheet, self.writes),
+            master_pdos=(*tpdos, *rpdos),
+            heartbeat_producer_ms=heartbeat,
+            heartbeat_consumer=node.flag("heartbeat_consumer", default=False),
+            heartbeat_multiplier=node.real(
+                "heartbeat_multiplier", self._options.heartbeat_multiplier
+            ),
+            guard_time_ms=guard_time,
+            life_time_factor=life_time,
+            emcy_cob_id=sheet.value(EMCY, 0, INVALID),
+            boot=node.flag("boot", default=True),
+            mandatory=node.flag("mandatory", default=False),
+            reset_communication=node.flag("reset_communication", default=True),
+            retry_factor=node.whole("retry_factor", self._options.retry_factor, 0, UNSIGNED8),
+            software_file=node.text("software_file"),
+            software_version=version,
+            restore_configuration=restore,
+            boot_timeout_ms=node.whole("boot_timeout_ms") if "boot_timeout_ms" in node else None,
+            driver=node.text("driver"),
+            package=node.text("package"),
+            channels=read_channels(node),
+            settings=self._settings(),
+            extra=read_extra(node),
+        )
+
+    def _identity(self) -> Identity:
+        """Return what is checked; only revision and serial number can be said in the file."""
+        node, sheet = self._node, self._sheet
+        for index, sub in ((0x1000, 0), (IDENTITY, 1)):
+            if sheet.row(index, sub) is None:
+                text = f"{index:04X}h:{sub:02X} is not in {sheet.path.name}"
+                node.note("no-identity", "dcf", text)
+        checked = [sheet.value(0x1000, 0), sheet.identity("VendorNumber", 1)]
+        checked.append(sheet.identity("ProductNumber", 2))
+        for key, head, sub in (
+            ("revision_number", "RevisionNumber", 3),
+            ("serial_number", "LSS_SerialNumber", 4),
+        ):
+            in_eds = sheet.identity(head, sub)
+            number = node.whole(key, in_eds)
+            if in_eds and number not in {0, in_eds}:
+                where = sheet.place(IDENTITY, sub)
+                text = f"{key}: 0x{number:08X}, but the EDS has 0x{in_eds:08X}: {where}"
+                node.note("identity", key, text)
+            checked.append(number)
+        has = (True, True, *(sheet.row(IDENTITY, sub) is not None for sub in (2, 3, 4)))
+        return Identity(
+            *(number if there else 0 for number, there in zip(checked, has, strict=True))
+        )
+
+    def _changed(self, key: str, index: int, usual: int, high: int = 0xFFFF_FFFF) -> int:
+        """Read a number that an object holds; write it if it differs from the EDS."""
+        node, sheet = self._node, self._sheet
+        before = sheet.value(index, 0, usual)
+        if key not in node:
+            return before
+        number = node.whole(key, before, 0, high)
+        compared = usual if index == TIME else before  # dcfgen compares 1012h with its own default
+        if number != compared:
+            if index in sheet:
+                self.writes.add(index, 0, number, node.place_of(key))
+            else:
+                text = f"{key}: {sheet.path.name} has no {index:04X}h"
+                node.note("no-object", key, text)
+        return number
+
+    def _error_behavior(self) -> None:
+        if "error_behavior" not in self._node:
+            return
+        section = self._node.section("error_behavior")
+        for sub in section.fields:
+            number = section.whole(sub, 0, 0, UNSIGNED8)
+            row = self._sheet.row(ERROR_BEHAVIOR, sub) if isinstance(sub, int) and sub else None
+            if row is None:
+                text = f"1029h:{sub} is not in {self._sheet.path.name}"
+                section.note("no-object", sub, text)
+            elif number != self._sheet.value(ERROR_BEHAVIOR, row.sub):
+                self.writes.add(ERROR_BEHAVIOR, row.sub, number, section.place_of(sub))
+
+    def _software_version(self) -> int:
+        number = self._node.whole("software_version")
+        if "software_version" in self._node and self._sheet.row(SOFTWARE, 1) is None:
+            text = f"software_version: {self._sheet.path.name} has no 1F56h:01"
+            self._node.note("no-object", "software_version", text)
+        return number
+
+    def _restore(self) -> int:
+        sub = self._node.whole("restore_configuration", 0, 0, UNSIGNED8)
+        if "restore_configuration" in self._node and self._sheet.row(RESTORE, sub) is None:
+            text = f"restore_configuration: {self._sheet.path.name} has no 1011h:{sub:02X}"
+            self._node.note("no-object", "restore_configuration", text)
+        return sub
+
+    def _sdo(self) -> None:
+        for entry in self._node.sections("sdo"):
+            check_keys(entry, WRITE)
+            if "index" not in entry:
+                entry.note("kind", "index", "an entry of sdo has an index")
+                continue
+            index = entry.whole("index", 0, 0, UNSIGNED16)
+            sub = entry.whole("sub_index", 0, 0, UNSIGNED8)
+            value = entry.whole("value", 0, -(1 << 63), (1 << 64) - 1)
+            item = entry.fields.get("value")
+            self.writes.add(index, sub, value, entry.place, item.text if item else "")
+
+    def _settings(self) -> dict[str, Item]:
+        fields = self._node.fields
+        return {key: fields[key] for key in DRIVER if key in fields}
+
+
+def read_extra(section: Section) -> dict[str, Item]:
+    """Return what is for us alone, by key."""
+    if EXTRA not in section:
+        return {}
+    return {str(key): item for key, item in section.section(EXTRA).fields.items()}
+
+
+def read_channels(node: Section) -> tuple[Channel, ...]:
+    """Read the axes of a node: their names and scales; without a number there is one."""
+    count = node.whole("num_channels", 1, 1, MOST_CHANNELS)
+    names = node.fields.get("channel_names")
+    own = node.sections("channels")
+    given = [item.text for item in names.items] if names else []
+    usual = {key: node.real(key, getattr(Channel, key, 0.0)) for key in SCALES if key in node}
+    channels = []
+    for at in range(count):
+        default = node.name if count == 1 else f"{node.name}/{at}"
+        name = given[at] if at < len(given) and given[at] else default
+        scales = dict(usual)
+        if at < len(own):
+            check_keys(own[at], SCALES)
+            scales |= {key: own[at].real(key, 0.0) for key in SCALES if key in own[at]}
+        channels.append(Channel(name, **scales))
+    return tuple(channels)

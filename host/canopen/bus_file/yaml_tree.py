@@ -1,0 +1,141 @@
+"""YAML as a tree that knows its lines: nothing is made of it but texts, numbers and flags.
+
+>>> tree, wrong = read_yaml("a: 0x10", "bus.yml")
+>>> tree.value["a"].value, str(tree.value["a"].place), wrong
+(16, 'bus.yml:1', [])
+"""
+
+from __future__ import annotations
+
+import datetime
+from typing import Final, NamedTuple
+
+import yaml
+
+from tickrig.host.canopen.bus_file.item import Item, Key, Place, Scalar
+from tickrig.wire.canopen.eds.eds_file import shorten
+
+MERGE: Final = "tag:yaml.org,2002:merge"
+
+
+class Wrong(NamedTuple):
+    """What is wrong with the YAML: rule, place, reason."""
+
+    rule: str
+    place: Place
+    text: str
+
+
+def read_yaml(text: str, name: str) -> tuple[Item | None, list[Wrong]]:
+    """Read a text.
+
+    Args:
+        text: the whole file.
+        name: what places call it.
+
+    Returns:
+        The tree, None if there is none; and what is wrong.
+    """
+    try:
+        root = yaml.compose(text, yaml.SafeLoader)
+        if root is None:
+            return None, [Wrong("yaml", Place(name, 1), "the file is empty")]
+        tree = _Tree(name)
+        return tree.item(root), tree.wrong
+    except yaml.reader.ReaderError as error:
+        line, reason = text.count("\n", 0, error.position) + 1, "a character that no text has"
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, reason = mark.line + 1 if mark else 1, str(error.problem or error.context)
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        line, reason = 1, str(error)
+    except RecursionError:
+        line, reason = 1, "lists or mappings nest too deep"
+    return None, [
+        Wrong("yaml", Place(name, line), f"not YAML: {shorten(' '.join(reason.split()))}")
+    ]
+
+
+class _Tree:
+    """Makes items of nodes; what an anchor names is made once, so that no file can grow."""
+
+    def __init__(self, name: str) -> None:
+        self.wrong: list[Wrong] = []
+        self._name = name
+        self._plain = yaml.constructor.SafeConstructor()
+        self._done: dict[int, Item] = {}
+        self._open: set[int] = set()
+
+    def item(self, node: yaml.Node) -> Item:
+        """Make an item of a node."""
+        key = id(node)
+        if (done := self._done.get(key)) is not None:
+            return done
+        place = self._place(node)
+        if key in self._open:
+            self._wrong("yaml-loop", node, "it holds itself")
+            return Item(None, place)
+        self._open.add(key)
+        item = self._make(node, place)
+        self._open.discard(key)
+        self._done[key] = item
+        return item
+
+    def _make(self, node: yaml.Node, place: Place) -> Item:
+        if isinstance(node, yaml.SequenceNode):
+            return Item(tuple(map(self.item, node.value)), place)
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, place)
+        return Item(self._scalar(node), place, shorten(str(node.value)))
+
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> Item:
+        """Make a mapping: what `<<` brings first, then its own; of a key twice the last counts."""
+        fields: dict[Key, Item] = {}
+        keys: dict[Key, Place] = {}
+        own: list[tuple[yaml.Node, yaml.Node]] = []
+        for key_node, value in node.value:
+            if key_node.tag != MERGE:
+                own.append((key_node, value))
+                continue
+            for merged in self._merged(value):
+                for key, each in merged.fields.items():
+                    fields.setdefault(key, each)
+                    keys.setdefault(key, merged.keys[key])
+        seen: dict[Key, Place] = {}
+        for key_node, value in own:
+            if not isinstance(key_node, yaml.ScalarNode):
+                self._wrong("yaml-key", key_node, "a key is a text or a number, this is not")
+                continue
+            key = self._scalar(key_node)
+            if key in seen:
+                text = f"{shorten(str(key_node.value))!r} is there twice: {seen[key]}"
+                self._wrong("yaml-twice", key_node, text)
+            keys[key] = seen[key] = self._place(key_node)
+            fields[key] = self.item(value)
+        return Item(fields, place, keys=keys)
+
+    def _merged(self, node: yaml.Node) -> list[Item]:
+        """Return the mappings that `<<` names."""
+        nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
+        items = [self.item(each) for each in nodes]
+        for each, item in zip(nodes, items, strict=True):
+            if not item.is_mapping:
+                self._wrong("yaml-merge", each, "<< takes a mapping, or a list of some")
+        return [item for item in items if item.is_mapping]
+
+    def _scalar(self, node: yaml.Node) -> Scalar:
+        """Return what YAML 1.1 makes of a scalar; dates stay texts."""
+        try:
+            value = self._plain.construct_object(node)
+        except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, OverflowError):
+            self._wrong("yaml-value", node, f"{shorten(str(node.value))!r} is no {node.tag}")
+            return str(node.value)
+        if isinstance(value, datetime.date | bytes):
+            return str(node.value)
+        return value if value is None or isinstance(value, str | int | float) else str(node.value)
+
+    def _wrong(self, rule: str, node: yaml.Node, text: str) -> None:
+        self.wrong.append(Wrong(rule, self._place(node), text))
+
+    def _place(self, node: yaml.Node) -> Place:
+        return Place(self._name, node.start_mark.line + 1)

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.host.canopen.bus_file.bench import NODE, Generated, Pdo, generate, write_bus
+from tests.host.canopen.bus_file.shapes import COGEN, GOOD, PLAIN
+from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
+from tickrig.host.canopen.bus_file.bus_values import BusPdo, BusSlave, concise_dcf
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_the_writes_are_those_of_dcfgen(name: str, tmp_path: Path) -> None:
+    path = write_bus(tmp_path, GOOD[name])
+    theirs, ours = generate(path), read_bus_file(path)
+    assert not ours.errors
+    assert list(ours.slaves) == list(theirs.slaves)
+    for slave, other in pairs(ours, theirs):
+        assert [write.encode().hex() for write in slave.writes] == [one.hex() for one in other.sdo]
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_the_master_is_that_of_dcfgen(name: str, tmp_path: Path) -> None:
+    path = write_bus(tmp_path, GOOD[name])
+    theirs, ours = generate(path), read_bus_file(path)
+    assert ours.master is not None
+    for ours_name, their_name in (
+        ("node_id", "node_id"),
+        ("sync_period_us", "sync_period"),
+        ("heartbeat_producer_ms", "heartbeat_producer"),
+        ("heartbeat_multiplier", "heartbeat_multiplier"),
+        ("start", "start"),
+    ):
+        assert getattr(ours.master, ours_name) == getattr(theirs.master, their_name)
+    for slave, other in pairs(ours, theirs):
+        assert [pdo_of(pdo) for pdo in slave.master_pdos] == pdos_of(other)
+        identity = slave.identity
+        assert (identity.device_type, identity.vendor_id) == (other.device_type, other.vendor_id)
+        assert identity.product_code == other.product_code
+        assert identity.revision_number == other.revision_number
+        assert identity.serial_number == other.serial_number
+        for key, their_key in (
+            *((key, key) for key in ("boot", "mandatory", "reset_communication", "emcy_cob_id")),
+            *((key, key) for key in ("retry_factor", "heartbeat_multiplier", "software_version")),
+            *((key, key) for key in ("heartbeat_consumer", "restore_configuration")),
+            ("heartbeat_producer_ms", "heartbeat_producer"),
+            ("guard_time_ms", "guard_time"),
+            ("life_time_factor", "life_time_factor"),
+        ):
+            assert getattr(slave, key) == getattr(other, their_key), key
+
+
+def test_after_the_writes_the_slave_has_the_pdos_of_the_file(tmp_path: Path) -> None:
+    slave = read_bus_file(write_bus(tmp_path, PLAIN)).slaves["left"]
+    rpdo, off, *_ = (pdo for pdo in slave.pdos if not pdo.transmit)
+    assert (rpdo.cob_id, [entry.index for entry in rpdo.mapping]) == (0x205, [0x6040, 0x6060])
+    assert off.cob_id == 0x8000_0302
+    first, second, third, *_ = (pdo for pdo in slave.pdos if pdo.transmit)
+    assert (first.cob_id, first.transmission, len(first.mapping)) == (0x182, 1, 2)
+    assert (second.event_timer_ms, second.inhibit_time_100us) == (100, 5)
+    assert not third.enabled
+
+
+def test_defaults_count_more_than_what_a_node_says(tmp_path: Path) -> None:
+    bus = read_bus_file(write_bus(tmp_path, COGEN))
+    assert [slave.heartbeat_producer_ms for slave in bus.slaves.values()] == [200, 200]
+    assert [one.rule.name for one in bus.warnings] == ["defaults-win"]
+    assert bus.warnings[0].line == 21
+    assert "bus.yml:9" in bus.warnings[0].text
+
+
+def test_what_is_for_us_is_handed_on_with_its_lines(tmp_path: Path) -> None:
+    text = NODE + "  tickrig:\n    motor:\n      inertia_kg_m2: 1e-4\n"
+    slave = read_bus_file(write_bus(tmp_path, text)).slaves["axis"]
+    inertia = slave.extra["motor"].fields["inertia_kg_m2"]
+    assert inertia.text == "1e-4"
+    assert (inertia.place.line, slave.extra["motor"].keys["inertia_kg_m2"].line) == (7, 7)
+
+
+def test_a_concise_dcf_begins_with_its_count(tmp_path: Path) -> None:
+    text = NODE + "  sdo: [{index: 0x6060, value: -1}]\n"
+    slave = read_bus_file(write_bus(tmp_path, text)).slaves["axis"]
+    assert concise_dcf(slave.writes).hex() == "01000000" + "6060" + "00" + "01000000" + "ff"
+
+
+def pairs(ours: BusFile, theirs: Generated) -> list[tuple[BusSlave, Any]]:
+    return [(ours.slaves[name], theirs.slaves[name]) for name in theirs.slaves]
+
+
+def pdo_of(pdo: BusPdo) -> Pdo:
+    mapping = tuple((one.index, one.sub, one.bits) for one in pdo.mapping)
+    return Pdo(pdo.number, pdo.transmit, pdo.cob_id, pdo.transmission, mapping)
+
+
+def pdos_of(slave: Any) -> list[Pdo]:
+    return [
+        Pdo(
+            *(number, transmit, pdo.cob_id, pdo.transmission_type),
+            tuple((sub.index, sub.sub_index, sub.data_type.bits()) for sub in pdo.mapping.values()),
+        )
+        for transmit, pdos in ((True, slave.tpdo), (False, slave.rpdo))
+        for number, pdo in pdos.items()
+    ]
