@@ -51,21 +51,21 @@ class BootStep:
     """One step of a boot-up, for people.
 
     Attributes:
-        asked: what was said to the slave, or waited for.
-        answered: what came.
-        means: what follows.
+        request: what was said to the slave, or waited for.
+        answer: what came.
+        meaning: what follows.
     """
 
-    asked: str
-    answered: str
-    means: str
+    request: str
+    answer: str
+    meaning: str
 
     def __str__(self) -> str:
         """Return it in a line."""
-        return f"{self.asked}: {self.answered}; {self.means}"
+        return f"{self.request}: {self.answer}; {self.meaning}"
 
 
-Note = Callable[[BootStep], None]
+OnStep = Callable[[BootStep], None]
 
 
 class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of it
@@ -88,11 +88,11 @@ class SlaveBoot:
 
     Args:
         slave: what is expected of it.
-        note: is told each step.
+        on_step: called with each step.
     """
 
-    def __init__(self, slave: SlaveAssignment, note: Note) -> None:
-        self._slave, self._note = slave, note
+    def __init__(self, slave: SlaveAssignment, on_step: OnStep) -> None:
+        self._slave, self._on_step = slave, on_step
         self._state: NmtState | None = None
 
     def script(self) -> Script[BootOutcome]:
@@ -249,8 +249,8 @@ class SlaveBoot:
             raise BootEnded(status)
         self._record(what, _hex(data), "as expected" if expected else "not looked at")
 
-    def _record(self, asked: str, answered: str, means: str) -> None:
-        self._note(BootStep(asked, answered, means))
+    def _record(self, request: str, answer: str, meaning: str) -> None:
+        self._on_step(BootStep(request, answer, meaning))
 
 
 _STATES: Final = {
