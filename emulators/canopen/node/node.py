@@ -74,9 +74,11 @@ class Node(Copyable):
         groups: names of several of these that are set together.
         outputs: what the world sees of it, by name.
         on_set: called with each input or object that was set by name, and its value.
+        on_crash: called with what the program of the slave raises, which then begins anew, as
+            after a watchdog; without it that is raised here.
     """
 
-    _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None}
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None, "on_crash": None}
 
     def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
         self.name, self.slave, self.application = name, slave, Application.of(slave)
@@ -86,6 +88,7 @@ class Node(Copyable):
         self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
         self.on_set: OnSet | None = None
+        self.on_crash: Callable[[Exception], object] | None = None
         bank = self.application.inputs
         self.physical: Mapping[str, Signal] = {
             "power_off": Switch("power_off", "its supply is cut", self._switch),
@@ -155,10 +158,17 @@ class Node(Copyable):
             if now_us >= self._coasts_us:
                 self._coasts_us = self.application.without_power(now_us)
             return ()
-        if self._ticked:
-            self._catch_up(now_us)
-        self._ticked = True
-        return self.slave.tick(now_us, rx)
+        try:
+            if self._ticked:
+                self._catch_up(now_us)
+            self._ticked = True
+            return self.slave.tick(now_us, rx)
+        except Exception as error:
+            if self.on_crash is None:
+                raise
+            self.on_crash(error)
+            self._begin_anew(self.on_crash)
+            return ()
 
     def signal(self, name: str) -> Signal | None:
         """Return the thing of this name, None if there is none."""
@@ -197,6 +207,15 @@ class Node(Copyable):
         self.slave.now_us = now_us
         while self._pending:
             self._pending.pop(0)()
+
+    def _begin_anew(self, on_crash: Callable[[Exception], object]) -> None:
+        """Reset the slave; one that cannot begin anew is dead until its power is switched."""
+        self._pending.clear()
+        try:
+            self.slave.reset()
+        except Exception as error:
+            self._on = False
+            on_crash(error)
 
     def _switch(self, off: int) -> None:
         if off:

@@ -10,7 +10,9 @@ from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.mounts import BusMount
 from tickrig.emulators.testing.conformance.bench_stimulus import BenchStimulus
+from tickrig.emulators.testing.conformance.crash import Crashes, guarded
 from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
@@ -41,6 +43,7 @@ def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") ->
         raise ValueError(f"{name or 'the bench'} has no node {node_id}; its nodes: {known}")
     bus = nodes[min(nodes) if node_id is None else node_id][0]
     slaves = buses[bus]
+    crashes = mode.act(lambda rig: _watch_nodes(_mount(rig, bus)))
     return ConformSource(
         mode.act(lambda rig: CanHost(rig.rig, _mount(rig, bus).open_end())),
         name or bus,
@@ -49,9 +52,11 @@ def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") ->
         virtual=True,
         nodes={number: nodes[number][1] for number in sorted(nodes) if nodes[number][0] == bus},
         eds={slave.node_id: eds_of(slave, f"{each}.eds") for each, slave in slaves.items()},
-        stimulus=lambda number: BenchStimulus(
-            BenchDevice(mode, nodes[number][1]), slaves[nodes[number][1]]
+        stimulus=lambda number: guarded(
+            BenchStimulus(BenchDevice(mode, nodes[number][1]), slaves[nodes[number][1]])
         ),
+        close=lambda: mode.act(lambda rig: _watch_no_more(_mount(rig, bus))),
+        watch=lambda number, run: _tell(crashes, nodes[number][1], run),
     )
 
 
@@ -67,6 +72,25 @@ def _slaves(rig: BenchRig) -> dict[str, dict[str, CanopenSlave]]:
         for mount in rig.state.mounts.values()
         if isinstance(mount, BusMount)
     }
+
+
+def _watch_nodes(mount: BusMount) -> dict[str, Crashes]:
+    """Let what their programs raise be no end of the bench."""
+    crashes = {name: Crashes(name) for name in mount.nodes}
+    for name, node in mount.nodes.items():
+        node.on_crash = crashes[name]
+    return crashes
+
+
+def _watch_no_more(mount: BusMount) -> None:
+    for node in mount.nodes.values():
+        node.on_crash = None
+
+
+def _tell(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:
+    """Let a crash be a failure of the node under test; that of another one disturbs."""
+    for each, crash in crashes.items():
+        crash.watch(run.crash if each == name else lambda reason, where: run.disturb(reason))
 
 
 def _mount(rig: BenchRig, bus: str) -> BusMount:

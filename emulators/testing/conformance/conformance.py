@@ -12,6 +12,7 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_device import BenchDevice
 from tickrig.emulators.testing.conformance.bench_source import bench_source
+from tickrig.emulators.testing.conformance.crash import guarded
 from tickrig.emulators.testing.conformance.slave import CalledSlave, Slave, SlaveCall
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.conform.chosen import patterns, unknown
@@ -92,7 +93,7 @@ def conformance(  # noqa: PLR0913 - by keyword
         file = _eds(eds) or source.eds.get(number)
         device = None if file is None else read_device(file)
         run = ConformRun(source.link, number, plan, device=device, eds=file, source=source.name)
-        source.watch_crashes(run.crash)
+        source.watch(number, run)
         return run.run()
 
 
@@ -103,7 +104,7 @@ def _source(node: Node, bit_rate: int, stimulus: Stimulus | None) -> ConformSour
         return replace(_source(bench, bit_rate, stimulus), close=bench.close)
     if isinstance(node, BenchDevice):
         source = bench_source(node._mode)
-        return replace(source, stimulus=lambda number: stimulus) if stimulus else source
+        return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source
     slave = node if isinstance(node, Slave) else CalledSlave(node)
     return SlaveBench(slave, bit_rate, stimulus).source
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.emulators.testing.conformance.crash import crash_lines, crash_text
+from collections.abc import Callable
+
 from tickrig.emulators.testing.conformance.slave import Slave
-from tickrig.host.canmon.conform.conform_source import Crash
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
@@ -19,13 +19,13 @@ class PoweredSlave:
         slave: what is judged; it is on.
 
     Attributes:
-        on_crash: is told what it has raised, and where.
+        on_crash: is told what it has raised.
     """
 
     def __init__(self, slave: Slave) -> None:
         self.slave, self._on = slave, True
         self._woken = self._dead = False
-        self.on_crash: Crash = lambda reason, where: None
+        self.on_crash: Callable[[Exception], object] = lambda error: None
 
     @property
     def tick_us(self) -> int:
@@ -61,7 +61,7 @@ class PoweredSlave:
         self._on = on
 
     def _begin_anew(self, error: Exception) -> None:
-        self.on_crash(crash_text(error), crash_lines(error))
+        self.on_crash(error)
         self._reset()
 
     def _reset(self) -> None:
@@ -70,4 +70,4 @@ class PoweredSlave:
             self.slave.reset()
         except Exception as error:
             self._dead = True
-            self.on_crash(crash_text(error), crash_lines(error))
+            self.on_crash(error)

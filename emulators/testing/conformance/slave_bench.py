@@ -5,9 +5,10 @@ from __future__ import annotations
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.testing.conformance.crash import Crashes, guarded
 from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
 from tickrig.emulators.testing.conformance.slave import Slave
-from tickrig.host.canmon.conform.conform_source import ConformSource, Crash
+from tickrig.host.canmon.conform.conform_source import ConformSource
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.host.canopen.conform.plan import Stimulus
 
@@ -37,18 +38,11 @@ class SlaveBench:
             "a bus in virtual time",
             bit_rate,
             virtual=True,
-            stimulus=lambda node_id: self.stimulate,
-            watch_crashes=self._watch,
+            stimulus=lambda node_id: guarded(self.stimulate),
+            watch=lambda node_id, run: crashes.watch(run.crash),
         )
-        self._early: list[tuple[str, list[str]]] = []
-        self._slave.on_crash = lambda reason, where: self._early.append((reason, where))
+        self._slave.on_crash = crashes = Crashes("your slave")
         rig.run_for(BOOT_US)
-
-    def _watch(self, crash: Crash) -> None:
-        """Tell of crashes from now on, and of those before."""
-        self._slave.on_crash = crash
-        for reason, where in self._early:
-            crash(reason, where)
 
     def stimulate(self, *words: str) -> str:
         """Move an input, or switch the supply; NotAllowed if nobody can."""

@@ -17,6 +17,7 @@ from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.links.errors import LinkClosed
 
 if TYPE_CHECKING:
+    from tickrig.host.canopen.conform.conform_run import ConformRun
     from tickrig.host.links.can_link import CanLink
     from tickrig.host.links.link import StampedLink
     from tickrig.wire.canopen.eds.eds_file import EdsFile
@@ -35,23 +36,11 @@ RIGS: Final = ExtensionGroup[Any](
 """What opens a rig file: hosts know no emulators, so it is loaded by its name."""
 
 
-Disturb = Callable[[str], None]
-"""Takes why a check that fails now says nothing of the node."""
-
-
 def _leave() -> None:
     """Leave all as it is."""
 
 
-Crash = Callable[[str, list[str]], object]
-"""Takes what the program of the node has raised, and the lines at which it did."""
-
-
-def _watch_no_crash(crash: Crash) -> None:
-    """Nobody sees into the program of the node."""
-
-
-def _watch_nothing(disturb: Disturb) -> None:
+def _watch_nothing(node_id: int, run: ConformRun) -> None:
     """Nothing disturbs here."""
 
 
@@ -69,8 +58,7 @@ class ConformSource:
         eds: what is known of these nodes beforehand.
         stimulus: makes what moves the inputs of a node; None where nobody can.
         close: gives the bus back.
-        watch: has somebody told, from now on, what disturbs on the bus.
-        watch_crashes: the same of what the program of the node raises, where that can be known.
+        watch: tells a run at a node what disturbs on the bus, and what programs of nodes raise.
     """
 
     link: StampedLink
@@ -82,8 +70,7 @@ class ConformSource:
     eds: dict[int, EdsFile] = field(default_factory=dict)
     stimulus: Callable[[int], Stimulus] | None = None
     close: Callable[[], object] = _leave
-    watch: Callable[[Disturb], None] = _watch_nothing
-    watch_crashes: Callable[[Crash], None] = _watch_no_crash
+    watch: Callable[[int, ConformRun], None] = _watch_nothing
 
 
 def open_conform_source(
@@ -147,5 +134,5 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
     )
 
 
-def _watch_errors(link: CanLink, disturb: Disturb) -> None:
-    link.on_error_frame = lambda error: disturb("error frames on the bus")
+def _watch_errors(link: CanLink, node_id: int, run: ConformRun) -> None:
+    link.on_error_frame = lambda error: run.disturb("error frames on the bus")

@@ -119,7 +119,7 @@ class Conformance:
                 source=source.name,
                 on_result=progress.take,
             )
-            source.watch(run.disturb)
+            source.watch(node_id, run)
             progress.begin(node_id)
             judged.append(run.run())
         progress.end()

@@ -40,6 +40,9 @@ EXAMINE_US: Final = 120_000_000
 MOST_CRASHES: Final = 20
 """So many ways in which the program of the node crashed are told."""
 
+Crash = Callable[[str, list[str]], object]
+"""Takes what the program of the node has raised, in a line, and the lines at which it did."""
+
 
 class ConformRun:
     """Judges one node.

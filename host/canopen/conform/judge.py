@@ -96,8 +96,8 @@ class Judge:
         verdict, reason = self._play(bound)
         self._end(bound)
         crashed = bool(self._exchange.crashes)
-        if crashed:
-            verdict, reason = Verdict.FAIL, next(iter(self._exchange.crashes))
+        if crashed and verdict is not Verdict.FAIL:
+            verdict, reason = Verdict.FAIL, self._crash()
         lines, end_us = self._lines(), self._exchange.now_us
         if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL and not crashed:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
@@ -110,11 +110,15 @@ class Judge:
                 number += 1
                 if "finally" not in step:
                     self._player.play(step)
+                if self._exchange.crashes:
+                    raise StepFailed(self._crash())
         except NotAllowed as error:
             return Verdict.NOT_APPLICABLE, str(error)
         except Disturbed as error:
             return Verdict.INCONCLUSIVE, str(error)
         except StepFailed as error:
+            if self._exchange.crashes:
+                return Verdict.FAIL, f"step {number}: {self._crash()}"
             return self._failed(bound, f"step {number}: {error}")
         return Verdict.PASS, ""
 
@@ -124,6 +128,10 @@ class Judge:
             if "finally" in step:
                 with suppress(StepFailed, Disturbed, NotAllowed):
                     self._player.play(step)
+
+    def _crash(self) -> str:
+        """Return what the program of the node has raised first."""
+        return next(iter(self._exchange.crashes))
 
     def _lines(self) -> tuple[Line, ...]:
         return self._exchange.evidence.lines()

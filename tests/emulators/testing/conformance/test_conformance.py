@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable
 
@@ -7,12 +8,14 @@ import pytest
 
 from tests.emulators.testing.conformance.stacks import R1_EDS, durand, local_node, ours
 from tickrig.device import make_epos
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.stack import SERVICES
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.conformance.conformance import conformance
 from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.report.report_json import report_json
-from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.host.canopen.conform.verdict import Report, Verdict
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = "NMT-0[345]"
@@ -83,8 +86,8 @@ def test_what_a_slave_raises_is_the_verdict_and_the_others_go_on() -> None:
     failed = [result for result in report.results if result.outcome.verdict is Verdict.FAIL]
     assert failed
     for result in failed:
-        reason = "your slave raised struct.error: unpack requires a buffer of 2 bytes"
-        assert result.outcome.reason == reason
+        reason = r"step \d+: your slave raised struct.error: unpack requires a buffer of 2 bytes"
+        assert re.fullmatch(reason, result.outcome.reason)
         remarks = [line.text for line in result.outcome.evidence if line.direction == "#"]
         assert any("in tick: struct.unpack" in text for text in remarks), remarks
     assert report.count(Verdict.PASS) > len(failed)
@@ -92,6 +95,64 @@ def test_what_a_slave_raises_is_the_verdict_and_the_others_go_on() -> None:
     assert report.findings[0].startswith("your slave raised struct.error")
     assert fragile.resets >= 2 * len(failed), "each is tried again, and it begins anew"
     assert report.unrestored == ()
+
+
+class Strict(CanopenSlave):
+    """A slave of ours with a mistake of its user: as `Fragile`."""
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        for frame in rx:
+            if frame.can_id == 0:
+                struct.unpack("<BB", frame.data)
+        return super().tick(now_us, rx)
+
+
+def strict(node_id: int) -> Strict:
+    return Strict(make_epos(node_id).dictionary, node_id, SERVICES)
+
+
+def raised(report: Report) -> set[str]:
+    """Return the checks in which a program of a node raised."""
+    return {result.check.id for result in report.results if "raised" in result.outcome.reason}
+
+
+def test_what_a_slave_of_ours_raises_is_the_verdict_too() -> None:
+    report = conformance(strict(5), only="NMT-0*")
+    assert raised(report) == {"NMT-09"}
+    reasons = [result.outcome for result in report.results if result.check.id == "NMT-09"]
+    assert [(each.verdict, each.reason) for each in reasons] == [
+        (Verdict.FAIL, "step 4: node5 raised struct.error: unpack requires a buffer of 2 bytes")
+    ]
+    assert report.findings[0].startswith("node5 raised struct.error")
+    assert report.count(Verdict.PASS) > 3
+    assert (report.exit_status, report.unrestored) == (1, ())
+
+
+def test_a_device_of_a_bench_that_raises_ends_no_run() -> None:
+    with Bench(left=make_epos(1), right=strict(2)) as bench:
+        report = conformance(bench["right"], only="NMT-0*")
+        assert raised(report) == {"NMT-09"}
+        bench.canopen_network().send_message(0, b"\x01")
+        with pytest.raises(struct.error):
+            bench.run_for("10ms")
+
+
+def test_what_the_hands_raise_is_no_failure_of_the_slave() -> None:
+    def hands(*words: str) -> str:
+        raise KeyError(words[0])
+
+    report = conformance(Fragile(), node_id=5, eds=R1_EDS, only="PR-01", stimulus=hands)
+    (result,) = report.results
+    assert result.outcome.verdict is Verdict.INCONCLUSIVE
+    assert result.outcome.reason == "the stimulus raised KeyError: 'input'"
+
+
+def test_another_device_of_a_bench_that_raises_accuses_nobody() -> None:
+    with Bench(left=strict(1), right=make_epos(2)) as bench:
+        report = conformance(bench["right"], only="NMT-0*")
+        assert report.count(Verdict.FAIL) == 0
+        disturbed = [line.text for each in report.results for line in each.outcome.evidence]
+        assert any(text.startswith("left raised struct.error") for text in disturbed)
 
 
 def test_a_slave_that_raises_from_the_beginning_ends_the_run() -> None:
