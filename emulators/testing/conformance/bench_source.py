@@ -56,7 +56,7 @@ def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") ->
             BenchStimulus(BenchDevice(mode, nodes[number][1]), slaves[nodes[number][1]])
         ),
         close=lambda: mode.act(lambda rig: _watch_no_more(_mount(rig, bus))),
-        watch=lambda number, run: _tell(crashes, nodes[number][1], run),
+        watch=lambda number, run: _watch(crashes, nodes[number][1], run),
     )
 
 
@@ -87,7 +87,7 @@ def _watch_no_more(mount: BusMount) -> None:
         node.on_crash = None
 
 
-def _tell(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:
+def _watch(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:
     """Let a crash be a failure of the node under test; that of another one disturbs."""
     for each, crash in crashes.items():
         crash.watch(run.crash if each == name else lambda reason, where: run.disturb(reason))

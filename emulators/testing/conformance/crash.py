@@ -24,17 +24,17 @@ class Crashes:
 
     def __init__(self, who: str) -> None:
         self._who, self._kept = who, list[tuple[str, list[str]]]()
-        self._tell: Crash = lambda reason, where: self._kept.append((reason, where))
+        self._report: Crash = lambda reason, where: self._kept.append((reason, where))
 
     def __call__(self, error: Exception) -> None:
         """Take what it has raised."""
-        self._tell(crash_text(error, self._who), crash_lines(error))
+        self._report(crash_text(error, self._who), crash_lines(error))
 
-    def watch(self, tell: Crash) -> None:
+    def watch(self, report: Crash) -> None:
         """Tell of them from now on, and of those before."""
-        self._tell = tell
+        self._report = report
         for reason, where in self._kept:
-            tell(reason, where)
+            report(reason, where)
 
 
 def guarded(stimulus: Stimulus) -> Stimulus:
