@@ -14,7 +14,7 @@ TESTING: Final = "tickrig.emulators.testing.commands"
 COMMANDS: Final = {
     "check": (
         f"{TESTING}.check_cli:check",
-        "Check rig files: say what is on the bench, or all that is wrong.",
+        "Check rig files and bus.yml: say what is on the bench, or all that is wrong.",
     ),
     "compare": (
         f"{TESTING}.compare_cli:compare_command",

@@ -1,7 +1,8 @@
-"""The command `tickrig check`: what a rig file says, or all that is wrong with it."""
+"""The command `tickrig check`: what a rig file or a bus.yml says, or all that is wrong with it."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -13,27 +14,63 @@ from tickrig.host.cli.start import loading
 
 MISTAKES: Final = 1
 UNREADABLE: Final = 2
+LOOKED_AT: Final = 65_536
+"""Bytes at its beginning by which a bus.yml is known."""
 
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.option("--strict", is_flag=True, help="Warnings count, too: a bus.yml has some.")
 @click.pass_context
-def check(context: click.Context, /, files: tuple[Path, ...]) -> None:
-    """Check rig files: say what is on the bench, or all that is wrong.
+def check(context: click.Context, /, files: tuple[Path, ...], strict: bool) -> None:
+    """Check rig files and bus.yml: say what is on the bench, or all that is wrong.
 
     Each mistake is a line FILE:LINE: REASON. Devices are made once to see that their
     options, inputs and faults are right, so a FILE.py that one names is run; nothing is
-    opened. Exit status 0: all is well; 1: there are mistakes; 2: a file cannot be read.
+    opened. The bus.yml of dcfgen and ros2_canopen is known by its content, and held
+    against the EDS files that it names.
+    Exit status 0: all is well; 1: there are mistakes; 2: a file cannot be read.
 
     \b
     tickrig check rig.toml
     tickrig check benches/*.toml
+    tickrig check config/bus.yml --strict
     """  # noqa: D301 - click wants the backspace
-    context.exit(max(map(_check, files)))
+    context.exit(max([_check(file, strict) for file in files]))
 
 
-def _check(file: Path) -> int:
+def _check(file: Path, strict: bool) -> int:
     """Check a file, and return the exit status."""
+    try:
+        return _check_bus(file, strict) if _is_bus(file) else _check_rig(file)
+    except OSError as error:
+        say(f"Error: {file}: {error.strerror}")
+        return UNREADABLE
+
+
+def _is_bus(file: Path) -> bool:
+    """Look into a file, not into a pipe, which is read but once."""
+    from tickrig.host.canopen.bus_file.bus_file import is_bus_file  # noqa: PLC0415 - slow
+
+    with suppress(OSError):
+        if file.is_file():
+            with file.open("rb") as opened:
+                return is_bus_file(opened.read(LOOKED_AT))
+    return False
+
+
+def _check_bus(file: Path, strict: bool) -> int:
+    with loading():
+        from tickrig.emulators.testing.commands.check_bus import check_bus  # noqa: PLC0415 - slow
+
+    try:
+        return check_bus(file, strict=strict)
+    except ImportError as error:
+        say(f"Error: {file}: {error}")
+        return UNREADABLE
+
+
+def _check_rig(file: Path) -> int:
     with loading():
         from tickrig.emulators.testing.rig_file.reader import read_rig_file  # noqa: PLC0415 - slow
         from tickrig.emulators.testing.rig_file.section import RigFileError  # noqa: PLC0415
@@ -44,8 +81,5 @@ def _check(file: Path) -> int:
     except RigFileError as error:
         click.echo(str(error))
         return MISTAKES
-    except OSError as error:
-        say(f"Error: {file}: {error.strerror}")
-        return UNREADABLE
     click.echo("\n".join([f"{file}: ok: {first}", *wires]))
     return 0

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from tickrig.host.canopen.bus_file.bus_checks import (
+    check_cob_ids,
+    check_container,
+    check_node_ids,
+)
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusOptions, BusSlave
 from tickrig.host.canopen.bus_file.item import Place
 from tickrig.host.canopen.bus_file.layout import Layout, read_layout
@@ -18,7 +24,10 @@ from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
 
 MOST_BYTES: Final = 1 << 20
 """A larger file is no bus.yml."""
-HIGHEST_NODE_ID: Final = 127
+_SECTION: Final = re.compile(
+    r"^(master|nodes|defaults)[ \t]*:|^[ \t]+(dcf|node_id)[ \t]*:", re.MULTILINE
+)
+_TOML: Final = re.compile(r"^[ \t]*\[\[?[\w.\"-]+\]|^[\w.-]+[ \t]*=", re.MULTILINE)
 NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
 
 
@@ -53,6 +62,19 @@ class BusFile:
 
     def _of(self, severity: Severity) -> tuple[RuleFinding, ...]:
         return tuple(one for one in self.findings if one.rule.severity is severity)
+
+
+def is_bus_file(data: bytes) -> bool:
+    r"""Return whether a file is a bus.yml, a good or a bad one; PyYAML is not needed.
+
+    Args:
+        data: the file, or its beginning.
+
+    >>> is_bus_file(b"master:\n  node_id: 1\n"), is_bus_file(b"[device.rrc]\n")
+    (True, False)
+    """
+    text = data.decode("utf-8", "replace")
+    return _SECTION.search(text) is not None and _TOML.search(text) is None
 
 
 def read_bus_file(path: Path) -> BusFile:
@@ -116,16 +138,19 @@ class _Reader:
         for name, node in self._layout.slaves.items():
             if (slave := self._slave(node, master)) is not None:
                 slaves[name] = slave
-        self._check_drivers()
+        check_node_ids(self._layout, master, slaves)
+        check_cob_ids(self._notes, master, slaves)
+        check_container(self._layout)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, node: Section, master: BusMaster | None) -> BusSlave | None:
         sheet = find_sheet(node, self._options.dcf_path, self._path.parent)
         if sheet is None:
             return None
-        if not 1 <= sheet.node_id <= HIGHEST_NODE_ID:
+        if not sheet.node_id:
             if "node_id" not in node:
-                node.note("no-node-id", "node_id", f"no node_id, and none in {sheet.path.name}")
+                text = f"no node_id, and none in {sheet.path.name}"
+                node.note("no-node-id", "node_id", text)
             return None
         reader = SlaveReader(node, sheet, self._options, self._cob_ids)
         slave = reader.read()
@@ -133,18 +158,3 @@ class _Reader:
             watch_master(node, sheet, reader.writes, master)
         writes = reader.writes
         return replace(slave, writes=writes.all, pdos=pdos_after(sheet, writes))
-
-    def _check_drivers(self) -> None:
-        """Note what the container of ros2_canopen misses, in a file that is for it."""
-        sections = [*self._layout.slaves.values()]
-        if self._layout.master is not None:
-            sections.append(self._layout.master)
-        keys = ("driver", "package")
-        if not any(key in section for section in sections for key in keys):
-            return
-        for section in sections:
-            for key in keys:
-                if key not in section:
-                    section.note("no-driver", key, f"no {key}")
-            if "node_id" not in section:
-                section.note("no-node-id", "node_id", "no node_id, which the container wants here")

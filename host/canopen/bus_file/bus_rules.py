@@ -35,6 +35,8 @@ _ERRORS: Final = (
     ("node-id", "CiA 301 7.2", "no node has it", "node_id: 1 to 127"),
     ("node-id-twice", "CiA 301 7.2", "two nodes answer to one master", "give each its own"),
     ("no-driver", CONTAINER, "the container refuses the node", "driver: a class, package: where"),
+    ("hidden", CONTAINER, "the container stops here", "defaults: and nodes:, for cogen"),
+    ("node-name", CONTAINER, "the container does not load it", "give it another name"),
     ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
 )
 _WARNINGS: Final = (
@@ -45,6 +47,7 @@ _WARNINGS: Final = (
     ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),
     ("section-lost", COGEN, "cogen drops it", "put it under nodes:"),
     ("defaults-win", COGEN, "cogen overwrites what the node says", "take it out of defaults"),
+    ("identity-key", DCFGEN, "the master checks what the EDS says", "write it into the EDS"),
     ("identity", DCFGEN, "the master refuses the node", "give bus.yml and EDS one number"),
     ("no-object", DCFGEN, "dcfgen leaves it out", "leave the key out"),
     ("read-only", DCFGEN, "the node refuses it at boot-up", "leave it out, or mend the EDS"),
@@ -57,15 +60,17 @@ _WARNINGS: Final = (
     ("not-mappable", DCFGEN, "the node refuses it at boot-up", "map what can be mapped"),
     ("direction", "CiA 306", "the node refuses it at boot-up", "map it the other way"),
     ("pdo-length", DCFGEN, "the node refuses it at boot-up", "map at most 64 bits"),
-    ("mapping-full", "CiA 301", "the node refuses it at boot-up", "map fewer objects"),
+    ("mapped-length", DCFGEN, "dcfgen takes the length of the EDS", "leave bits out"),
     ("not-enabled", DCFGEN, "the PDO is never sent", "cob_id: auto"),
-    ("not-disabled", DCFGEN, "the master waits for a PDO that does not come", "mapping: []"),
     ("cob-id-twice", "CiA 301", "one CAN-ID means two things", "cob_id: auto, or another one"),
     ("cob-id-restricted", "CiA 301", "it clashes with a service", "cob_id: auto, or another one"),
     ("error-control", DCFGEN, "dcfgen drops guarding", "keep heartbeat or guarding"),
     ("no-entry", DCFGEN, "the node does not watch the master", "free an entry of 1016h"),
 )
-_NOTES: Final = (("own-key", CONTAINER, "nothing", "leave it, if a driver of your own reads it"),)
+_NOTES: Final = (
+    ("own-key", CONTAINER, "nothing", "leave it, if a driver of your own reads it"),
+    ("not-disabled", DCFGEN, "the master has a PDO that never comes", "mapping: []"),
+)
 
 RULES: Final = {
     name: Rule(name, severity, clause, breaks, fix)

@@ -6,14 +6,11 @@ import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 
 from tickrig.host.canopen.bus_file.item import Item, Place
+from tickrig.wire.canopen.cob_id import INVALID
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.pdo import MappedObject
-
-INVALID: Final = 1 << 31
-"""Bit of a COB-ID: the PDO, or the service, is not there."""
 
 Extra = Mapping[str, Item]
 """A mapping `tickrig:` of the file, as it stands there."""
@@ -105,6 +102,7 @@ class Channel:
         scale_pos_from_dev: units of position for a device unit.
         scale_vel_to_dev: device units for a unit of speed.
         scale_vel_from_dev: units of speed for a device unit.
+        scale_eff_to_dev: device units for a unit of effort.
         scale_eff_from_dev: units of effort for a device unit.
         offset_pos_to_dev: device units that are added.
         offset_pos_from_dev: units of position that are added.
@@ -115,6 +113,7 @@ class Channel:
     scale_pos_from_dev: float = 0.001
     scale_vel_to_dev: float = 1000.0
     scale_vel_from_dev: float = 0.001
+    scale_eff_to_dev: float = 1000.0
     scale_eff_from_dev: float = 0.001
     offset_pos_to_dev: float = 0.0
     offset_pos_from_dev: float = 0.0

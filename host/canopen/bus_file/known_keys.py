@@ -14,6 +14,7 @@ EXTRA: Final = "tickrig"
 
 OPTIONS: Final = ("dcf_path", "heartbeat_multiplier", "retry_factor", EXTRA)
 BOTH: Final = (
+    *("vendor_id", "product_code"),
     *("node_id", "revision_number", "serial_number", "time_cob_id"),
     *("heartbeat_multiplier", "heartbeat_consumer", "heartbeat_producer", "error_behavior"),
     *("driver", "package", "namespace", "dcf", "dcf_path", "remappings", "diagnostics", EXTRA),
@@ -21,13 +22,13 @@ BOTH: Final = (
 )
 MASTER: Final = (
     *BOTH,
-    *("baudrate", "vendor_id", "product_code", "emcy_inhibit_time", "nmt_inhibit_time"),
+    *("baudrate", "emcy_inhibit_time", "nmt_inhibit_time"),
     *("sync_period", "sync_window", "sync_overflow", "start", "start_nodes", "start_all_nodes"),
     *("reset_all_nodes", "stop_all_nodes", "boot_time", "boot_timeout"),
 )
 SCALES: Final = (
     *("scale_pos_to_dev", "scale_pos_from_dev", "scale_vel_to_dev", "scale_vel_from_dev"),
-    *("scale_eff_from_dev", "offset_pos_to_dev", "offset_pos_from_dev"),
+    *("scale_eff_to_dev", "scale_eff_from_dev", "offset_pos_to_dev", "offset_pos_from_dev"),
 )
 DRIVER: Final = (
     *("enable_lazy_load", "polling", "period", "switching_state", "homing_timeout_seconds"),
@@ -45,8 +46,8 @@ PDO: Final = (
     *("enabled", "cob_id", "transmission", "inhibit_time", "event_timer", "event_deadline"),
     *("sync_start", "mapping"),
 )
-MAPPED: Final = ("index", "sub_index")
-WRITE: Final = (*MAPPED, "value")
+MAPPED: Final = ("index", "sub_index", "bits")
+WRITE: Final = ("index", "sub_index", "value")
 
 
 def check_keys(section: Section, known: Iterable[str], *, open_to_others: bool = False) -> None:

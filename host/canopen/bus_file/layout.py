@@ -23,20 +23,13 @@ class Layout(NamedTuple):
         options: None where there are none.
         master: None where there is none.
         slaves: by name, in the order of dcfgen.
-        is_cogen: whether cogen made them of `defaults` and `nodes`.
+        hidden: what begins with a dot, where dcfgen reads the file as it is.
     """
 
     options: Section | None
     master: Section | None
     slaves: dict[str, Section]
-    is_cogen: bool
-
-
-def looks_like_bus(tree: Item) -> bool:
-    """Return whether a file is a bus.yml at all, good or bad."""
-    return bool({MASTER, NODES} & tree.fields.keys()) or any(
-        {"dcf", "node_id"} & section.fields.keys() for section in tree.fields.values()
-    )
+    hidden: tuple[Section, ...]
 
 
 def read_layout(tree: Item, notes: Notes) -> Layout:
@@ -46,22 +39,21 @@ def read_layout(tree: Item, notes: Notes) -> Layout:
     than what a node says, and all keys are sorted.
     """
     top = Section(notes, "", tree, tree.place)
-    is_cogen = NODES in tree.fields or DEFAULTS in tree.fields
-    slaves = _cogen_nodes(top) if is_cogen else _nodes(top)
-    return Layout(_optional(top, OPTIONS), _optional(top, MASTER), slaves, is_cogen)
+    ends = _optional(top, OPTIONS), _optional(top, MASTER)
+    if NODES in top or DEFAULTS in top:
+        return Layout(*ends, _cogen_nodes(top), ())
+    nodes = {
+        name: Section(notes, shorten(name), item, top.place_of(key))
+        for key, name, item in _named(top, top.fields)
+        if name not in {OPTIONS, MASTER}
+    }
+    hidden = [name for name in nodes if name.startswith(".")]
+    return Layout(*ends, nodes, tuple(nodes.pop(name) for name in hidden))
 
 
 def _optional(top: Section, key: str) -> Section | None:
     item = top.fields.get(key)
     return None if item is None else Section(top.notes, key, item, top.place_of(key))
-
-
-def _nodes(top: Section) -> dict[str, Section]:
-    return {
-        name: Section(top.notes, shorten(name), item, top.place_of(key))
-        for key, name, item in _named(top, top.fields)
-        if name not in {OPTIONS, MASTER} and not name.startswith(".")
-    }
 
 
 def _cogen_nodes(top: Section) -> dict[str, Section]:

@@ -17,10 +17,10 @@ class Notes:
     """All findings of a file, each once."""
 
     def __init__(self) -> None:
-        self._found: dict[RuleFinding, None] = {}
+        self._found: dict[tuple[str, Place, str], RuleFinding] = {}
 
     def note(self, rule: str, place: Place, where: str, text: str) -> None:
-        """Note what breaks a rule.
+        """Note what breaks a rule; what several nodes have of one line is noted once.
 
         Args:
             rule: its name.
@@ -29,12 +29,12 @@ class Notes:
             text: what came, and what was allowed.
         """
         found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
-        self._found[found] = None
+        self._found.setdefault((rule, place, text), found)
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
         """All of them in the order of the lines."""
-        return tuple(sorted(self._found, key=lambda one: (one.file, one.line)))
+        return tuple(sorted(self._found.values(), key=lambda one: (one.file, one.line)))
 
 
 class Section:

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_values import INVALID, BusPdo
+from tickrig.host.canopen.bus_file.bus_values import BusPdo
 from tickrig.host.canopen.bus_file.known_keys import MAPPED, PDO, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
 from tickrig.host.canopen.bus_file.sheet import Sheet
 from tickrig.host.canopen.bus_file.writes import Writes
+from tickrig.wire.canopen.cob_id import INVALID
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 
@@ -88,10 +89,10 @@ class PdoReader:
         if was != pdo.cob_id | INVALID:
             self._writes.add(index, 1, pdo.cob_id | INVALID, section.place_of("cob_id"))
         if not pdo.enabled:
-            if section.flag("enabled", "cob_id" in section):
+            if section.flag("enabled", "mapping" in section and "cob_id" not in section):
                 where = self._sheet.place(index, 1)
                 text = f"cob_id is 0x{pdo.cob_id:08X}, with bit 31: it stays off: {where}"
-                section.note("not-enabled", "enabled" if "enabled" in section else "cob_id", text)
+                section.note("not-enabled", "enabled", text)
             return pdo
         pdo = self._with_parameters(pdo, index, section)
         if "mapping" in section:
@@ -176,10 +177,17 @@ class PdoReader:
         row = self._sheet.row(index, sub)
         what = f"{index:04X}h:{sub:02X}"
         if row is None:
-            text = f"{what} is not there: {self._sheet.place(index)}"
+            text = f"{what} is not there: {self._sheet.beside(index)}"
             entry.note("object-missing", "index", text)
             return None
         self._check_mappable(entry, row, what, pdo)
+        if (bits := entry.whole("bits", row.data_type.bits)) != row.data_type.bits:
+            where = self._sheet.place(index, sub)
+            entry.note(
+                "mapped-length",
+                "bits",
+                f"bits: {bits}, but {what} has {row.data_type.bits}: {where}",
+            )
         if not row.data_type.bits:
             text = f"{what} is a {row.data_type.name}, which no PDO carries"
             entry.note("value-type", "index", text)

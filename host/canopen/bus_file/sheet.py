@@ -10,7 +10,12 @@ from typing import Final
 from tickrig.host.canopen.bus_file.item import Place
 from tickrig.host.canopen.bus_file.notes import Section
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_device import COMMISSIONING, EdsDevice, read_device
+from tickrig.wire.canopen.eds.eds_device import (
+    COMMISSIONING,
+    HIGHEST_NODE_ID,
+    EdsDevice,
+    read_device,
+)
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number
 from tickrig.wire.canopen.eds.object_table import EntryDescription
@@ -18,6 +23,7 @@ from tickrig.wire.canopen.eds.object_table import EntryDescription
 FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
 """What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
+UNSET: Final = 255
 
 
 class Sheet:
@@ -56,6 +62,10 @@ class Sheet:
             return default
         data = row.power_on_data(self.node_id)
         return int.from_bytes(data, "little", signed=row.signed)
+
+    def beside(self, index: int) -> str:
+        """Say where an object is described that lacks an entry, or that there is no object."""
+        return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
     def place(self, index: int, sub: int | None = None) -> Place:
         """Return the line where an object, or an entry of it, is described."""
@@ -114,6 +124,18 @@ def find_sheet(node: Section, dcf_path: str, folder: Path) -> Sheet | None:
     return None
 
 
+def _node_id(node: Section) -> int:
+    """Return the node-ID that the section gives, 0 for none or a wrong one."""
+    number = node.whole("node_id", UNSET, -(1 << 31))
+    if number != UNSET and not 1 <= number <= HIGHEST_NODE_ID:
+        node.note("node-id", "node_id", f"node_id: {number} is not in 1..127")
+    elif number == UNSET and "node_id" in node:
+        node.note("no-node-id", "node_id", "node_id: 255 is no node: dcfgen leaves it out")
+    else:
+        return number % UNSET
+    return 0
+
+
 def _said(path: Path, error: OSError | ValueError) -> str:
     if isinstance(error, EdsError):
         return shorten(str(error))
@@ -138,7 +160,7 @@ def _expanded(text: str, folder: Path) -> str:
 
 def _read(node: Section, path: Path, *, is_first: bool) -> Sheet | None:
     file = open_eds(path)
-    sheet = Sheet(path, file, node.whole("node_id", 0, 0, 127) if "node_id" in node else 0)
+    sheet = Sheet(path, file, _node_id(node))
     if not is_first:
         node.note("file-elsewhere", "dcf", f"dcf: it is taken from {path.parent}")
     for one in file.errors:

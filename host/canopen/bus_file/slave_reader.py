@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import (
-    INVALID,
     BusOptions,
     BusSlave,
     Channel,
@@ -24,6 +23,7 @@ from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader, pdos_after
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet
 from tickrig.host.canopen.bus_file.writes import Writes
+from tickrig.wire.canopen.cob_id import INVALID
 
 HIGHEST_NODE_ID: Final = 127
 MOST_CHANNELS: Final = 8
@@ -50,6 +50,7 @@ class SlaveReader:
         """Read it all; the writes come in the order of dcfgen."""
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
+        self._check_identity_keys()
         identity = self._identity()
         self._changed("time_cob_id", TIME, 0x100)
         heartbeat = self._changed("heartbeat_producer", HEARTBEAT, 0, UNSIGNED16)
@@ -121,6 +122,18 @@ class SlaveReader:
         return Identity(
             *(number if there else 0 for number, there in zip(checked, has, strict=True))
         )
+
+    def _check_identity_keys(self) -> None:
+        """Note what the master has of the EDS alone."""
+        for key, head, sub in (
+            ("vendor_id", "VendorNumber", 1),
+            ("product_code", "ProductNumber", 2),
+        ):
+            if key in self._node:
+                where = self._sheet.place(IDENTITY, sub)
+                number = self._sheet.identity(head, sub)
+                text = f"{key} of a node is not read: 0x{number:08X} is checked: {where}"
+                self._node.note("identity-key", key, text)
 
     def _changed(self, key: str, index: int, usual: int, high: int = 0xFFFF_FFFF) -> int:
         """Read a number that an object holds; write it if it differs from the EDS."""

@@ -61,8 +61,7 @@ class Writes:
             kind = row.data_type
             self._check_access(row, what, place)
         elif sub or index not in self._sheet:
-            beside = self._sheet.place(index)
-            text = f"{what} is not there: {beside}"
+            text = f"{what} is not there: {self._sheet.beside(index)}"
             self._notes.note("object-missing", place, self._name, text)
             return None
         data = self._data(kind, what, value, place, said or str(value))
@@ -97,13 +96,6 @@ class Writes:
             self._notes.note("value-limits", place, self._name, text)
 
 
-def final_values(sheet: Sheet, writes: Iterable[BusWrite]) -> dict[int, int]:
-    """Return the numbers of PDO parameters after the writes, by index << 8 | sub-index."""
-    values = {
-        row.key: int.from_bytes(row.power_on_data(sheet.node_id), "little")
-        for row in sheet.device.entries
-        if 0x1400 <= row.index < 0x1C00 and row.data_type.is_integer
-    }
-    for write in writes:
-        values[write.index << 8 | write.sub_index] = int.from_bytes(write.data, "little")
-    return values
+def final_places(writes: Iterable[BusWrite]) -> dict[int, Place]:
+    """Return what asks for the last write to an entry, by index << 8 | sub-index."""
+    return {write.index << 8 | write.sub_index: write.place for write in writes}

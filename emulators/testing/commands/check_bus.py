@@ -1,0 +1,69 @@
+"""What `tickrig check` says of a bus.yml: findings, or what is on the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
+
+MISTAKES: Final = 1
+
+
+def check_bus(file: Path, *, strict: bool) -> int:
+    """Check a bus.yml, and return the exit status.
+
+    Args:
+        file: whose name is said.
+        strict: warnings count, too.
+
+    Raises:
+        OSError: it cannot be read.
+        ImportError: PyYAML is not installed.
+    """
+    bus = read_bus_file(file)
+    for finding in bus.findings:
+        click.echo(str(finding))
+    if bus.errors or (strict and bus.warnings):
+        return MISTAKES
+    click.echo("\n".join([f"{file}: ok: {_head(bus)}", *_slaves(bus)]))
+    return 0
+
+
+def _head(bus: BusFile) -> str:
+    slaves = "1 slave" if len(bus.slaves) == 1 else f"{len(bus.slaves)} slaves"
+    return f"{slaves}, {_master(bus.master) if bus.master else 'no master'}"
+
+
+def _master(master: BusMaster) -> str:
+    words = [f"master {master.node_id}"]
+    if master.sync_period_us:
+        words.append(f"SYNC each {master.sync_period_us / 1_000:g} ms")
+    if master.heartbeat_producer_ms:
+        words.append(f"heartbeat each {master.heartbeat_producer_ms} ms")
+    return ", ".join(words)
+
+
+def _slaves(bus: BusFile) -> Iterator[str]:
+    """Yield a line for each slave."""
+    width = max(map(len, bus.slaves), default=0)
+    for name, slave in bus.slaves.items():
+        yield f"  {name:{width}}  {_slave(slave)}"
+
+
+def _slave(slave: BusSlave) -> str:
+    count = len(slave.writes)
+    words = [
+        f"node-ID {slave.node_id}",
+        slave.sheet.name,
+        f"{count} write{'' if count == 1 else 's'} at boot-up" if slave.boot else "not booted",
+    ]
+    if slave.heartbeat_producer_ms:
+        words.append(f"heartbeat each {slave.heartbeat_producer_ms} ms")
+    if slave.num_channels > 1:
+        words.append(f"axes {', '.join(slave.channel_names)}")
+    return ", ".join(words)

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tests.host.canopen.bus_file.bench import NODE, write_bus
+from tests.host.canopen.bus_file.shapes import COGEN, PLAIN
+from tickrig.emulators.testing.commands.check_cli import check
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words: str) -> tuple[int, list[str], str]:
+    result = CliRunner().invoke(check, words)
+    return result.exit_code, result.stdout.splitlines(), result.stderr
+
+
+def test_a_good_file_is_summed_up(folder: Path) -> None:
+    write_bus(folder, PLAIN)
+    assert run("bus.yml") == (
+        0,
+        [
+            "bus.yml: ok: 1 slave, master 1, SYNC each 10 ms",
+            "  left  node-ID 2, epos.eds, 23 writes at boot-up",
+        ],
+        "",
+    )
+
+
+def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
+    write_bus(folder, NODE + "  sdo:\n    - {index: 0x6041, value: 1}\n    - {index: 0x9999}\n")
+    status, out, _ = run("bus.yml")
+    assert status == 1
+    assert out[0].startswith(
+        "bus.yml:6: warning: [read-only] [axis] 6041h:00 cannot be written: epos.eds:"
+    )
+    assert out[1] == (
+        "bus.yml:7: error: [object-missing] [axis] 9999h:00 is not there: epos.eds has no 9999h;"
+        " fix: write to what is there (dcfgen)"
+    )
+    assert len(out) == 2
+
+
+def test_warnings_count_where_that_is_wanted(folder: Path) -> None:
+    write_bus(folder, COGEN)
+    assert run("bus.yml")[0] == 0
+    assert run("bus.yml", "--strict")[0] == 1
+
+
+def test_it_is_known_by_its_content_and_a_rig_file_by_its_own(folder: Path) -> None:
+    write_bus(folder, NODE).rename("bench.toml")
+    (folder / "rig.yml").write_text('[device.rrc]\ntype = "rrc"\n# master: 1\n')
+    status, out, _ = run("bench.toml", "rig.yml")
+    assert (status, out[0]) == (0, "bench.toml: ok: 1 slave, master 1")
+    assert out[2] == "rig.yml: ok: 1 device, 1 wire"
+
+
+def test_a_pipe_is_read_but_once(folder: Path) -> None:
+    read, write = os.pipe()
+    os.write(write, b'[device.rrc]\ntype = "rrc"\n')
+    os.close(write)
+    status, out, _ = run(f"/dev/fd/{read}")
+    os.close(read)
+    assert (status, out[0]) == (0, f"/dev/fd/{read}: ok: 1 device, 1 wire")
+
+
+def test_without_pyyaml_the_extra_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_bus(folder, NODE)
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    monkeypatch.delitem(sys.modules, "tickrig.host.canopen.bus_file.yaml_tree", raising=False)
+    status, out, err = run("bus.yml")
+    said = "Error: bus.yml: a bus.yml needs PyYAML: pip install 'tickrig[bus]'\n"
+    assert (status, out, err) == (2, [], said)
