@@ -7,9 +7,16 @@ from types import TracebackType
 from typing import Any, Final, Self, cast
 
 from tickrig.host.canopen.master.assignment import MasterPlan
+from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.nmt_master import NmtMaster
+from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.waiting import Operation, perform
 from tickrig.host.links.link import Link, StampedLink
+from tickrig.host.text.values import parse_time_us
+
+Duration = int | str
+"""Microseconds, or a text as `"100ms"`."""
 
 STARTED_US: Final = 2_000
 """By then a command to start has been heard."""
@@ -24,6 +31,7 @@ class CanopenMaster:
 
     Attributes:
         nmt: the NMT master that is run.
+        joints: axes of drives by name.
 
     Raises:
         TypeError: a link to a serial line.
@@ -34,6 +42,7 @@ class CanopenMaster:
             raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
         self._link = cast(StampedLink, link)  # what has receive_stamped is one
         self.nmt = NmtMaster(plan)
+        self.joints: dict[str, DriveDriver] = {}
         self._by_name = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
 
     def __enter__(self) -> Self:
@@ -64,30 +73,36 @@ class CanopenMaster:
             return self.nmt.slaves[name]
         return self._by_name[name]
 
-    def boot(self, within_us: int = 10_000_000) -> None:
+    def attach(self, process_data: ProcessData) -> None:
+        """Let the master exchange process data and drive drives from now on."""
+        self.nmt.process_data = process_data
+        drivers = [driver for node in process_data.drives for driver in node.drivers]
+        self.joints = {driver.name: driver for driver in drivers}
+
+    def boot(self, within: Duration = "10s") -> None:
         """Start the network: let time pass until each slave has booted.
 
         Args:
-            within_us: for how long at most.
+            within: for how long at most: microseconds, or a text as `"100ms"`.
 
         Raises:
             BootFailed: some have not; it says which, and why.
         """
-        self.wait_until(self._all_booted, within_us)
+        self.wait_until(self._all_booted, within)
         if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
             raise BootFailed(failed)
         self.run_for(STARTED_US)
 
-    def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
-        self.wait_until(_never, duration_us)
+    def run_for(self, duration: Duration) -> None:
+        """Let time pass: microseconds, or a text as `"100ms"`."""
+        self.wait_until(_never, duration)
 
-    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+    def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
         """Let time pass until something is so.
 
         Args:
             done: says whether it is.
-            within_us: for how long at most.
+            within: for how long at most: microseconds, or a text as `"100ms"`.
 
         Returns:
             False if the time was over first.
@@ -95,12 +110,21 @@ class CanopenMaster:
         Raises:
             LinkClosed: the bus is gone.
         """
-        until_us = self.now_us + within_us
+        until_us = self.now_us + (parse_time_us(within) if isinstance(within, str) else within)
         while not done():
             if self.now_us >= until_us:
                 return False
             self._step(until_us)
         return True
+
+    def perform(self, *operations: Operation) -> None:
+        """Run operations of joints, all at once: `master.perform(left.init(), right.init())`.
+
+        Raises:
+            DriveFailed: a drive did not do in time what was wanted of it.
+            LinkClosed: the bus is gone.
+        """
+        perform(operations, lambda: self.now_us, self.wait_until)
 
     def explain(self, name: str | int) -> str:
         """Return what was asked and answered in the latest boot-up of a slave, line by line."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.boot_status import BootStatus
 from tickrig.host.canopen.master.network_slave import NetworkSlave
+from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
@@ -51,8 +51,7 @@ class NmtMaster:
         state: its own NMT state.
         halted: a mandatory slave could not be booted, so nothing is started any more.
         strangers: node-IDs that booted and are no slaves: error status A.
-        on_frame: called with the time and each data frame that is no NMT, SDO or EMCY.
-        on_sync: called with the time after each SYNC.
+        process_data: takes all other data frames, and works in periods.
         now_us: the time it was told last.
     """
 
@@ -61,8 +60,7 @@ class NmtMaster:
         self.slaves = {slave.node_id: self._slave(slave) for slave in plan.slaves}
         self.state, self.halted = NmtState.INITIALISING, False
         self.strangers: list[int] = []
-        self.on_frame: Callable[[int, CanFrame], None] = lambda now_us, frame: None
-        self.on_sync: Callable[[int], None] = lambda now_us: None
+        self.process_data = ProcessData({})
         self._heartbeat, self._sync = PeriodicTimer(plan.heartbeat_us), PeriodicTimer(plan.sync_us)
         self.now_us = self._sync_count = 0
 
@@ -75,7 +73,7 @@ class NmtMaster:
         if self.state is NmtState.INITIALISING:
             return self.now_us
         slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
-        return min(slaves, self._heartbeat.due_us, self._sync.due_us)
+        return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
         """Take what was on the bus by now, do what is due; return what is to be sent."""
@@ -87,7 +85,7 @@ class NmtMaster:
         for slave in self.slaves.values():
             if slave.tick(now_us):
                 self._lose(slave)
-        self._produce()
+        self.process_data.tick(now_us, sync=self._produce())
         out, self._out = tuple(self._out), []
         return out
 
@@ -144,7 +142,7 @@ class NmtMaster:
         elif function == EMCY_COB_ID and slave is not None:
             slave.emergencies.append(int.from_bytes(frame.data[:2], "little"))
         else:
-            self.on_frame(at_us, frame)
+            self.process_data.receive(frame)
 
     def _booted(self, slave: NetworkSlave) -> None:
         """Start a slave that has booted, and go on if it was waited for."""
@@ -188,13 +186,16 @@ class NmtMaster:
         else:
             self.command(NmtCommand.RESET_NODE, slave.assignment.node_id)
 
-    def _produce(self) -> None:
-        """Send heartbeat and SYNC when they are due; after a pause once."""
+    def _produce(self) -> bool:
+        """Send heartbeat and SYNC when they are due, after a pause once; True after a SYNC."""
         if self._heartbeat.advance(self.now_us):
             self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):
             self.send(SYNC_COB_ID, self._count())
-            self.on_sync(self.now_us)
+            if self.state is NmtState.OPERATIONAL:
+                self.process_data.sync()
+            return True
+        return False
 
     def _count(self) -> bytes:
         """Return the counter of a SYNC, nothing if it has none."""

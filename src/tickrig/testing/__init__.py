@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     )
     from tickrig.emulators.testing.properties import strategies as strategies
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
+    from tickrig.host.canopen.master.open_master import open_master as open_master
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -18,5 +19,6 @@ else:
             "tickrig.emulators.testing.conformance.pytest_suite": ("conformance_tests",),
             "tickrig.emulators.testing.properties": ("strategies",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
+            "tickrig.host.canopen.master.open_master": ("open_master",),
         },
     )

@@ -1,0 +1,107 @@
+"""The objects of a slave that PDOs carry, as its master has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.canopen.bus_file.bus_values import BusPdo
+from tickrig.host.canopen.dialogue import Send
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
+from tickrig.wire.canopen.pdo import pack_bits, unpack_bits
+
+Key = tuple[int, int]
+"""Index and sub-index."""
+
+EVENT_DRIVEN: Final = 0xFE
+"""Transmission types from here on: a PDO is sent when an object is written."""
+
+SYNC_ACYCLIC: Final = 0
+"""Sent with the SYNC after an object was written."""
+
+
+class ProcessImage:
+    """Values by index and sub-index; what was never received or written is 0.
+
+    An RPDO of the slave goes out when an object in it is written, or with each n-th SYNC if
+    it is synchronous: with 0 for what nobody has written yet, as Lely's master does.
+
+    Not emulated: inhibit times, event timers and deadlines of the master's side.
+
+    Args:
+        pdos: of the slave, those that are there.
+        send: takes CAN-ID and data.
+    """
+
+    def __init__(self, pdos: Iterable[BusPdo], send: Send) -> None:
+        enabled = [pdo for pdo in pdos if pdo.enabled]
+        self._send = send
+        self._received = {pdo.cob_id & CAN_ID_MASK: pdo for pdo in enabled if pdo.transmit}
+        self._sent = [pdo for pdo in enabled if not pdo.transmit]
+        self._inputs = {key for pdo in self._received.values() for key in keys(pdo)}
+        self._outputs = {key for pdo in self._sent for key in keys(pdo)}
+        self._values: dict[Key, int] = {}
+        self._written: set[int] = set()
+        self._syncs = 0
+
+    @property
+    def cob_ids(self) -> Iterable[int]:
+        """The CAN-IDs on which the slave sends."""
+        return self._received
+
+    def receives(self, key: Key) -> bool:
+        """Whether a TPDO of the slave carries an object."""
+        return key in self._inputs
+
+    def sends(self, key: Key) -> bool:
+        """Whether an RPDO of the slave carries an object."""
+        return key in self._outputs
+
+    def read(self, key: Key) -> int:
+        """Return the bits of an object."""
+        return self._values.get(key, 0)
+
+    def write(self, key: Key, bits: int) -> None:
+        """Change an object; send what carries it and is event-driven."""
+        self._values[key] = bits
+        for pdo in self._sent:
+            if key in keys(pdo):
+                if pdo.transmission >= EVENT_DRIVEN:
+                    self._transmit(pdo)
+                else:
+                    self._written.add(pdo.number)
+
+    def learn(self, key: Key, bits: int) -> None:
+        """Take what was read otherwise, as by SDO."""
+        self._values[key] = bits
+
+    def receive(self, can_id: int, data: bytes) -> None:
+        """Take a TPDO; one that is too short is passed over."""
+        pdo = self._received[can_id]
+        widths = [mapped.bits for mapped in pdo.mapping]
+        if 8 * len(data) < sum(widths):
+            return
+        values = unpack_bits(data, widths)
+        for mapped, bits in zip(pdo.mapping, values, strict=True):
+            self._values[mapped.index, mapped.sub] = bits
+
+    def sync(self) -> None:
+        """Send what is due with this SYNC."""
+        self._syncs += 1
+        for pdo in self._sent:
+            if pdo.transmission == SYNC_ACYCLIC:
+                due = pdo.number in self._written
+            else:
+                due = pdo.transmission < EVENT_DRIVEN and self._syncs % pdo.transmission == 0
+            if due:
+                self._transmit(pdo)
+        self._written.clear()
+
+    def _transmit(self, pdo: BusPdo) -> None:
+        fields = ((self.read((one.index, one.sub)), one.bits) for one in pdo.mapping)
+        self._send(pdo.cob_id & CAN_ID_MASK, pack_bits(fields))
+
+
+def keys(pdo: BusPdo) -> tuple[Key, ...]:
+    """Return what a PDO carries."""
+    return tuple((mapped.index, mapped.sub) for mapped in pdo.mapping)

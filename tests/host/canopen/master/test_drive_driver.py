@@ -1,0 +1,218 @@
+"""Each mode of operation moves a joint, as ros2_canopen's 402 driver has it move."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.host.canopen.master.joints import NO_PDOS, PDOS, Cell, cell
+from tickrig.host.canopen.master.cia402.drive_state import DriveState
+from tickrig.host.canopen.master.waiting import DriveFailed
+
+HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
+"""Home is where the motor is."""
+
+
+def ready(drives: Cell, mode: str) -> None:
+    """Enable the joint, and choose a mode."""
+    drives.master.perform(drives.joint.init())
+    drives.master.perform(drives.joint.choose(mode))
+
+
+@pytest.fixture(params=[PDOS, NO_PDOS], ids=["by PDO", "by SDO"])
+def pdos(request: pytest.FixtureRequest) -> str:
+    text: str = request.param
+    return text
+
+
+def test_pp_goes_to_the_target_and_takes_the_next_one(tmp_path: Path, pdos: str) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos) as drives:
+        ready(drives, "pp")
+        for target in (5.0, -2.0):
+            drives.joint.set_target(target)
+            near = drives.master.wait_until(
+                lambda goal=target: abs(drives.joint.position - goal) < 0.01,  # type: ignore[misc]
+                "2s",
+            )
+            assert near, drives.joint.position
+
+
+def test_pv_has_the_target_velocity_after_its_ramp(tmp_path: Path, pdos: str) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos) as drives:
+        ready(drives, "pv")
+        drives.joint.set_target(0.6)
+        assert drives.master.wait_until(lambda: drives.joint.velocity > 0.55, "1s")
+        drives.master.run_for("100ms")
+        assert drives.joint.velocity == pytest.approx(0.6, abs=0.02)
+        drives.joint.set_target(0.0)
+        assert drives.master.wait_until(lambda: abs(drives.joint.velocity) < 0.005, "1s")
+
+
+@pytest.mark.parametrize("mode", ["csp", "ip"])
+def test_a_position_is_followed_from_period_to_period(tmp_path: Path, pdos: str, mode: str) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos) as drives:
+        ready(drives, mode)
+        for step in range(1, 101):
+            drives.joint.set_target(step * 0.02)
+            drives.master.run_for("10ms")
+        drives.master.run_for("100ms")
+        assert drives.joint.position == pytest.approx(2.0, abs=0.01)
+
+
+def test_csv_has_the_target_velocity_within_a_period(tmp_path: Path, pdos: str) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos) as drives:
+        ready(drives, "csv")
+        drives.joint.set_target(0.5)
+        drives.master.run_for("300ms")
+        assert drives.joint.velocity == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("mode", ["cst", "tq"])
+def test_a_torque_accelerates_the_joint(tmp_path: Path, pdos: str, mode: str) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos) as drives:
+        ready(drives, mode)
+        drives.joint.set_target(200)
+        assert drives.master.wait_until(lambda: drives.joint.velocity > 0.5, "1s")
+        assert drives.joint.effort == pytest.approx(0.2, abs=0.02)
+        drives.joint.set_target(-200)
+        assert drives.master.wait_until(lambda: drives.joint.velocity < 0, "5s")
+
+
+def test_hm_finds_the_limit_switch_and_is_zero_there(tmp_path: Path, pdos: str) -> None:
+    method_17 = "  sdo: [{index: 0x6098, value: 17}]\n"
+    with cell(tmp_path, method_17, pdos=pdos) as drives:
+        joint, bench = drives.joint, drives.bench["joint2"]
+        bench.set("negative_limit_at", -20.0)
+        drives.master.perform(joint.init())
+        assert joint.position == pytest.approx(0.0, abs=0.01)
+        assert float(bench.get("shaft_deg")) == pytest.approx(-20.0, abs=0.5)
+        assert (joint.state, joint.mode) == (DriveState.OPERATION_ENABLED, 6)
+
+
+def test_homing_that_finds_nothing_is_given_up_in_its_time(tmp_path: Path) -> None:
+    more = "  homing_timeout_seconds: 2\n  sdo: [{index: 0x6098, value: 17}]\n"
+    with cell(tmp_path, more) as drives:
+        start_us = drives.master.now_us
+        with pytest.raises(DriveFailed, match="joint2: homing did not find home"):
+            drives.master.perform(drives.joint.init())
+        assert 2_000_000 < drives.master.now_us - start_us < 2_500_000
+
+
+def test_method_0_does_not_home(tmp_path: Path) -> None:
+    with cell(tmp_path, "  sdo: [{index: 0x6098, value: 0}]\n") as drives:
+        drives.master.perform(drives.joint.init())
+        assert drives.joint.state is DriveState.OPERATION_ENABLED
+
+
+def test_several_joints_home_and_move_at_once(tmp_path: Path) -> None:
+    nodes = (2, 3, 4)
+    with cell(tmp_path, HOMING_35, nodes=nodes) as drives:
+        joints = [drives.master.joints[f"joint{node}"] for node in nodes]
+        start_us = drives.master.now_us
+        drives.master.perform(*(joint.init() for joint in joints))
+        drives.master.perform(*(joint.choose("csp") for joint in joints))
+        assert drives.master.now_us - start_us < 500_000
+        for step in range(1, 51):
+            for number, joint in enumerate(joints, 1):
+                joint.set_target(step * 0.01 * number)
+            drives.master.run_for("10ms")
+        drives.master.run_for("100ms")
+        assert [round(joint.position, 2) for joint in joints] == [0.5, 1.0, 1.5]
+
+
+def test_without_a_target_the_drive_is_halted(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pv")
+        assert drives.joint.controlword == 0x010F
+        drives.joint.set_target(0.1)
+        drives.master.run_for("30ms")
+        assert drives.joint.controlword == 0x000F
+
+
+def test_halt_stops_quickly_and_a_recovery_goes_on(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pv")
+        drives.joint.set_target(0.6)
+        drives.master.run_for("300ms")
+        drives.joint.halt()
+        left = drives.master.wait_until(
+            lambda: drives.joint.state is not DriveState.OPERATION_ENABLED, "100ms"
+        )
+        assert left
+        drives.master.run_for("300ms")
+        assert abs(drives.joint.velocity) < 0.005
+        drives.master.perform(drives.joint.recover())
+        assert drives.joint.state is DriveState.OPERATION_ENABLED
+
+
+def test_a_fault_is_reset_by_a_recovery_once_its_cause_is_gone(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pv")
+        drives.bench["joint2"].set("short_circuit", 1)
+        drives.master.run_for("100ms")
+        assert drives.joint.state is DriveState.FAULT
+        assert drives.master.slave("joint2").emergencies == [0x2310]
+        with pytest.raises(DriveFailed, match=r"no target in Fault \(statusword"):
+            drives.joint.set_target(0.1)
+        drives.bench["joint2"].set("short_circuit", 0)
+        drives.master.perform(drives.joint.recover())
+        drives.joint.set_target(0.1)
+
+
+def test_a_drive_is_disabled_enabled_and_shut_down(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pp")
+        for goal in (DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED):
+            drives.master.perform(drives.joint.switch_to(goal))
+            assert drives.joint.state is goal
+        drives.master.perform(drives.joint.shut_down())
+        assert drives.joint.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_no_way_leads_from_a_fault_to_a_quick_stop(tmp_path: Path) -> None:
+    with cell(tmp_path) as drives:
+        drives.bench["joint2"].set("short_circuit", 1)
+        drives.master.run_for("100ms")
+        drives.joint.halt()  # as ros2_canopen's: nothing to do in a fault
+        with pytest.raises(DriveFailed, match="no way from"):
+            drives.master.perform(drives.joint.switch_to(DriveState.QUICK_STOP_ACTIVE))
+
+
+def test_modes_that_the_drive_has_not_and_words_that_are_none(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        drives.master.perform(drives.joint.init())
+        with pytest.raises(DriveFailed, match="has no mode 2 "):
+            drives.master.perform(drives.joint.choose("vl"))
+        with pytest.raises(ValueError, match="no mode 'cps'"):
+            drives.master.perform(drives.joint.choose("cps"))
+        with pytest.raises(ValueError, match="no target"):
+            drives.joint.set_target(1.0)
+        drives.master.perform(drives.joint.choose("pp"))
+        with pytest.raises(ValueError, match="nan is no target"):
+            drives.joint.set_target(float("nan"))
+
+
+def test_scales_and_offsets_are_those_of_the_file(tmp_path: Path) -> None:
+    scales = (
+        "  scale_pos_to_dev: 2000.0\n  scale_pos_from_dev: 0.0005\n"
+        "  offset_pos_to_dev: 100.0\n  offset_pos_from_dev: -0.05\n"
+    )
+    with cell(tmp_path, scales + HOMING_35) as drives:
+        ready(drives, "pp")
+        drives.joint.set_target(1.5)
+        assert drives.master.wait_until(lambda: abs(drives.joint.position - 1.5) < 0.002, "2s")
+        assert drives.bench["joint2"].get("0x607A") == 3100
+
+
+def test_a_drive_that_loses_its_supply_is_booted_and_initialised_anew(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pv")
+        drives.bench["joint2"].fault("power_off", for_="500ms")
+        drives.master.run_for("400ms")
+        assert drives.master.slave("joint2").lost == 1
+        drives.master.run_for("2s")
+        ready(drives, "pv")
+        drives.joint.set_target(0.3)
+        drives.master.run_for("500ms")
+        assert drives.joint.velocity == pytest.approx(0.3, abs=0.02)
