@@ -81,7 +81,7 @@ def test_ctrl_c_in_the_middle_restores_what_was_changed(bus: Bus, board: Slave) 
 
 
 def test_a_node_that_stands_still_is_blocked_and_has_not_failed(bus: Bus, board: Slave) -> None:
-    run = begin(bus, "--communication", *only("NMT-0*", "UE-*"))
+    run = begin(bus, "--communication", *only("HB-01", "HB-02"))  # HB-01 holds it for two seconds
     wait_for(lambda: board.get("0x1017") == 100, run)
     board.process.send_signal(signal.SIGSTOP)
     try:
@@ -91,6 +91,7 @@ def test_a_node_that_stands_still_is_blocked_and_has_not_failed(bus: Bus, board:
     assert status == 4
     assert said["counts"]["fail"] == 0
     assert said["counts"]["blocked"] > 0
+    assert said["unrestored"] == ["1017h:00 was 0000; not verified: the node was lost"]
 
 
 def test_a_tester_that_was_stopped_calls_no_silence_a_failure(bus: Bus, board: Slave) -> None:
