@@ -47,8 +47,10 @@ def text_report(
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in unwell(report) if not baseline.knows(result)]
-    parts += [_failure(result, show, again) for result in found[:MOST_SHOWN]]
-    parts.append([_title(result) for result in found[MOST_SHOWN:]])
+    begun = [result for result in found if result.outcome.evidence]
+    parts += [_failure(result, show, again) for result in begun[:MOST_SHOWN]]
+    parts.append([_title(result) for result in begun[MOST_SHOWN:]])
+    parts.append(_never_begun([result for result in found if not result.outcome.evidence]))
     parts += [_list("EDS and node", report.findings), _list("not restored", report.unrestored)]
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
@@ -86,6 +88,15 @@ def _not_applicable(report: Report) -> list[str]:
     rows = [f"{number:5}  {reason}" for reason, number in ranked[:MOST_REASONS]]
     more = len(ranked) - MOST_REASONS
     return ["not applicable:", *rows, *([f"       and {more} reasons more"] if more > 0 else [])]
+
+
+def _never_begun(results: list[Result]) -> list[str]:
+    """Count checks of which nothing was seen on the bus, with the reason that they share."""
+    counts = Counter((each.outcome.verdict, one_line(each.outcome.reason)) for each in results)
+    return [
+        f"{str(verdict).upper()} {counted(number, 'check')}: {reason}"
+        for (verdict, reason), number in counts.items()
+    ]
 
 
 def _failure(result: Result, show: ShowFrames, again: str) -> list[str]:

@@ -57,6 +57,15 @@ def test_many_failures_have_a_line_each_behind_the_first_ones() -> None:
     assert text.count("look at") == 20
 
 
+def test_checks_that_nobody_began_are_counted_in_a_line() -> None:
+    reason = "node 5 does not answer; heard here: nobody"
+    silent = tuple(result(f"UE-{n}", Verdict.BLOCKED, reason, evidence=()) for n in range(30))
+    text = text_report(replace(SAMPLE, results=(*silent, *SAMPLE.results)))
+    assert text.count("BLOCKED") == 2
+    assert "\n\nBLOCKED 30 checks: node 5 does not answer; heard here: nobody\n" in text
+    assert "\nBLOCKED PR-03: " in text
+
+
 def test_a_known_failure_is_not_shown_again_and_one_that_is_mended_is_told() -> None:
     text = text_report(SAMPLE, KNOWN)
     assert "FAIL NMT-11" not in text
