@@ -29,6 +29,11 @@ DRIVE: Final = (0x6040, 0x6041)
 IO_PROFILE: Final = 401
 DRIVE_PROFILE: Final = 402
 MANY_AXES: Final = 0x800
+GUESSED: Final = (
+    *("data-type-missing", "data-type-unknown", "empty-value", "no-number"),
+    *("access-missing", "access-form"),
+)
+"""Where one of these is found, the reader has taken something that nobody wrote."""
 
 
 def mandatory(document: Document) -> Iterator[RuleFinding]:
@@ -55,9 +60,13 @@ def communication(document: Document) -> Iterator[RuleFinding]:
             kind = "an ARRAY or RECORD" if standard.composed else "a VAR"
             what = f"it is a {described.code.name}, {kind} was allowed"
             yield document.found("communication-kind", what, f"{index:04X}", "ObjectType")
+    file = document.file
+    findings = (*file.errors, *file.warnings)
+    guessed = {(one.section, one.line) for one in findings if one.rule in GUESSED}
     for row in document.rows.values():
         if row.index in COMMUNICATION:
-            yield from _entry(document, row, standard_object(row.index))
+            found = _entry(document, row, standard_object(row.index))
+            yield from (one for one in found if (one.section, one.line) not in guessed)
 
 
 def _entry(

@@ -6,7 +6,7 @@ from typing import Final
 
 import pytest
 
-from tests.host.canopen.data_sheet.corpus import CORPUS, DRIVE, GOOD, NAME, Deviation
+from tests.host.canopen.data_sheet.corpus import CORPUS, DRIVE, GOOD, NAME, Deviation, within
 from tickrig.host.canopen.data_sheet.check import check, failing
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.fix import fix
@@ -49,6 +49,24 @@ def test_a_deviation_is_reported(deviation: Deviation) -> None:
     for one in found:
         assert 0 <= one.line <= lines
         assert "\n" not in str(one)
+
+
+@pytest.mark.parametrize(
+    ("section", "line", "other", "rule"),
+    [
+        ("1017", "DataType=0x0006\n", "", "data-type-missing"),
+        ("1017", "DataType=0x0006\n", "DataType=\n", "empty-value"),
+        ("1017", "DataType=0x0006\n", "DataType=abc\n", "no-number"),
+        ("1017", "DataType=0x0006\n", "DataType=0x00FF\n", "data-type-unknown"),
+        ("1000", "AccessType=ro\n", "", "access-missing"),
+        ("1000", "AccessType=ro\n", "AccessType=abc\n", "access-form"),
+    ],
+)
+def test_what_the_reader_has_guessed_breaks_no_other_rule(
+    section: str, line: str, other: str, rule: str
+) -> None:
+    changed = within(section, line, other)(GOOD)
+    assert rules(Document(NAME, changed.encode())) == {rule}
 
 
 @all_deviations
