@@ -28,6 +28,7 @@ from tickrig.wire.canopen.sdo.abort import AbortCode
 BOTH: Final = Access.TPDO | Access.RPDO
 INVALID: Final = 1 << 31
 PDOS: Final = range(4)
+EVENT_DRIVEN: Final = (254, 255)
 
 RPDO_IDS: Final = tuple(f"{0x1400 + n:04X}:01" for n in PDOS)
 TPDO_IDS: Final = tuple(f"{0x1800 + n:04X}:01" for n in PDOS)
@@ -70,8 +71,14 @@ def has_reserved_sub(slave: CanopenSlave) -> Bends:
 
 
 def seems_event_driven(slave: CanopenSlave) -> Bends:
+    """Say that TPDOs are event-driven, whoever writes that too, and wait for SYNC."""
     for number in PDOS:
-        slave.dictionary[0x1800 + number, 2].source = lambda entry: b"\xff"
+        entry = slave.dictionary[0x1800 + number, 2]
+        entry.assign(b"\xff")
+        acts_as(f"{0x1800 + number:04X}:02", lambda kind: 0 if kind in EVENT_DRIVEN else kind)(
+            slave
+        )
+        entry.assign(b"\0")
     return Bends()
 
 
