@@ -80,6 +80,7 @@ class Ds402(Application):
         node: the slave.
         slot: its place in the tick.
         servo: motor, power stage and load.
+        defaults: what counts for objects that its dictionary has not, by (index, sub-index).
 
     Attributes:
         modes: the modes that the drive has, by number.
@@ -111,11 +112,17 @@ class Ds402(Application):
     mode: Mode
     mode_number: int
 
-    def __init__(self, node: CanopenSlave, slot: int, servo: Servo | None = None) -> None:
+    def __init__(
+        self,
+        node: CanopenSlave,
+        slot: int,
+        servo: Servo | None = None,
+        defaults: Mapping[tuple[int, int], int] = indices.DEFAULTS,
+    ) -> None:
         super().__init__(node, slot)
         self._servo, self.outputs = servo, terminals.OUTPUTS
         motor: Motor = servo or IdealMotor()
-        self.parameters = parameters = Parameters(node.dictionary)
+        self.parameters = parameters = Parameters(node.dictionary, defaults)
         listed = parameters.number(indices.SUPPORTED_MODES)
         self.offered: Mapping[int, type[Mode]] = offered(self.modes, listed)
         self._supported = listed or supported(self.offered)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import OnEntry
@@ -15,15 +15,18 @@ class Parameters(Part):
 
     Args:
         dictionary: of the slave.
+        defaults: values of objects that the device has not, by (index, sub-index).
     """
 
-    def __init__(self, dictionary: Dictionary) -> None:
-        self._dictionary = dictionary
+    def __init__(
+        self, dictionary: Dictionary, defaults: Mapping[tuple[int, int], int] = DEFAULTS
+    ) -> None:
+        self._dictionary, self._defaults = dictionary, defaults
 
     def number(self, index: int, sub: int = 0) -> int:
-        """Return a value; the default of `DEFAULTS` if the device has no such object."""
+        """Return a value; that of the defaults if the device has no such object, or 0."""
         entry = self._dictionary.find(index, sub)
-        return DEFAULTS.get((index, sub), 0) if entry is None else entry.number
+        return self._defaults.get((index, sub), 0) if entry is None else entry.number
 
     def write(self, index: int, value: int, sub: int = 0) -> None:
         """Set a value, if the device has such an object; too large a one is cut to its range."""
