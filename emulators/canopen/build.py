@@ -5,56 +5,41 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import UNCONFIGURED, ServiceMaker
+from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import application_of as application_of_component
 from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
-from tickrig.device.canopen.ds401 import Ds401
-from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body.body_spec import BodySpec
-from tickrig.emulators.canopen.choices import AUTO
+from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node import NODE_INPUTS, Node
 from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
+from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.rig import Station
-from tickrig.host.cli.messages import show_findings
+from tickrig.host.cli.messages import say, show_findings
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.log import log_of
+from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error, find_class
 from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.rtc_canopen.objects import device_info
 
-DEVICE_TYPE: Final = 0x1000
+if TYPE_CHECKING:
+    from tickrig.emulators.canopen.bus_file.bus_nodes import BusNodes
 
-PROFILES: Final[dict[str, ServiceMaker]] = {"none": Application, "401": Ds401, "402": Ds402}
-"""Device profiles by the number that the low word of 1000h holds."""
-
-
-def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
-    """Return a profile of `choices.PROFILES`; `auto` takes that of the device type, if it is there.
-
-    >>> application_of(Dictionary([])).__name__
-    'Application'
-    """
-    if profile == AUTO:
-        entry = dictionary.find(DEVICE_TYPE)
-        number = entry.number & 0xFFFF if entry else 0
-        return PROFILES.get(str(number), Application)
-    return PROFILES[profile]
+NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[rtc]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +50,13 @@ class Described:
         name: what its things are called after, and its memory in a store file.
         node_id: 1..127, or `UNCONFIGURED`.
         description: what its file or model says.
+        about: what it moves, for people; empty where nothing is known of it.
     """
 
     name: str
     node_id: int
     description: DeviceDescription
+    about: str = ""
 
 
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
@@ -100,6 +87,21 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
     return list(found.values())
 
 
+def describe_bus(file: Path, urdf: Path | None = None, profile: str = AUTO) -> list[Described]:
+    """Read a bus.yml; Refused with all that is wrong. What is odd is told on standard error.
+
+    Args:
+        file: the bus.yml.
+        urdf: the robot with its joints, None for that which it names.
+        profile: of `choices.PROFILES`, for nodes that name none.
+    """
+    bus = _read_bus(file, urdf, EdsCache(), profile)
+    for remark in bus.remarks:
+        say(remark)
+    show_findings(odd for node in bus.nodes for odd in node.description.warnings)
+    return [Described(node.name, node.node_id, node.description, node.about) for node in bus.nodes]
+
+
 def describe_device(name: str) -> DeviceDescription:
     """Describe a model, or the DeviceRTC of a user's file; Refused if there is none."""
     if name in MODELS:
@@ -123,7 +125,8 @@ def make_nodes(
         dictionary = description.make_dictionary()
         memory = store.nonvolatile(item.name, dictionary) if store else None
         slave = make_slave(dictionary, item.node_id, memory, description.application, sdo)
-        nodes.append(Node(item.name, slave, wire))
+        nodes.append(node := Node(item.name, slave, wire))
+        node.begin_with(description.start)
     return nodes
 
 
@@ -132,13 +135,39 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
 
     Args:
         cache: of files.
-        device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
-        profile: of `choices.PROFILES`, for a file.
+        device: its EDS or DCF, the name of a model, `FILE.yml:NODE` of a bus.yml, or
+            `FILE.py:Class` of a DeviceRTC.
+        profile: of `choices.PROFILES`, for an EDS or DCF.
     """
     if isinstance(device, str):
-        return describe_device(device)
+        return _bus_node(cache, device) if is_bus_node(device) else describe_device(device)
     description = _read(cache, device)
     return replace(description, application=application_of(description.template, profile))
+
+
+def _read_bus(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
+    try:
+        from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - YAML
+    except ModuleNotFoundError as error:
+        if error.name != "yaml":
+            raise
+        raise Refused(NEEDS_YAML) from None
+    try:
+        return read_bus(file, urdf, cache, profile)
+    except OSError as error:
+        refuse_path("file", error)
+    except ValueError as error:  # all mistakes
+        raise Refused(str(error)) from None
+
+
+def _bus_node(cache: EdsCache, spec: str) -> DeviceDescription:
+    """Describe the node that `FILE.yml:NODE` stands for."""
+    file, _, name = spec.rpartition(":")
+    nodes = _read_bus(Path(file), None, cache).nodes
+    found = next((node for node in nodes if node.name == name), None)
+    if found is None:
+        raise Refused(f"{file}: no node {name!r}; {near(name, [node.name for node in nodes])}")
+    return found.description
 
 
 def _read(cache: EdsCache, file: Path) -> DeviceDescription:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Final
 
@@ -20,3 +21,14 @@ MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
     "epos": _DRIVE,
 }
 """Physical faults by the name of the model, beside those of every node."""
+
+_BUS_NODE: Final = re.compile(r".+\.ya?ml:.+", re.IGNORECASE)
+
+
+def is_bus_node(text: str) -> bool:
+    """Return whether a text names a node of a bus.yml.
+
+    >>> is_bus_node("arm/bus.yml:joint_1"), is_bus_node("bus.yml")
+    (True, False)
+    """
+    return _BUS_NODE.fullmatch(text) is not None

@@ -54,6 +54,13 @@ def device_faults(context: click.Context) -> tuple[str, ...]:
 )
 @click.option("--rig", type=PATH, help="TOML file with tables [[node]], and [body] if it has one.")
 @click.option(
+    "--bus",
+    "bus_file",
+    type=PATH,
+    help="bus.yml of ros2_canopen or dcfgen: a node for each of it, with motor and switches.",
+)
+@click.option("--urdf", type=PATH, help="Robot with the joints of --bus, expanded by xacro.")
+@click.option(
     "--profile",
     type=click.Choice(PROFILES),
     default=AUTO,
@@ -81,12 +88,15 @@ def device_faults(context: click.Context) -> tuple[str, ...]:
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
 @run_options("drop, corrupt, duplicate, delay, babble, short", device_faults)
 @click.pass_context
-def main(
+def main(  # noqa: PLR0913 - options
     context: click.Context,
     /,
+    *,
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
+    bus_file: Path | None,
+    urdf: Path | None,
     write_eds: Path | None,
     **options: Any,
 ) -> None:
@@ -105,6 +115,7 @@ def main(
     canopen-slave-emu --eds motor.eds --node-id lss --store memory.json -c can0 -i socketcan
     canopen-slave-emu --eds motor.eds --node-id 5 --scenario start.txt > run.log
     canopen-slave-emu --rig examples/rigs/beego.toml -i socketcan -c vcan0
+    canopen-slave-emu --bus bus.yml -i socketcan -c vcan0
     canopen-slave-emu --rtc my_rtc.py:Gripper --node-id 16 -i socketcan -c vcan0
     canopen-slave-emu --model epos --write-eds epos.eds
 
@@ -118,4 +129,4 @@ def main(
     if write_eds:
         run.write_eds(options["model"], options["rtc"], write_eds)
     else:
-        context.exit(run.emulate(node_id, nodes, rig, options))
+        context.exit(run.emulate(node_id, nodes, rig, run.BusYml(bus_file, urdf), options))

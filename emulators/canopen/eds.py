@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,7 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.host.canopen.eds import open_eds
+from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.eds.eds_device import COUNTS, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
@@ -29,6 +30,7 @@ class DeviceDescription:
         bit_rate: of a DCF in bit/s, None if it gives none.
         application: what the device does with its objects.
         warnings: what is not by the standard in its file.
+        start: inputs that are not as usual when a slave of it begins, by name.
     """
 
     file: str
@@ -38,6 +40,7 @@ class DeviceDescription:
     bit_rate: int | None = None
     application: ServiceMaker = Application
     warnings: tuple[Finding, ...] = ()
+    start: Mapping[str, Setting] = field(default_factory=dict)
 
     def make_dictionary(self) -> Dictionary:
         """Make the dictionary of one more slave."""
@@ -146,11 +149,20 @@ def _completed(row: EntryDescription, highest: int) -> EntryDescription:
     return row
 
 
+Version = tuple[int, int]
+"""Time and size of a file."""
+
+
 class EdsCache:
-    """Reads each EDS or DCF once, and again when the file has changed."""
+    """Reads each EDS or DCF once, and again when the file has changed.
+
+    Attributes:
+        others: what else was read, by what it was read of, with the versions of its files.
+    """
 
     def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], DeviceDescription]] = {}
+        self._known: dict[Path, tuple[Version, DeviceDescription]] = {}
+        self.others: dict[object, tuple[Mapping[Path, Version], object]] = {}
 
     def read(self, path: Path) -> DeviceDescription:
         """Return what a file describes.
@@ -159,10 +171,15 @@ class EdsCache:
             OSError: the file cannot be read.
             EdsError: it is malformed.
         """
-        status = path.stat()
-        version = (status.st_mtime_ns, status.st_size)
+        version = version_of(path)
         known = self._known.get(path)
         if known is None or known[0] != version:
             known = version, read_eds(path)
             self._known[path] = known
         return known[1]
+
+
+def version_of(path: Path) -> Version:
+    """Return what tells whether a file has changed; OSError if it cannot be looked at."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import click
 
@@ -19,6 +19,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body.body_spec import BodySpec
 from tickrig.emulators.canopen.build import (
     Described,
+    describe_bus,
     describe_device,
     describe_nodes,
     make_bench,
@@ -28,6 +29,7 @@ from tickrig.emulators.canopen.build import (
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
+from tickrig.emulators.canopen.profiles import profile_name
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.candump_file import CandumpFile
@@ -36,7 +38,7 @@ from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep, Se
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.text.values import parse_size, parse_time_us
+from tickrig.host.text.values import counted, parse_size, parse_time_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
@@ -44,7 +46,21 @@ from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
 VIRTUAL_CHANNEL: Final = "can0"
 BIT_RATE: Final = 1_000_000
 SHOWN_NODES: Final = 8
-NO_NODE: Final = "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node or --rig FILE"
+NO_NODE: Final = (
+    "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node, --rig FILE or --bus FILE"
+)
+
+
+class BusYml(NamedTuple):
+    """A bus.yml that the nodes are those of.
+
+    Attributes:
+        file: the file, None for none.
+        urdf: the robot with its joints, None for none, or that which the file names.
+    """
+
+    file: Path | None = None
+    urdf: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +69,7 @@ class CanopenOptions(RunOptions):
 
     Attributes:
         specs: the nodes.
+        bus_yml: what names the nodes instead of `specs`.
         body: what they move, None if nothing.
         profile: of nodes of files; see `choices.PROFILES`.
         bus: the bus outside.
@@ -61,6 +78,7 @@ class CanopenOptions(RunOptions):
     """
 
     specs: tuple[NodeSpec, ...] = ()
+    bus_yml: BusYml = field(default_factory=BusYml)
     body: BodySpec | None = None
     profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
@@ -83,7 +101,11 @@ class CanopenRun(EmulatorRun):
         self._channel = VIRTUAL_CHANNEL
 
     def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
-        self._described = describe_nodes(self._options.specs, self._options.profile)
+        file, urdf = self._options.bus_yml
+        if file is None:
+            self._described = describe_nodes(self._options.specs, self._options.profile)
+        else:
+            self._described = describe_bus(file, urdf, self._options.profile)
         if not self._described:
             raise Refused(NO_NODE)
         wire = self._make_wire()
@@ -153,9 +175,25 @@ class CanopenRun(EmulatorRun):
         return Player(bench, scenario, transcript, stays=options.in_real_time)
 
     def _greet(self, bench: RunningEmulator) -> None:
+        if self._options.bus_yml.file:
+            self._greet_bus(bench, self._options.bus_yml.file)
+            return
         nodes = [f"{item.name} ({item.description.file})" for item in self._described]
         more = f" and {len(nodes) - SHOWN_NODES} more" if len(nodes) > SHOWN_NODES else ""
         say(f"CANopen slave {', '.join(nodes[:SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")
+        self._say_how()
+
+    def _greet_bus(self, bench: RunningEmulator, file: Path) -> None:
+        """Say which nodes there are, a line each."""
+        say(f"{counted(len(self._described), 'CANopen slave')} of {file} on {bench.link}:")
+        for item in self._described:
+            what = item.about or f"profile {profile_name(item.description.application)}"
+            sheet = Path(item.description.file).name
+            say(f"  {item.name}  node-ID {item.node_id}  {sheet}  {what}")
+        say("Ctrl-C ends.")
+        self._say_how()
+
+    def _say_how(self) -> None:
         control = self._options.control
         say(
             f"  tickrig ctl {control} describe"
@@ -178,17 +216,34 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def emulate(
-    node_id: str | None, nodes: tuple[str, ...], rig: Path | None, options: dict[str, Any]
+    node_id: str | None,
+    nodes: tuple[str, ...],
+    rig: Path | None,
+    bus_yml: BusYml,
+    options: dict[str, Any],
 ) -> int:
     """Run slaves as the command line says, and return the exit status."""
     given = {f"--{name}": options.pop(name) for name in DEVICES}
+    _check_bus_yml(bus_yml, {**given, "--node-id": node_id, "--node": nodes, "--rig": rig})
     bus = BusOptions(**{name: options.pop(name) for name in BUS_FIELDS})
     file = RigFile(()) if rig is None else read_rig(rig)
     specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
-    run = CanopenRun(CanopenOptions(specs=specs, body=file.body, bus=bus, sdo=sdo, **options))
+    run = CanopenRun(
+        CanopenOptions(specs=specs, bus_yml=bus_yml, body=file.body, bus=bus, sdo=sdo, **options)
+    )
     with mistakes_in(spec.device for spec in specs):
         return run.run()
+
+
+def _check_bus_yml(bus_yml: BusYml, others: Mapping[str, object]) -> None:
+    """Refuse --bus beside what names nodes too, and --urdf without --bus."""
+    if bus_yml.file is None:
+        if bus_yml.urdf is not None:
+            raise Refused("--urdf belongs to --bus: it has the joints of a bus.yml")
+        return
+    if beside := [option for option, value in others.items() if value]:
+        raise Refused(f"--bus names all nodes: it goes without {' and '.join(beside)}")
 
 
 def write_eds(model: str | None, rtc: str | None, path: Path) -> None:

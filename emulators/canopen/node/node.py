@@ -186,6 +186,13 @@ class Node(Copyable):
         dictionary = self.slave.dictionary
         return [*self.physical, *(object_name(dictionary, entry) for entry in dictionary)]
 
+    def begin_with(self, start: Mapping[str, Setting]) -> None:
+        """Set inputs and objects that are not as usual when it begins; ValueError if it cannot."""
+        for name, value in start.items():
+            if (signal := self.signal(name)) is None:
+                raise ValueError(f"{self.name} has no input {name!r}")
+            signal.write(value)
+
     def read(self, name: str) -> Setting:
         """Return an output; KeyError if there is none."""
         match name:

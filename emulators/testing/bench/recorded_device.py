@@ -13,7 +13,7 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe
-from tickrig.emulators.canopen.choices import AUTO, PROFILES
+from tickrig.emulators.canopen.choices import AUTO, PROFILES, is_bus_node
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node import Node
@@ -123,6 +123,6 @@ def _found(entry: DeviceEntry, folder: Path) -> Path | str:
 
 
 def _file_of(device: str) -> Path | None:
-    """Return the file of `FILE.py:Class`, None for a model."""
+    """Return the file of `FILE.py:Class` or `FILE.yml:NODE`, None for a model."""
     file, _, _ = device.rpartition(":")
-    return Path(file) if file.endswith(SUFFIX) else None
+    return Path(file) if file.endswith(SUFFIX) or is_bus_node(device) else None

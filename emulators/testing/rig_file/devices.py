@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.canopen.choices import MODELS, is_bus_node
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.testing.rig_file.fields import check_name, shown
@@ -54,7 +54,7 @@ class DeviceReader:
             self.plans[name] = None
             if table is not None:
                 self.sections[name] = table
-                if not table.notes.names:
+                if ("device", name) not in table.notes.names:
                     self._check_name(name, table)
                 self.plans[name] = self._read(name, table)
 
@@ -164,6 +164,8 @@ def kind_of(
         raise ValueError(f"no device {shown(text)}")
     if f"{SUFFIX}:" in text:
         return DeviceKind.DEVICE_RTC, str(folder / text)
+    if is_bus_node(text):
+        return DeviceKind.BUS_NODE, str(folder / text)
     if text.lower().endswith(EDS_SUFFIXES):
         return DeviceKind.EDS, str(folder / text)
     if text in MODELS:

@@ -71,6 +71,7 @@ class DeviceKind(Enum):
     SERIAL = "device type"
     MODEL = "CANopen model"
     EDS = "EDS or DCF file"
+    BUS_NODE = "node of a bus.yml"
     DEVICE_RTC = "DeviceRTC"
 
 
@@ -82,7 +83,7 @@ class DevicePlan:
         name: what tests and its signals call it.
         kind: what `type` names.
         type: name of a device type (`DEVICES`) or of a model (`MODELS`), path of an EDS or DCF,
-            or `FILE.py:Class`.
+            `FILE.yml:NODE` or `FILE.py:Class`.
         wire: name of its wire, of `RigPlan.wires`.
         config: of a device type, its options by name, as the file has them.
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.

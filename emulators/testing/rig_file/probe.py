@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +28,7 @@ from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
+from tickrig.host.text.values import Setting
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,7 @@ class Probe:
         baud: of a serial device, that of its type.
         node_id: of a node, that of its DCF or model.
         bit_rate: of a node, that of its DCF.
+        start: inputs that are not as usual when it begins.
     """
 
     physical: HasSignals
@@ -49,6 +51,7 @@ class Probe:
     baud: int | None = None
     node_id: int | None = None
     bit_rate: int | None = None
+    start: Mapping[str, Setting] = field(default_factory=dict)
 
     def check_fault(self, name: str, rate: float | None) -> None:
         """Raise ValueError unless the device, or its wire, can have this fault."""
@@ -109,7 +112,14 @@ def probe(plan: DevicePlan) -> Probe | list[Wrong]:
     title = found.info.product_name or Path(plan.type).name
     if plan.kind is DeviceKind.MODEL:
         title = MODELS[plan.type].text
-    return Probe(node, CAN_FAULTS, title, node_id=found.node_id, bit_rate=found.bit_rate)
+    return Probe(
+        node,
+        CAN_FAULTS,
+        title,
+        node_id=found.node_id,
+        bit_rate=found.bit_rate,
+        start=found.start,
+    )
 
 
 def _serial(name: str, config: Mapping[str, object]) -> Probe | list[Wrong]:

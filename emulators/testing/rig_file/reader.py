@@ -15,7 +15,8 @@ from tickrig.emulators.testing.rig_file.body import read_body
 from tickrig.emulators.testing.rig_file.devices import DeviceReader, kind_of
 from tickrig.emulators.testing.rig_file.doors import DoorReader
 from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
-from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
+from tickrig.emulators.testing.rig_file.formats.bus_yml import bus_as_rig, is_bus_yml, with_nodes
+from tickrig.emulators.testing.rig_file.formats.old_formats import in_new_words, no_rig_file
 from tickrig.emulators.testing.rig_file.plan import (
     DeviceKind,
     DevicePlan,
@@ -38,7 +39,7 @@ MAX_MB: Final = 4
 
 
 def read_rig_file(path: Path) -> RigPlan:
-    """Read a rig file.
+    """Read a rig file, or a bus.yml as one.
 
     Args:
         path: the file; names of other files in it are looked for beside it.
@@ -50,6 +51,8 @@ def read_rig_file(path: Path) -> RigPlan:
         OSError: it cannot be read.
         RigFileError: all that is wrong with it.
     """
+    if is_bus_yml(path):
+        return _plan(bus_as_rig(path), path)
     try:
         with path.open("rb") as file:
             data = file.read((MAX_MB << 20) + 1)
@@ -95,6 +98,10 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
     top = in_new_words(Section(Notes(document), (), document.values))
+    return _plan(with_nodes(top, path.parent), path)
+
+
+def _plan(top: Section, path: Path) -> RigPlan:
     plan = _Reader(top, path).read()
     if top.notes.all:
         raise RigFileError(str(path), top.notes.all)
@@ -164,9 +171,9 @@ class _Reader:
         found: dict[str, DevicePlan] = {}
         for name, plan in self._devices.plans.items():
             section = self._devices.sections.get(name)
-            start: Start = {}
+            start: Start = dict(each.start) if (each := self._probes[name]) else {}
             if section and (table := section.sub("start")):
-                start = starts.read_start(name, table, self._physical[name])
+                start |= starts.read_start(name, table, self._physical[name])
             if plan:
                 found[name] = replace(plan, start=start)
         return found

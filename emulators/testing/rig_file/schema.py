@@ -65,7 +65,7 @@ WIRES: Final[Mapping[WireType, Schema]] = {
 _DEVICE: Final = {
     "type": Key(
         text,
-        "device type, CANopen model, EDS or DCF file, `FILE.py:Class`",
+        "device type, CANopen model, EDS or DCF file, `FILE.yml:NODE`, `FILE.py:Class`",
         "what it is",
     ),
     "wire": Key(text, "name of a wire", "what it is connected to", "its own line; the only bus"),
@@ -130,6 +130,7 @@ TOLERANCE: Final[Schema] = {
 
 TOP: Final[Schema] = {
     "seed": Key(whole(0, (1 << 63) - 1), "0 or more", "of all chance", "0"),
+    "bus": Key(path, "a file", "bus.yml of ros2_canopen: each node is a device", NONE),
     **{
         name: Key(table, "tables", meaning, NONE)
         for name, meaning in (

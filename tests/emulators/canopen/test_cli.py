@@ -230,7 +230,11 @@ def test_lss_finds_a_node_without_node_id() -> None:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        ("", "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node or --rig FILE"),
+        (
+            "",
+            "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node, --rig FILE or"
+            " --bus FILE",
+        ),
         ("--node-id 5", "--node-id belongs to --eds, --dcf, --model or --rtc; with --node write"),
         (f"--eds {EDS} --dcf {DCF}", "--eds and --dcf name the same thing: give one of them"),
         (f"--dcf {DCF} --model f-palette", "--dcf and --model name the same thing"),

@@ -12,9 +12,10 @@ from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.build import application_of, describe_nodes, make_nodes
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_node
+from tickrig.emulators.canopen.profiles import application_of
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 

@@ -1,0 +1,108 @@
+"""The slaves of a bus.yml: each made of its EDS, as the master of that file will expect it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
+from tickrig.emulators.canopen.bus_file.node_keys import URDF
+from tickrig.emulators.canopen.bus_file.node_maker import BusNode, NodeMaker
+from tickrig.emulators.canopen.bus_file.urdf import Urdf, read_urdf
+from tickrig.emulators.canopen.choices import AUTO
+from tickrig.emulators.canopen.eds import EdsCache, Version, version_of
+from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
+from tickrig.host.canopen.bus_file.item import Place
+
+
+@dataclass(frozen=True, slots=True)
+class BusNodes:
+    """The slaves of a bus.
+
+    Attributes:
+        nodes: in the order of the file.
+        remarks: what is odd, a line each.
+    """
+
+    nodes: tuple[BusNode, ...]
+    remarks: tuple[str, ...] = ()
+
+
+def read_bus(
+    path: Path,
+    urdf: Path | None = None,
+    cache: EdsCache | None = None,
+    profile: str = AUTO,
+) -> BusNodes:
+    """Read a bus.yml, the files that it names, and make its slaves once.
+
+    Args:
+        path: the bus.yml.
+        urdf: the robot with the joints; that of `options: tickrig:` unless given.
+        cache: of EDS files; it keeps the slaves, too.
+        profile: of `choices.PROFILES`, for nodes that name none.
+
+    Raises:
+        OSError: the bus.yml or the URDF cannot be read.
+        BusMistakesError: all that is wrong.
+    """
+    cache = cache or EdsCache()
+    versions, found = cache.others.get((path, urdf, profile), ({}, None))
+    if isinstance(found, BusNodes) and all(_is_same(*each) for each in versions.items()):
+        return found
+    bus = read_bus_file(path)
+    found, robot = _nodes_of(bus, urdf, cache, profile)
+    files = {path, *(slave.sheet for slave in bus.slaves.values()), *robot}
+    versions = {file: version_of(file) for file in sorted(files)}
+    cache.others[path, urdf, profile] = versions, found
+    return found
+
+
+def _is_same(file: Path, version: Version) -> bool:
+    try:
+        return version_of(file) == version
+    except OSError:
+        return False
+
+
+def _nodes_of(
+    bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str
+) -> tuple[BusNodes, tuple[Path, ...]]:
+    """Return the slaves, and the file of the robot if there is one."""
+    mistakes = [Mistake(Place(one.file, one.line), _said(one)) for one in bus.errors]
+    robot = None
+    try:
+        robot = _robot(bus, urdf)
+    except BusMistakesError as error:
+        mistakes += error.mistakes
+    reader = NodeMaker(bus, robot, cache, mistakes, profile)
+    nodes = tuple(reader.nodes())
+    if mistakes:
+        raise BusMistakesError(mistakes)
+    if not nodes:
+        raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
+    remarks = (*map(str, bus.warnings), *reader.remarks)
+    return BusNodes(nodes, remarks), (Path(robot.name),) if robot else ()
+
+
+def _said(one: Any) -> str:
+    where = f"{one.section}: " if one.section else ""
+    return f"{where}{one.text}; fix: {one.rule.fix} ({one.rule.name})"
+
+
+def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
+    """Return the robot that is named, None if none is."""
+    if urdf is not None:
+        return read_urdf(urdf)
+    item = bus.options.extra.get(URDF)
+    if item is None:
+        return None
+    if not isinstance(item.value, str) or not item.value or "\0" in item.value:
+        raise BusMistakesError([Mistake(item.place, f"options.tickrig.urdf: {item} is no file")])
+    file = bus.path.parent / item.value
+    try:
+        return read_urdf(file)
+    except OSError as error:
+        text = f"options.tickrig.urdf: {file}: {error.strerror}"
+        raise BusMistakesError([Mistake(item.place, text)]) from None

@@ -1,0 +1,186 @@
+"""The motor, gear and switches behind a CiA 402 node of a bus.yml."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import partial
+from math import pi
+from typing import Final
+
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.state.supervision import Bounds
+from tickrig.device.servo.parameters import Encoders, ServoParameters
+from tickrig.device.servo.presets import PRESETS
+from tickrig.device.servo.servo import Servo
+from tickrig.device.servo.sizing import free_speed_rad_s, of_size, peak_torque_nm
+
+MOTOR: Final = "epos-wheel"
+UNITS: Final = 1_000.0
+"""Position units in a radian or a metre: what ros2_canopen believes unless a bus.yml says more."""
+SPARE_SPEED: Final = 1.5
+"""How much faster than a joint shall be its motor turns without load, where it can be chosen."""
+LOW_SUPPLY: Final = 0.4
+HIGH_SUPPLY: Final = 1.5
+FINEST: Final = 100_000
+"""Largest denominator of the factor group that a drive begins with."""
+
+Defaults = Mapping[tuple[int, int], int]
+"""Values by (index, sub-index)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointDrive:
+    """What moves a joint; None where nothing is said.
+
+    Attributes:
+        motor: name of `servo.presets.PRESETS`.
+        gear_ratio: turns of the motor in a turn of the shaft.
+        gear_efficiency: part of the power of an external torque that gets through.
+        friction_nm: dry friction at the shaft.
+        inertia_kg_m2: what always hangs on the shaft; the loops are tuned to it.
+        supply_v: supply of the power stage.
+        encoder_counts: quadrature counts in a turn of the motor.
+        max_torque: of the shaft, in Nm; in N where it moves a carriage.
+        max_velocity: of the shaft, in rad/s; in m/s where it moves a carriage.
+        lower, upper: where the shaft presses the limit switches, in rad; in m as above.
+        home: between which angles it presses the home switch, in rad; in m as above.
+        travel_m: what a turn of the shaft moves a carriage; None where the joint turns.
+        units: position units in a radian, or in a metre.
+    """
+
+    motor: str = MOTOR
+    gear_ratio: float | None = None
+    gear_efficiency: float | None = None
+    friction_nm: float | None = None
+    inertia_kg_m2: float | None = None
+    supply_v: float | None = None
+    encoder_counts: int | None = None
+    max_torque: float | None = None
+    max_velocity: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    home: tuple[float, float] | None = None
+    travel_m: float | None = None
+    units: float = UNITS
+
+    @property
+    def per_turn(self) -> float:
+        """What a turn of the shaft is, in rad or m."""
+        return 2 * pi if self.travel_m is None else self.travel_m
+
+    @property
+    def servo(self) -> ServoParameters:
+        """Motor, power stage and gear: the preset, as large and as fast as the joint needs."""
+        servo = self._with_supply(PRESETS[self.motor])
+        turn = self.per_turn / (2 * pi)
+        ratio = self.gear_ratio
+        if ratio is None and self.max_velocity:
+            ratio = _ratio_for(servo, self.max_velocity / turn)
+        if ratio is not None:
+            servo = replace(servo, gear=replace(servo.gear, ratio=ratio))
+        if self.max_torque:
+            servo = of_size(servo, self.max_torque * turn / peak_torque_nm(servo))
+        return self._with_load(servo)
+
+    @property
+    def start(self) -> dict[str, float]:
+        """The physical inputs of the drive that are not as usual."""
+        degrees = 360 / self.per_turn
+        found = {"supply_v": self.servo.stage.supply_v}
+        if self.lower is not None:
+            found["negative_limit_at"] = self.lower * degrees
+        if self.upper is not None:
+            found["positive_limit_at"] = self.upper * degrees
+        if self.home is not None:
+            found["home_from"], found["home_to"] = (place * degrees for place in self.home)
+        return found
+
+    @property
+    def about(self) -> str:
+        """What it is, for people."""
+        servo = self.servo
+        torque, speed = peak_torque_nm(servo), free_speed_rad_s(servo)
+        if self.travel_m is None:
+            what = f"{torque:.3g} Nm, {speed:.3g} rad/s"
+        else:
+            turn = self.per_turn / (2 * pi)
+            what = f"{torque / turn:.3g} N, {speed * turn:.3g} m/s"
+        return f"{self.motor}, gear {servo.gear.ratio:.4g}:1, {what}"
+
+    def defaults(self) -> Defaults:
+        """Return what counts for objects of the drive to which its EDS gives no value."""
+        servo = self.servo
+        speed = free_speed_rad_s(servo) / (2 * pi) * self.per_turn * self.units
+        gear = Fraction(servo.gear.ratio).limit_denominator(FINEST)
+        feed = Fraction(self.per_turn * self.units).limit_denominator(FINEST)
+        rpm = free_speed_rad_s(servo) * servo.gear.ratio * 60 / (2 * pi)
+        if self.max_velocity:
+            rpm = self.max_velocity / self.per_turn * servo.gear.ratio * 60
+        continuous_ma = max(1, round(servo.stage.continuous_a * 1_000))
+        rated_nm = servo.stage.continuous_a * servo.motor.torque_constant_nm_a
+        return {
+            **indices.DEFAULTS,
+            (indices.ENCODER_RESOLUTION, 1): servo.encoders.counts_per_turn,
+            (indices.GEAR_RATIO, 1): gear.numerator,
+            (indices.GEAR_RATIO, 2): gear.denominator,
+            (indices.FEED_CONSTANT, 1): feed.numerator,
+            (indices.FEED_CONSTANT, 2): feed.denominator,
+            (indices.MAX_MOTOR_SPEED, 0): max(1, round(rpm)),
+            (indices.RATED_CURRENT, 0): continuous_ma,
+            (indices.RATED_TORQUE, 0): max(1, round(rated_nm * 1_000)),
+            (indices.MAX_CURRENT, 0): round(servo.stage.peak_a * 1e6 / continuous_ma),
+            (indices.PROFILE_VELOCITY, 0): _units(speed / 4),
+            (indices.PROFILE_ACCELERATION, 0): _units(speed),
+            (indices.PROFILE_DECELERATION, 0): _units(speed),
+            (indices.QUICK_STOP_DECELERATION, 0): _units(4 * speed),
+            (indices.HOMING_SPEEDS, 1): _units(speed / 20),
+            (indices.HOMING_SPEEDS, 2): _units(speed / 200),
+            (indices.HOMING_ACCELERATION, 0): _units(speed),
+        }
+
+    def application(self) -> ServiceMaker:
+        """Return what makes the drive, for `make_slave`."""
+        supply_mv = self.servo.stage.supply_v * 1_000
+        bounds = Bounds(supply_mv=(round(supply_mv * LOW_SUPPLY), round(supply_mv * HIGH_SUPPLY)))
+        return partial(_make_drive, self.servo, self.defaults(), bounds)
+
+    def _with_supply(self, servo: ServoParameters) -> ServoParameters:
+        if self.supply_v is None:
+            return servo
+        low_v = self.supply_v * LOW_SUPPLY
+        return replace(
+            servo, stage=replace(servo.stage, supply_v=self.supply_v, supply_min_v=low_v)
+        )
+
+    def _with_load(self, servo: ServoParameters) -> ServoParameters:
+        """Return the servo with what is said of it outright."""
+        gear, counts = servo.gear, self.encoder_counts
+        if self.gear_efficiency is not None:
+            gear = replace(gear, efficiency=self.gear_efficiency)
+        if self.friction_nm is not None:
+            gear = replace(gear, coulomb_nm=self.friction_nm)
+        if self.inertia_kg_m2 is not None:
+            gear = replace(gear, inertia_kg_m2=self.inertia_kg_m2)
+        encoders = Encoders(counts) if counts else servo.encoders
+        return replace(servo, gear=gear, encoders=encoders)
+
+
+def _make_drive(
+    servo: ServoParameters, defaults: Defaults, bounds: Bounds, node: CanopenSlave, slot: int
+) -> Ds402:
+    drive = Ds402(node, slot, Servo(servo), defaults)
+    drive.supervision.bounds = bounds
+    return drive
+
+
+def _ratio_for(servo: ServoParameters, speed_rad_s: float) -> float:
+    """Return the gear ratio with which a motor is as fast as a joint needs it."""
+    return free_speed_rad_s(servo) * servo.gear.ratio / (SPARE_SPEED * speed_rad_s)
+
+
+def _units(value: float) -> int:
+    return max(1, min(round(value), (1 << 32) - 2))

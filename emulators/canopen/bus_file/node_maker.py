@@ -1,0 +1,210 @@
+"""What each node of a bus.yml is made of: its EDS, what its master expects, and a joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.bus_file.drive_objects import (
+    NAMES,
+    complete,
+    missing,
+    modes_listed,
+    with_values,
+)
+from tickrig.emulators.canopen.bus_file.joint_drive import UNITS, JointDrive
+from tickrig.emulators.canopen.bus_file.mistake import Mistake
+from tickrig.emulators.canopen.bus_file.node_keys import JOINT_KEYS, NodeKeys, read_keys
+from tickrig.emulators.canopen.bus_file.urdf import PRISMATIC, Urdf, UrdfJoint
+from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
+from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.profiles import application_of
+from tickrig.host.canopen.bus_file.bus_file import BusFile
+from tickrig.host.canopen.bus_file.bus_values import BusSlave
+from tickrig.wire.canopen.eds.eds_file import EdsError
+
+TRAVEL_M: Final = 0.01
+"""What a turn of the shaft moves a carriage of which nobody says it."""
+SECOND_AXIS: Final = 0x800
+"""How far the objects of a further axis are from those of the first one (CiA 402-1)."""
+IDENTITY: Final = 0x1018
+SOFTWARE: Final = (0x1F56, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class BusNode:
+    """A slave.
+
+    Attributes:
+        name: of its section.
+        node_id: 1..127.
+        line: of its section.
+        description: what it is made of, with its inputs at the start.
+        about: what moves, for people; empty where nothing does.
+    """
+
+    name: str
+    node_id: int
+    line: int
+    description: DeviceDescription
+    about: str = ""
+
+
+class NodeMaker:
+    """Makes the slaves of one file.
+
+    Args:
+        bus: the file.
+        robot: its joints, None if nobody says more of them.
+        cache: of EDS files.
+        mistakes: takes what is wrong.
+        profile: of `choices.PROFILES`, for nodes that name none.
+
+    Attributes:
+        remarks: what is odd, a line each.
+    """
+
+    def __init__(
+        self,
+        bus: BusFile,
+        robot: Urdf | None,
+        cache: EdsCache,
+        mistakes: list[Mistake],
+        profile: str,
+    ) -> None:
+        self._bus, self._cache, self._mistakes = bus, cache, mistakes
+        self._profile = profile
+        self._joints = dict(self._joints_of(robot)) if robot else {}
+        self.remarks: list[str] = []
+
+    def nodes(self) -> Iterator[BusNode]:
+        """Give all slaves of which something can be made."""
+        for slave in self._bus.slaves.values():
+            keys = read_keys((slave.extra, self._bus.options.extra), slave.name, self._mistakes)
+            try:
+                sheet = self._cache.read(slave.sheet)
+            except (EdsError, OSError):
+                continue  # the reader of the file has noted it
+            master = self._bus.master
+            rate = 1_000 * master.baudrate if master else None
+            yield self._node(
+                slave, keys, replace(sheet, node_id=slave.node_id, bit_rate=rate or None)
+            )
+
+    def _joints_of(self, robot: Urdf) -> Iterator[tuple[str, UrdfJoint]]:
+        """Give the joints of the robot by the name of their node."""
+        by_id = {slave.node_id: name for name, slave in self._bus.slaves.items()}
+        for joint in robot.joints:
+            name = joint.device_name or by_id.get(joint.node_id or 0, "")
+            if name in self._bus.slaves:
+                yield name, joint
+            else:
+                what = f"node {name!r}" if name else f"node-ID {joint.node_id}"
+                text = f"joint {joint.name!r}: no {what} in {self._bus.path.name}"
+                self.remarks.append(str(Mistake(joint.place, text)))
+
+    def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
+        sheet = replace(sheet, template=self._identified(slave, sheet.template))
+        application, about = application_of(sheet.template, keys.profile or self._profile), ""
+        start = dict(keys.start)
+        if application is Ds402:
+            self._check_axes(slave, sheet.template)
+            joint = self._joint(slave, keys)
+            template = self._completed(slave, keys, sheet.template, joint)
+            sheet, application = replace(sheet, template=template), joint.application()
+            about, start = joint.about, {**joint.start, **start}
+        else:
+            self._check_no_joint(slave, keys)
+        description = replace(sheet, application=application, start=start)
+        self._check_start(slave, keys, description)
+        return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
+
+    def _identified(self, slave: BusSlave, dictionary: Dictionary) -> Dictionary:
+        """Return the dictionary with the identity that the file says; 0 says nothing."""
+        identity = slave.identity
+        wanted = {
+            (IDENTITY, 1): identity.vendor_id,
+            (IDENTITY, 2): identity.product_code,
+            (IDENTITY, 3): identity.revision_number,
+            (IDENTITY, 4): identity.serial_number,
+            SOFTWARE: slave.software_version,
+        }
+        return with_values(dictionary, {at: value for at, value in wanted.items() if value})
+
+    def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
+        """Note a drive of several axes: the profile has one."""
+        second = indices.CONTROLWORD + SECOND_AXIS
+        if slave.num_channels > 1 or dictionary.find(second) is not None:
+            text = (
+                "a drive of several axes (CiA 402-1) is not emulated; profile: none for its objects"
+            )
+            self._mistakes.append(Mistake(slave.place, f"{slave.name}: {text}"))
+
+    def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
+        """Note keys of a motor in a node that has none."""
+        for name in (*JOINT_KEYS, "modes"):
+            if name in slave.extra:
+                text = f"{slave.name}.tickrig.{name}: it is no CiA 402 drive, and has no motor"
+                self._mistakes.append(Mistake(keys.places[name], text))
+
+    def _joint(self, slave: BusSlave, keys: NodeKeys) -> JointDrive:
+        """Return what moves a node: what its keys say, else the robot, else the driver's scale."""
+        scale = slave.channels[0].scale_pos_to_dev if slave.channels else UNITS
+        found: dict[str, Any] = {"units": abs(scale) or UNITS}
+        if robot := self._joints.get(slave.name):
+            found |= {
+                "lower": robot.lower,
+                "upper": robot.upper,
+                "max_velocity": robot.velocity,
+                "max_torque": robot.effort,
+                "gear_ratio": robot.reduction,
+            }
+            if robot.kind == PRISMATIC:
+                found["travel_m"] = TRAVEL_M
+        return JointDrive(**{**found, **keys.joint})
+
+    def _completed(
+        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+    ) -> Dictionary:
+        """Return the objects of a drive, and remark those that its EDS has not."""
+        listed = modes_listed(dictionary)
+        modes = keys.modes or listed | self._asked_for(slave, listed)
+        wanted = modes if keys.modes else modes - listed
+        if added := missing(dictionary, wanted):
+            names = ", ".join(f"{index:04X}h" for index in added)
+            text = f"its EDS lacks {names}, which its modes need: they are added"
+            self.remarks.append(str(Mistake(slave.place, f"{slave.name}: {text}")))
+        return complete(dictionary, modes, added, joint.defaults())
+
+    def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
+        """Return the modes that the file writes to 6060h and the EDS does not list."""
+        found = set()
+        for write in slave.writes:
+            number = int.from_bytes(write.data, "little")
+            if write.index == indices.MODES_OF_OPERATION and number in NAMES.keys() - listed:
+                text = f"mode {number} ({NAMES[number]}) is not in 6502h of its EDS: it is added"
+                self.remarks.append(str(Mistake(write.place, f"{slave.name}: {text}")))
+                found.add(number)
+        return frozenset(found)
+
+    def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:
+        """Note inputs at the start that there are not, or that do not take their value."""
+        if not keys.start:
+            return
+        made = make_slave(
+            description.make_dictionary(), slave.node_id, None, description.application
+        )
+        inputs = Nodes([Node(slave.name, made, CanWire())]).inputs
+        for name, value in keys.start.items():
+            try:
+                inputs.check(name, value)
+            except ValueError as error:
+                text = f"{slave.name}.tickrig.start.{name}: {error}"
+                self._mistakes.append(Mistake(keys.places.get(name, slave.place), text))

@@ -1,0 +1,224 @@
+"""The joints of a URDF that `<ros2_control>` puts on a CANopen bus: limits and reduction.
+
+Nothing but elements and attributes is read: a document type, and so entities, are refused.
+
+>>> robot = '''<robot name="arm">
+... <joint name="elbow" type="revolute"><limit lower="-1" upper="1" velocity="2"/></joint>
+... <ros2_control><joint name="elbow"><param name="node_id">3</param></joint></ros2_control>
+... </robot>'''
+>>> found = parse_urdf(robot.encode(), "arm.urdf").joints[0]
+>>> found.name, found.node_id, found.upper
+('elbow', 3, 1.0)
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Final
+
+from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
+from tickrig.host.canopen.bus_file.item import Place
+from tickrig.wire.canopen.eds.eds_file import decode_text
+from tickrig.wire.canopen.eds.xdd import Element, XddError, read_xml
+
+MOST_BYTES: Final = 32_000_000
+XACRO_TAGS: Final = ("macro", "include", "property", "arg")
+XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
+LIMITS: Final = ("lower", "upper", "velocity", "effort")
+REVOLUTE, CONTINUOUS, PRISMATIC = "revolute", "continuous", "prismatic"
+MOVES: Final = (REVOLUTE, CONTINUOUS, PRISMATIC)
+REDUCTIONS: Final = ("mechanicalReduction", "mechanical_reduction")
+HIGHEST_NODE_ID: Final = 127
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UrdfJoint:
+    """A joint that a device of the bus moves.
+
+    Attributes:
+        name: of the joint.
+        place: where `<ros2_control>` has it.
+        device_name: of the node in bus.yml, empty if none is said.
+        node_id: of the node, None if none is said.
+        kind: `revolute`, `continuous` or `prismatic`.
+        lower: in rad, or m; None where it does not end.
+        upper: the same.
+        velocity: largest one in rad/s, or m/s; None where none is said.
+        effort: largest one in Nm, or N; None where none is said.
+        reduction: turns, or rad per m, of the actuator for one of the joint; None if none is said.
+    """
+
+    name: str
+    place: Place
+    device_name: str = ""
+    node_id: int | None = None
+    kind: str = REVOLUTE
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
+    reduction: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Urdf:
+    """What a file says.
+
+    Attributes:
+        name: of the file.
+        joints: those that devices of a bus move, in the order of the file.
+    """
+
+    name: str
+    joints: tuple[UrdfJoint, ...] = ()
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Read a file.
+
+    Raises:
+        OSError: it cannot be read.
+        BusMistakesError: all that is wrong with it.
+    """
+    with path.open("rb") as file:
+        return parse_urdf(file.read(MOST_BYTES + 1), str(path))
+
+
+def parse_urdf(data: bytes, name: str) -> Urdf:
+    """Read the bytes of a file; see `read_urdf`."""
+    if len(data) > MOST_BYTES:
+        raise BusMistakesError(
+            [Mistake(Place(name, 1), f"more than {MOST_BYTES:,} bytes: no URDF")]
+        )
+    try:
+        robot = read_xml(decode_text(data))[0]
+    except XddError as error:
+        raise BusMistakesError([Mistake(Place(name, error.line), str(error))]) from None
+    return _Reader(name).read(robot)
+
+
+def _named(element: Element, *names: str) -> Iterator[Element]:
+    """Give the children of these names."""
+    return (child for child in element.children if child.name in names)
+
+
+def _name(element: Element) -> str:
+    """Return its attribute `name`."""
+    return element.attributes.get("name", "")
+
+
+class _Reader:
+    """Reads the joints of one robot."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._mistakes: list[Mistake] = []
+
+    def read(self, robot: Element) -> Urdf:
+        """Read all joints; BusMistakesError with all that is wrong."""
+        if robot.name != "robot":
+            self._wrong(robot, f"<{robot.name}> is no <robot>")
+        for each in itertools.islice(_named(robot, *XACRO_TAGS), 1):
+            self._wrong(each, f"<xacro:{each.name}> is not expanded: {XACRO}")
+        shapes = {_name(each): each for each in _named(robot, "joint")}
+        reductions = dict(self._reductions(robot))
+        joints = [
+            joint
+            for control in _named(robot, "ros2_control")
+            for each in _named(control, "joint")
+            if (joint := self._joint(each, shapes.get(_name(each)), reductions))
+        ]
+        if self._mistakes:
+            raise BusMistakesError(self._mistakes)
+        return Urdf(self._name, tuple(joints))
+
+    def _joint(
+        self, element: Element, shape: Element | None, reductions: Mapping[str, float]
+    ) -> UrdfJoint | None:
+        """Return a joint of `<ros2_control>`; None if it has no device on a CANopen bus."""
+        values = {_name(each): each for each in _named(element, "param")}
+        device, node = values.get("device_name"), values.get("node_id")
+        if device is None and node is None:
+            return None
+        node_id = self._node_id(node) if node else None
+        if shape is None:
+            self._wrong(element, f"joint {_name(element)!r}: the robot has no joint of this name")
+            return None
+        kind = shape.attributes.get("type", "")
+        if kind not in MOVES:
+            text = f"joint {_name(element)!r}: type {kind!r} is none of {', '.join(MOVES)}"
+            self._wrong(shape, text)
+        return UrdfJoint(
+            name=_name(element),
+            place=Place(self._name, element.line),
+            device_name=device.text.strip() if device else "",
+            node_id=node_id,
+            kind=kind,
+            reduction=reductions.get(_name(element)),
+            **self._limits(shape, kind),
+        )
+
+    def _limits(self, shape: Element, kind: str) -> dict[str, float]:
+        """Return what `<limit>` says; an empty range, and 0 of the others, stand for none."""
+        found: dict[str, float] = {}
+        for limit in _named(shape, "limit"):
+            for key in LIMITS:
+                if (text := limit.attributes.get(key)) is not None:
+                    value = self._number(limit, f"joint {_name(shape)!r}: limit {key}", text)
+                    if value is not None:
+                        found[key] = value
+        lower, upper = found.get("lower", 0.0), found.get("upper", 0.0)
+        if lower > upper:
+            text = f"limit lower {lower:g} is above upper {upper:g}"
+            self._wrong(shape, f"joint {_name(shape)!r}: {text}")
+        if kind == CONTINUOUS or lower == upper:
+            found.pop("lower", None)
+            found.pop("upper", None)
+        for key in ("velocity", "effort"):
+            if (value := found.get(key, 1.0)) <= 0:
+                del found[key]
+                if value < 0:
+                    self._wrong(shape, f"joint {_name(shape)!r}: limit {key} {value:g} is below 0")
+        return found
+
+    def _reductions(self, robot: Element) -> Iterator[tuple[str, float]]:
+        """Give the reduction of each joint with a transmission, of the robot or of its control."""
+        for owner in (robot, *_named(robot, "ros2_control")):
+            for transmission in _named(owner, "transmission"):
+                parts = (transmission, *_named(transmission, "joint", "actuator"))
+                written = [value for part in parts for value in _named(part, *REDUCTIONS)]
+                for joint in _named(transmission, "joint") if written else ():
+                    value = self._number(written[0], _name(joint), written[0].text.strip())
+                    if value:
+                        yield _name(joint), abs(value)
+                    elif value is not None:
+                        self._wrong(written[0], f"{_name(joint)}: 0 is no reduction")
+
+    def _node_id(self, element: Element) -> int | None:
+        text = element.text.strip()
+        if text.isascii() and text.isdecimal() and 1 <= int(text[:9]) <= HIGHEST_NODE_ID:
+            return int(text)
+        self._wrong(element, f"node_id {text!r:.40} is not 1..{HIGHEST_NODE_ID}{_hint(text)}")
+        return None
+
+    def _number(self, element: Element, what: str, text: str) -> float | None:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if isfinite(value):
+            return value
+        self._wrong(element, f"{what}: {text!r:.40} is no number{_hint(text)}")
+        return None
+
+    def _wrong(self, element: Element, text: str) -> None:
+        self._mistakes.append(Mistake(Place(self._name, element.line), text))
+
+
+def _hint(text: str) -> str:
+    """Say that a value of xacro has to be expanded."""
+    return f": {XACRO}" if "$" in text else ""
