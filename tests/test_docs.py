@@ -33,6 +33,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/canmon-logs.md",
         "docs/canmon-model.md",
         "docs/canopen.md",
+        "docs/canopen-master.md",
         "docs/conform.md",
         "docs/device-rtc.md",
         "docs/rh3.md",
