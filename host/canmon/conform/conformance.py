@@ -27,7 +27,9 @@ from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report
-from tickrig.host.canopen.eds import open_eds
+from tickrig.host.canopen.data_sheet.check import check, severities
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.eds import open_eds, read_eds_bytes
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import VERSION
@@ -68,8 +70,10 @@ class Conformance:
         check_chosen(self._only, self._level)
         self._stimulus = open_stimulus(options["stimulus"]) if options["stimulus"] else None
         self._eds: Path | None = options["eds"]
+        self._settings: dict[str, str] = {}
         if self._eds is not None:
             _read_eds(self._eds)
+            self._settings["EDS findings"] = _findings(self._eds)
 
     def _inputs(self) -> Iterator[Path]:
         """Yield the files that are read; a baseline may be written anew."""
@@ -123,7 +127,16 @@ class Conformance:
             progress.begin(node_id)
             judged.append(run.run())
         progress.end()
-        return _completed(judged[0], source, eds) if judged else None
+        return self._completed(judged[0], source, eds) if judged else None
+
+    def _completed(self, report: Report, source: ConformSource, eds: EdsFile | None) -> Report:
+        """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
+        settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
+        if eds is None:
+            return replace(report, settings=settings)
+        settings |= {"EDS": Path(eds.name).name, **self._settings}
+        wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
+        return replace(report, settings=settings, findings=(*wrong, *report.findings))
 
     def _plan(self, source: ConformSource, node_id: int, consent: Consent) -> Plan:
         options, stimulus = self._options, self._stimulus
@@ -170,16 +183,6 @@ class Conformance:
         return shlex.join(words)
 
 
-def _completed(report: Report, source: ConformSource, eds: EdsFile | None) -> Report:
-    """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
-    settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
-    if eds is None:
-        return replace(report, settings=settings)
-    settings["EDS"] = Path(eds.name).name
-    wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
-    return replace(report, settings=settings, findings=(*wrong, *report.findings))
-
-
 def _read_baseline(path: Path | None) -> Baseline:
     if path is None:
         return NONE_KNOWN
@@ -204,6 +207,12 @@ def _read_eds(path: Path) -> EdsFile:
     except EdsError as error:
         raise Refused(f"--eds {error}") from None
     return file
+
+
+def _findings(path: Path) -> str:
+    """Say how much `canmon eds check` finds in an EDS."""
+    found = check(Document(str(path), read_eds_bytes(path)))
+    return f"{severities(found)}: {shlex.join(['canmon', 'eds', 'check', str(path)])}"
 
 
 def _index(word: str) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -12,12 +11,13 @@ import click
 
 from tickrig.host.canmon.eds.eds_files import read_document
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canopen.data_sheet.check import check, failing
-from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
+from tickrig.host.canopen.data_sheet.check import check, failing, severities
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.junit import junit
+from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, write_whole
 
 if TYPE_CHECKING:
@@ -61,21 +61,20 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
     """  # noqa: D301 - click wants the backspace
     _check_report(report)
     documents, unread = _read(file)
-    counted: list[RuleFinding] = []
-    tally: Counter[str] = Counter()
+    everything: list[RuleFinding] = []
     for document in documents:
         found = check(document)
-        counted += failing(found, strict=strict)
-        tally.update(one.rule.severity.value for one in found)
+        everything += found
         with until_unread():
             for one in found:
                 click.echo(finding_json(one) if as_json else str(one))
-    _write(report, documents, unread, counted)
+    failures = failing(everything, strict=strict)
+    _write(report, documents, unread, failures)
     if documents:
-        click.echo(_summary(len(documents), tally), err=True)
+        click.echo(f"{counted(len(documents), 'file')}: {severities(everything)}", err=True)
     if unread:
         click.get_current_context().exit(Refused.exit_code)
-    if counted:
+    if failures:
         click.get_current_context().exit(FOUND)
 
 
@@ -89,15 +88,6 @@ def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
             error.show()
             unread.append(Case(f"{path}: {UNREAD}", error.message))
     return documents, unread
-
-
-def _summary(files: int, tally: Counter[str]) -> str:
-    counts = ", ".join(_counted(tally[each.value], each.value) for each in Severity)
-    return f"{_counted(files, 'file')}: {counts}"
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def finding_json(one: RuleFinding) -> str:
@@ -131,12 +121,12 @@ def _write(
     report: Path | None,
     documents: Sequence[Document],
     unread: Sequence[Case],
-    counted: Sequence[RuleFinding],
+    failures: Sequence[RuleFinding],
 ) -> None:
     """Write a test case for each rule of each file, and one for each that was not read."""
     if report is None:
         return
-    cases = [*unread, *(Case(f"{one.file}: {one.rule.name}", str(one)) for one in counted)]
+    cases = [*unread, *(Case(f"{one.file}: {one.rule.name}", str(one)) for one in failures)]
     rules = (f"{document.name}: {name}" for document in documents for name in RULES)
     names = list(dict.fromkeys((*(case.rule for case in unread), *rules)))
     try:

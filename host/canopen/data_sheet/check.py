@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
@@ -17,6 +18,7 @@ from tickrig.host.canopen.data_sheet.rules import (
     truncation,
     value_rules,
 )
+from tickrig.host.text.values import counted
 
 CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     value_rules.of_reader,
@@ -49,6 +51,12 @@ def _check(document: Document) -> list[RuleFinding]:
     if document.file.is_xml and any(one.rule.name in UNREADABLE for one in found):
         found = [one for one in found if one.rule.name in UNREADABLE]
     return sorted(found, key=lambda one: one.line)
+
+
+def severities(findings: Iterable[RuleFinding]) -> str:
+    """Return how many findings have which severity, as `2 errors, 1 warning, 0 notes`."""
+    counts = Counter(one.rule.severity for one in findings)
+    return ", ".join(counted(counts[each], each.value) for each in Severity)
 
 
 def failing(findings: Iterable[RuleFinding], *, strict: bool = False) -> list[RuleFinding]:

@@ -167,6 +167,18 @@ def test_an_eds_of_another_device_is_told_first(rig: str, tmp_path: Path) -> Non
     assert "another device" not in conform(rig, "--node", "5", "--eds", str(EDS), *NMT).stdout
 
 
+def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) -> None:
+    path = tmp_path / "r 1.eds"
+    path.write_text(EDS.read_text("utf-8").replace("NrOfRXPDO=4", "NrOfRXPDO=7"), "utf-8")
+    result = conform(rig, "--node", "5", "--eds", str(path), *NMT)
+    told = CliRunner().invoke(main, ["eds", "check", str(path)]).stderr
+    counts = told.strip().removeprefix("1 file: ")
+    assert counts.startswith("0 errors, 1 warning, ")
+    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+    assert f"EDS findings {counts}: canmon eds check '{path}'" in lines
+    assert result.exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("words", "why"),
     [
