@@ -90,6 +90,17 @@ def test_hm_finds_the_limit_switch_and_is_zero_there(tmp_path: Path, pdos: str) 
         assert (joint.state, joint.mode) == (DriveState.OPERATION_ENABLED, 6)
 
 
+@pytest.mark.parametrize("method", [35, 18])
+def test_a_drive_that_has_homed_homes_again(tmp_path: Path, method: int) -> None:
+    with cell(tmp_path, f"  sdo: [{{index: 0x6098, value: {method}}}]\n") as drives:
+        drives.bench["joint2"].set("positive_limit_at", 30.0)
+        ready(drives, "pp")
+        drives.joint.set_target(-1.0)
+        assert drives.master.wait_until(lambda: abs(drives.joint.position + 1.0) < 0.01, "2s")
+        drives.master.perform(drives.joint.init())
+        assert drives.joint.position == pytest.approx(0.0, abs=0.01)
+
+
 def test_homing_that_finds_nothing_is_given_up_in_its_time(tmp_path: Path) -> None:
     more = "  homing_timeout_seconds: 2\n  sdo: [{index: 0x6098, value: 17}]\n"
     with cell(tmp_path, more) as drives:
