@@ -5,23 +5,39 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from tickrig.host.canopen.conform.bus.evidence import LEFT_OUT
 from tickrig.host.canopen.conform.report.evidence import ShowFrames, frame_of, plain_frame
 from tickrig.host.canopen.conform.verdict import Direction, Line
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import EdsObjects
+from tickrig.host.monitor.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.monitor.frames.record import Record
 
 
 def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
-    """Return what writes the lines of checks, in their order.
+    """Return what writes the lines of a check; each call begins anew, knowing only the EDS.
+
+    Between two checks there are frames that no evidence has: what was open or mapped in one
+    says nothing of the next.
 
     Args:
         eds: an EDS, or what was read of one, by node-ID.
+
+    Raises:
+        OSError: an EDS cannot be read.
+        EdsError: an EDS is malformed.
     """
-    decoder = Decoder(eds)
+    known = {
+        node: read_eds_objects(item, node) if isinstance(item, Path) else item
+        for node, item in eds.items()
+    }
 
     def show(lines: Sequence[Line]) -> list[str]:
-        return [plain_frame(line, _meaning(decoder, line)) for line in lines]
+        shown, decoder = list[str](), Decoder(known)
+        for line in lines:
+            if line.direction is Direction.REMARK and line.text.endswith(LEFT_OUT):
+                decoder = Decoder(known)
+            shown.append(plain_frame(line, _meaning(decoder, line)))
+        return shown
 
     return show
 

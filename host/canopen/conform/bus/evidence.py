@@ -10,6 +10,8 @@ from tickrig.host.canopen.conform.verdict import Direction, Line
 FIRST_LINES: Final = 40
 LAST_LINES: Final = 160
 """So many lines are kept of a long check."""
+LEFT_OUT: Final = "lines left out"
+"""Ends the remark in place of the others."""
 
 
 class Evidence:
@@ -33,5 +35,5 @@ class Evidence:
         """Return them, with a remark where some were left out."""
         if not self._left_out:
             return (*self._first, *self._last)
-        remark = Line(self._last[0].at_us, Direction.REMARK, f"{self._left_out} lines left out")
+        remark = Line(self._last[0].at_us, Direction.REMARK, f"{self._left_out} {LEFT_OUT}")
         return (*self._first, remark, *self._last)
