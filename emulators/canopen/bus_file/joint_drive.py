@@ -44,7 +44,7 @@ class JointDrive:
         inertia_kg_m2: what always hangs on the shaft; the loops are tuned to it.
         supply_v: supply of the power stage.
         encoder_counts: quadrature counts in a turn of the motor.
-        max_torque: of the shaft, in Nm; in N where it moves a carriage.
+        max_torque: that the shaft gives for a second, in Nm; in N where it moves a carriage.
         max_velocity: of the shaft, in rad/s; in m/s where it moves a carriage.
         lower, upper: where the shaft presses the limit switches, in rad; in m as above.
         home: between which angles it presses the home switch, in rad; in m as above.
@@ -82,8 +82,11 @@ class JointDrive:
             ratio = _ratio_for(servo, self.max_velocity / turn)
         if ratio is not None:
             servo = replace(servo, gear=replace(servo.gear, ratio=ratio))
+        if self.gear_efficiency is not None:
+            servo = replace(servo, gear=replace(servo.gear, efficiency=self.gear_efficiency))
         if self.max_torque:
-            servo = of_size(servo, self.max_torque * turn / peak_torque_nm(servo))
+            needed_nm = self.max_torque * turn / servo.gear.efficiency
+            servo = of_size(servo, needed_nm / peak_torque_nm(servo))
         return self._with_load(servo)
 
     @property
@@ -103,7 +106,8 @@ class JointDrive:
     def about(self) -> str:
         """What it is, for people."""
         servo = self.servo
-        torque, speed = peak_torque_nm(servo), free_speed_rad_s(servo)
+        torque = peak_torque_nm(servo) * servo.gear.efficiency
+        speed = free_speed_rad_s(servo)
         if self.travel_m is None:
             what = f"{torque:.3g} Nm, {speed:.3g} rad/s"
         else:
@@ -159,8 +163,6 @@ class JointDrive:
     def _with_load(self, servo: ServoParameters) -> ServoParameters:
         """Return the servo with what is said of it outright."""
         gear, counts = servo.gear, self.encoder_counts
-        if self.gear_efficiency is not None:
-            gear = replace(gear, efficiency=self.gear_efficiency)
         if self.friction_nm is not None:
             gear = replace(gear, coulomb_nm=self.friction_nm)
         if self.inertia_kg_m2 is not None:

@@ -81,8 +81,8 @@ class NodeMaker:
     ) -> None:
         self._bus, self._cache, self._mistakes = bus, cache, mistakes
         self._profile = profile
-        self._joints = dict(self._joints_of(robot)) if robot else {}
         self.remarks: list[str] = []
+        self._joints = dict(self._joints_of(robot)) if robot else {}
 
     def nodes(self) -> Iterator[BusNode]:
         """Give all slaves of which something can be made."""

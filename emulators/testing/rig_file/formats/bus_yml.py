@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.testing.rig_file.fields import shown
+from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.rig_file.section import Notes, Section
 from tickrig.host.text.toml_document import Mistake, TomlDocument, TomlPath
 
@@ -67,7 +68,7 @@ def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
         top.wrong(NEEDS_YAML, BUS)
         return {}
     try:
-        bus = read_bus(path)
+        bus = read_bus(path, cache=eds_cache())
     except BusMistakesError as error:
         for place, text in error.mistakes:
             own = alone and place.file == str(path)
