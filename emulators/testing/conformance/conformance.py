@@ -42,6 +42,7 @@ def conformance(  # noqa: PLR0913 - by keyword
     level: str = "intrusive",
     only: str | Iterable[str] = (),
     allow: Iterable[int] = (),
+    never: Iterable[int] = (),
     stimulus: Stimulus | None = None,
     seed: int = 0,
     bit_rate: int = BIT_RATE,
@@ -58,6 +59,7 @@ def conformance(  # noqa: PLR0913 - by keyword
             `canmon conform` only reads: in virtual time nothing can move.
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
+        never: indices of objects that are never written, whatever else is allowed.
         stimulus: moves inputs: takes `"input", "6000:01", "01"`, `"emergency", "5000", "01"` and
             such, returns what `"output", NAME` asks for; of a `Slave` power is switched here.
         seed: of what is left to chance.
@@ -85,6 +87,7 @@ def conformance(  # noqa: PLR0913 - by keyword
             level=Level(LEVELS.index(level)),
             only=names,
             allow=frozenset(allow),
+            never=frozenset(never),
             bit_rate=source.bit_rate,
             seed=seed,
             stimulus=source.stimulus(number) if source.stimulus else None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -65,7 +65,8 @@ class Conformance:
         keep_inputs(self._files, self._inputs())
         self._only = patterns(options["only"])
         self._baseline = _read_baseline(options["baseline"])
-        self._allow = frozenset(map(_index, options["allow"]))
+        self._allow = _indices("--allow", options["allow"])
+        self._never = _indices("--never", options["never"])
         self._level = Level[options["level"].upper().replace("-", "_")]
         check_chosen(self._only, self._level)
         self._stimulus = open_stimulus(options["stimulus"]) if options["stimulus"] else None
@@ -146,6 +147,7 @@ class Conformance:
             level=self._level,
             only=self._only,
             allow=self._allow,
+            never=self._never,
             bit_rate=source.bit_rate,
             max_load=options["max_load"] / 100,
             seed=options["seed"],
@@ -178,7 +180,8 @@ class Conformance:
         words += ["--node", str(report.node_id), f"--{report.level.word}"]
         words += ["--eds", str(self._eds)] if self._options["eds"] else []
         words += ["--stimulus", self._options["stimulus"]] if self._options["stimulus"] else []
-        words += [word for index in self._options["allow"] for word in ("--allow", index)]
+        for name in ("allow", "never"):
+            words += [word for index in self._options[name] for word in (f"--{name}", index)]
         words += ["--seed", str(self._options["seed"])] if self._options["seed"] else []
         return shlex.join(words)
 
@@ -215,7 +218,11 @@ def _findings(path: Path) -> str:
     return f"{severities(found)}: {shlex.join(['canmon', 'eds', 'check', str(path)])}"
 
 
-def _index(word: str) -> int:
+def _indices(option: str, words: Iterable[str]) -> frozenset[int]:
+    return frozenset(_index(option, word) for word in words)
+
+
+def _index(option: str, word: str) -> int:
     """Read an index, as 6200h or 0x6200."""
     digits = word.lower().removeprefix("0x").removesuffix("h")
     try:
@@ -223,5 +230,5 @@ def _index(word: str) -> int:
     except ValueError:
         index = -1
     if not 0x1000 <= index <= 0xFFFF:
-        raise Refused(f"--allow {word!r} is no index as 6200h")
+        raise Refused(f"{option} {word!r} is no index as 6200h")
     return index

@@ -20,8 +20,14 @@ Confirm = Callable[[str], bool]
 
 DOES = {
     Level.READ_ONLY: "is only read",
-    Level.COMMUNICATION: "is started, stopped and configured anew; SYNC and PDOs are sent",
-    Level.INTRUSIVE: "is reset, configured anew, stored and restored; SYNC, PDOs, LSS are sent",
+    Level.COMMUNICATION: (
+        "is started, stopped and configured anew, objects below 6000h are written with what they"
+        " must refuse; SYNC and PDOs are sent"
+    ),
+    Level.INTRUSIVE: (
+        "is reset, configured anew, stored and restored, objects below 6000h are written;"
+        " SYNC, PDOs, LSS are sent"
+    ),
 }
 
 

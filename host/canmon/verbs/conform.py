@@ -64,6 +64,7 @@ _choice: Final[Decorator] = add_options(
     _levels,
     click.option("--stimulus", metavar="CMD", help="Moves inputs: a command, a socket, or ask."),
     click.option("--allow", multiple=True, metavar="INDEX", help="May be written, as 6200h."),
+    click.option("--never", multiple=True, metavar="INDEX", help="Is never written, as 2000h."),
     click.option(
         "--max-load",
         type=Percent(LEAST_LOAD, 100),
@@ -108,7 +109,8 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     SOURCE is a bus, or a rig file in virtual time. Without --node it says which
     nodes are heard. By default the node is only read: --communication and
     --intrusive do more, restore what they changed, and ask first (--yes). What
-    could move something, objects 6000h to 9FFFh, is written with --allow only.
+    could move something, objects 6000h to 9FFFh, is written with --allow only; an
+    object of the maker that could, as a set pressure, is named with --never.
 
     \b
     canmon conform can0 --node 5 --eds drive.eds

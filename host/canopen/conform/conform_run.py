@@ -70,7 +70,7 @@ class ConformRun:
     ) -> None:
         self._node_id, self._plan, self._source = node_id, plan, source
         self._device, self._eds, self._on_result = device, eds, on_result
-        self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm)
+        self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm, plan.never)
         self._exchange = Exchange(
             link,
             node_id,
@@ -170,7 +170,8 @@ class ConformRun:
         """Make the checks of each object of the EDS; without one there are none."""
         if self._device is None:
             return []
-        checks = [*object_checks(self._device, self._node_id, allow=self._plan.allow)]
+        plan = self._plan
+        checks = [*object_checks(self._device, self._node_id, allow=plan.allow, never=plan.never)]
         if self._plan.seed:
             Random(self._plan.seed).shuffle(checks)
         return checks

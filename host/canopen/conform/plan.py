@@ -23,6 +23,7 @@ class Plan:
         level: what may be done to the node.
         only: names of groups or checks, with * and ?; all if empty.
         allow: indices of profile objects (6000h to 9FFFh) that may be written.
+        never: indices of objects that are never written, whatever else is allowed.
         bit_rate: of the bus in bit/s, None if nobody says it.
         max_load: share of the bit rate that the tester may use, above 0 to 1.
         seed: of the order in which objects are judged; 0: that of the dictionary.
@@ -35,6 +36,7 @@ class Plan:
     level: Level = Level.READ_ONLY
     only: tuple[str, ...] = ()
     allow: frozenset[int] = frozenset()
+    never: frozenset[int] = frozenset()
     bit_rate: int | None = None
     max_load: float = 0.3
     seed: int = 0

@@ -95,7 +95,7 @@ class _Search:
     device: EdsDevice
     reader: ObjectReader
     allow: Collection[int]
-    unsafe: Collection[int]
+    never: Collection[int]
     known: bool
     bound: dict[str, Bound] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
@@ -107,7 +107,7 @@ def bind(
     upload: Upload,
     *,
     allow: Collection[int] = (),
-    unsafe: Collection[int] = (),
+    never: Collection[int] = (),
 ) -> Binding:
     """Find an object or PDO for each name; the node is only read.
 
@@ -118,7 +118,7 @@ def bind(
         device: what its EDS says; None to ask the node which objects of CiA 301 it has.
         upload: reads an object of the node.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written all the same.
-        unsafe: indices that are never written.
+        never: indices that are never written.
 
     Returns:
         What was found.
@@ -128,7 +128,7 @@ def bind(
     """
     reader = ObjectReader(upload)
     found = device or probe_device(reader)
-    search = _Search(found, reader, allow, unsafe, device is not None)
+    search = _Search(found, reader, allow, never, device is not None)
     for wanted in WANTED:
         _bind_object(search, wanted)
     _bind_absent(search)
@@ -184,7 +184,7 @@ def _is_free(search: _Search, entry: EntryDescription) -> bool:
 
 def _may_write(search: _Search, index: int) -> bool:
     """Say whether an object may be written, with a value or to be refused."""
-    if index in search.unsafe:
+    if index in search.never:
         return False
     return index not in PROFILE_AREA or index in search.allow
 

@@ -147,7 +147,7 @@ def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
     if "macro" in step:
         yield from written_by(*step["macro"])
     can_id, _, data = str(step.get("send", "")).partition("#")
-    if can_id == request and len(data) >= 8 and _is_download(int(data[:2], 16)):
+    if can_id == request and len(data) >= 8 and begins_download(int(data[:2], 16)):
         yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
 
 
@@ -158,7 +158,7 @@ def _used(step: Mapping[str, Any]) -> Iterator[Address]:
         yield from written_by(*step["macro"])
 
 
-def _is_download(command: int) -> bool:
+def begins_download(command: int) -> bool:
     """Return whether a request begins to write the object that it names."""
     specifier = command & SPECIFIER
     begins = specifier == ClientCommand.BLOCK_DOWNLOAD and not command & BLOCK_ENDS

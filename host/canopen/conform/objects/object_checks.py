@@ -52,11 +52,11 @@ class _Maker:
     Args:
         node_id: of the node, 1..127.
         allow: indices of the profile area that may be written.
-        unsafe: indices that are never written.
+        never: indices that are never written.
     """
 
-    def __init__(self, node_id: int, allow: Collection[int], unsafe: Collection[int]) -> None:
-        self._node_id, self._allow, self._unsafe = node_id, allow, unsafe
+    def __init__(self, node_id: int, allow: Collection[int], never: Collection[int]) -> None:
+        self._node_id, self._allow, self._never = node_id, allow, never
 
     def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[Check]:
         """Make the checks of one entry; `counts` says whether it is the sub-index 0 of a record."""
@@ -90,7 +90,7 @@ class _Maker:
         return entry.power_on_data(self._node_id).hex().upper()
 
     def _may_write(self, index: int) -> bool:
-        if index in NEVER_WRITTEN or index in self._unsafe:
+        if index in NEVER_WRITTEN or index in self._never:
             return False
         return index not in PROFILE_AREA or index in self._allow
 
@@ -100,7 +100,7 @@ def object_checks(
     node_id: int,
     *,
     allow: Collection[int] = (),
-    unsafe: Collection[int] = (),
+    never: Collection[int] = (),
 ) -> tuple[Check, ...]:
     """Make the checks of all objects, sorted by index and sub-index.
 
@@ -112,9 +112,9 @@ def object_checks(
         device: what the EDS says.
         node_id: of the node, 1..127; for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
-        unsafe: indices that are never written.
+        never: indices that are never written.
     """
-    maker, checks = _Maker(node_id, allow, unsafe), list[Check]()
+    maker, checks = _Maker(node_id, allow, never), list[Check]()
     entries = sorted(device.entries, key=attrgetter("key"))
     objects = [(index, list(rows)) for index, rows in groupby(entries, attrgetter("index"))]
     for number, (index, rows) in enumerate(objects):

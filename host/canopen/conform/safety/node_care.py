@@ -206,7 +206,7 @@ class NodeCare:
             pattern = f"{ERROR_CONTROL_COB_ID + self._node_id:03X}#.."
             text = self._exchange.expect([pattern], 3 * PROBE_MS)
             return NmtState(int(text[-2:], 16) & 0x7F)
-        except (SdoFailed, StepFailed, ValueError):
+        except (SdoFailed, StepFailed, NotAllowed, ValueError):
             return None
 
     def _command(self, command: NmtCommand) -> None:

@@ -7,7 +7,11 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.notation.bound_check import NMT_TO_ALL, SYNC_TO_ALL
+from tickrig.host.canopen.conform.notation.bound_check import (
+    NMT_TO_ALL,
+    SYNC_TO_ALL,
+    begins_download,
+)
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
@@ -15,6 +19,7 @@ from tickrig.wire.canopen.sdo.sdo_command import (
     REQUEST_COB_ID,
     SPECIFIER,
     ClientCommand,
+    index_sub,
 )
 
 UPLOADS: Final = frozenset(
@@ -34,6 +39,7 @@ SWITCH_GLOBAL, CONFIGURATION = 0x04, 0x01
 CONFIGURES: Final = (0x11, 0x13, 0x15, 0x17)
 """LSS services that change a node: node-ID, bit timing, its activation, both stored."""
 STORAGE: Final = (0x1010, 0x1011)
+FRAME_BYTES: Final = 8
 
 Confirm = Callable[[str], bool]
 
@@ -46,15 +52,21 @@ class Permission:
         allow: indices of the profile area that may be written.
         node_id: of the node under test.
         confirm: is asked, once, before each thing that concerns other nodes or is not undone.
+        never: indices that are never written.
 
     Attributes:
         others: node-IDs that were on the bus.
     """
 
     def __init__(
-        self, level: Level, allow: Collection[int], node_id: int, confirm: Confirm
+        self,
+        level: Level,
+        allow: Collection[int],
+        node_id: int,
+        confirm: Confirm,
+        never: Collection[int] = (),
     ) -> None:
-        self._level, self._allow, self._node_id = level, allow, node_id
+        self._level, self._allow, self._node_id, self._never = level, allow, node_id, never
         self._confirm = confirm
         self._answers: dict[str, bool] = {}
         self.others: frozenset[int] = frozenset()
@@ -71,6 +83,8 @@ class Permission:
         if self._level is Level.READ_ONLY:
             if not is_request or frame.remote or not _is_upload(frame.data):
                 raise NotAllowed(f"{frame} is more than reading: --communication")
+        elif is_request:
+            self._check_request(frame.data)
         elif frame.can_id == NMT_COB_ID and not frame.extended:
             self._check_nmt(frame.data)
         elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:
@@ -85,13 +99,14 @@ class Permission:
             index: of the object.
             refused: the node must refuse it.
         """
+        self._check_never(index)
         if index in PROGRAMS:
             raise NotAllowed(f"{index:04X}h is of program download, which is never written")
         if index >= PROFILE and index not in self._allow:
             raise NotAllowed(f"{index:04X}h may move something: --allow {index:04X}h")
         beyond = index in STORAGE or (MANUFACTURER <= index < PROFILE and not refused)
         if beyond and self._level < Level.INTRUSIVE:
-            raise NotAllowed(f"{index:04X}h would be written: --intrusive")
+            raise NotAllowed(f"{index:04X}h would be written with what it takes: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
         """Ask a person, once; NotAllowed if the answer is no.
@@ -104,6 +119,14 @@ class Permission:
             self._answers[question] = self._confirm(question)
         if not self._answers[question]:
             raise NotAllowed(f"would {question}: nobody said yes (--yes)")
+
+    def _check_request(self, data: bytes) -> None:
+        if len(data) == FRAME_BYTES and begins_download(data[0]):
+            self._check_never(index_sub(data)[0])
+
+    def _check_never(self, index: int) -> None:
+        if index in self._never:
+            raise NotAllowed(f"{index:04X}h must not be written: --never {index:04X}h")
 
     def _check_nmt(self, data: bytes) -> None:
         if data[:1] == bytes([NmtCommand.RESET_NODE]) and self._level < Level.INTRUSIVE:

@@ -74,7 +74,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
         SdoTimeout: it does not answer.
     """
     client.size_of = _standard_size if device is None else _sizes(device)
-    binding = bind(device, client.upload, allow=plan.allow)
+    binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
     features = find_features(binding, client, eds)
     names = NodeNames(node_id, binding, client.number, others)
     return Subject(binding, features, names, dict(_about(client)))

@@ -188,6 +188,7 @@ def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) ->
         (("--node", "5", "--only", "NMT-03"), "--only NMT-03 needs --communication"),
         (("--node", "5", "--only", "UE", "--only", "LS"), "--only LS needs --intrusive"),
         (("--node", "5", "--allow", "600"), "--allow '600' is no index as 6200h"),
+        (("--node", "5", "--never", "x"), "--never 'x' is no index as 6200h"),
         (("--node", "5", "--html", "/nosuch/x.html"), "--html /nosuch/x.html: no directory"),
         (("--node", "5", "--badge", "/"), "--badge /: it is a directory"),
         (("--node", "5", "--baseline", "/nosuch"), "--baseline /nosuch: No such file"),

@@ -211,16 +211,48 @@ def test_a_node_that_comes_back_is_restored_then() -> None:
     assert lost == [(0x2001, 0)]  # of the manufacturer: this level does not write it
 
 
-def test_objects_of_the_profile_are_not_written_unless_allowed() -> None:
-    r1 = R1()
-    link = SpyLink(r1)
-    groups = ("DE", "DS", "NMT", "PC", "PR", "ST", "IO", "OD")  # no blocks: any byte begins one
-    r1.judge(Plan(Level.INTRUSIVE, groups, confirm=yes), link=link)
-    written = {
+WRITING = ("DE", "DS", "NMT", "HB", "PC", "PR", "ST", "IO", "OD")
+"""Groups that write objects; no blocks: any byte begins one."""
+
+
+def written_on(link: SpyLink) -> set[int]:
+    return {
         int.from_bytes(frame.data[1:3], "little")
         for frame in link.sent
         if frame.can_id == 0x605 and frame.data and frame.data[0] & 0xE0 == 0x20
     }
+
+
+def test_what_must_be_refused_is_written_to_objects_of_the_manufacturer_too() -> None:
+    r1 = R1()
+    link = SpyLink(r1)
+    report = r1.judge(Plan(Level.COMMUNICATION, ("DE", "OD-2*"), confirm=yes), link=link)
+    assert 0x2001 in written_on(link)
+    reasons = {r.check.id: r.outcome.reason for r in report.results}
+    assert reasons["DE-11"].endswith("h would be written with what it takes: --intrusive")
+
+
+def test_what_must_never_be_written_never_is() -> None:
+    r1 = configured()
+    never = frozenset({0x1017, 0x1400, 0x1A00, *range(0x2000, 0x2010)})
+    link = SpyLink(r1)
+    report = r1.judge(Plan(Level.INTRUSIVE, WRITING, confirm=yes, never=never), link=link)
+    assert not written_on(link) & never
+    assert written_on(link) > {0x1006, 0x1014, 0x1800}
+    assert failing(report) == []
+    assert report.unrestored == (
+        "1017h:00 was E803",
+        "1400h:02 was 01",
+        "1600h:00 was 01",  # a mapping only changes while 1400h:01 disables the PDO
+        "2001h:00 was EFBE",
+    )
+
+
+def test_objects_of_the_profile_are_not_written_unless_allowed() -> None:
+    r1 = R1()
+    link = SpyLink(r1)
+    r1.judge(Plan(Level.INTRUSIVE, WRITING, confirm=yes), link=link)
+    written = written_on(link)
     assert 0x1017 in written
     assert not [index for index in written if index >= 0x6000]
 

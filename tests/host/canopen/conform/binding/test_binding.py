@@ -158,9 +158,9 @@ def test_what_means_something_in_its_profile_stands_for_nothing(
         )
 
 
-def test_an_object_that_the_user_calls_unsafe_is_not_bound() -> None:
+def test_an_object_that_must_never_be_written_is_not_bound() -> None:
     bench = make_bench(make_dictionary())
-    binding = bind(r1_device(), bench.upload, unsafe={0x2003, 0x1018})
+    binding = bind(r1_device(), bench.upload, never={0x2003, 0x1018})
     assert binding.reasons["rw_u64"].endswith("and it must not be written")
     assert place(binding, "absent_sub") == "1016.05"
 

@@ -146,7 +146,7 @@ def test_objects_of_the_profile_are_written_only_if_they_are_allowed() -> None:
     assert written == ["OD-6200.01-long", "OD-6200.01-high"]
     for checks in (
         object_checks(device, NODE_ID),
-        object_checks(device, NODE_ID, allow={0x6200}, unsafe={0x6200}),
+        object_checks(device, NODE_ID, allow={0x6200}, never={0x6200}),
     ):
         assert all(check.level is Level.READ_ONLY for check in checks)
 
