@@ -15,6 +15,7 @@ from tickrig.host.canopen.conform.binding.wanted import (
     HARMLESS,
     PLAIN_OUTPUTS,
     PROFILE_AREA,
+    TEXTS,
     WANTED,
     Use,
     Wanted,
@@ -195,7 +196,12 @@ def _order(wanted: Wanted, entry: EntryDescription) -> tuple[bool | int, ...]:
     if wanted.use is Use.WRITE and entry.index in HARMLESS:
         return (0, HARMLESS.index(entry.index))
     area = 1 if entry.index in COMMUNICATION_AREA else 3 if entry.index in PROFILE_AREA else 2
-    return (area, narrow, entry.signed, entry.key)
+    return (area, narrow, entry.signed, -_room(wanted, entry), entry.key)
+
+
+def _room(wanted: Wanted, entry: EntryDescription) -> int:
+    """Return how much a string that is written is known to hold."""
+    return len(entry.default) if wanted.use is Use.WRITE and entry.data_type in TEXTS else 0
 
 
 def _bind_absent(search: _Search) -> None:

@@ -8,12 +8,13 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.position import follow
-from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames, multiplexer
-from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.bus.sdo_frames import ABORTED, SdoFrames, multiplexer
+from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
 from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo_command import SEGMENT_BYTES
 
 MOST_BYTES: Final = 20_000
@@ -21,6 +22,9 @@ MOST_BYTES: Final = 20_000
 
 STATE_MS: Final = 20
 """So long after an NMT command a node is in its new state."""
+
+TOO_LONG: Final = ("12000706", "10000706", "05000405")
+"""Codes with which a download is refused that is longer than the object can hold."""
 
 SCAN_MS: Final = 10
 FOUND: Final = "7E4#4F00000000000000"
@@ -73,6 +77,19 @@ def download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
     sdo.say(bytes([0x21, *_mux(at)]) + len(data).to_bytes(4, "little"))
     sdo.answer(f"60{multiplexer(at)}00000000")
     sdo.download_segments(data)
+
+
+def room(sdo: SdoFrames, at: Address, size: str) -> None:
+    """Begin to write so many bytes, and end it; NotAllowed where the object has no room for them.
+
+    How much a string holds is in no EDS.
+    """
+    sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
+    mux = multiplexer(at)
+    answer = sdo.answer(f"60{mux}00000000", *(f"80{mux}{code}" for code in TOO_LONG))
+    if answer[0] == ABORTED:
+        raise NotAllowed(f"{at[0]:04X}h:{at[1]:02X} holds less than {size} bytes")
+    sdo.say(bytes([ABORTED, *_mux(at)]) + AbortCode.GENERAL.to_bytes(4, "little"))
 
 
 def upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
@@ -251,6 +268,7 @@ MACROS: Final[dict[str, Callable[..., object]]] = {
     "sync": sync,
     "syncperiod": sync_period,
     "segdn": download_segmented,
+    "room": room,
     "segup": upload_pattern,
     "blkdn": download_block,
     "blkup": upload_block_pattern,

@@ -51,6 +51,7 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "blkdn": _transfer,
     "blkup": _transfer,
     "upload": lambda words: TRANSFER_MS,
+    "room": lambda words: TRANSFER_MS,
     "blockup": lambda words: 2 * TRANSFER_MS,
     "fastscan": lambda words: 10_000,
     "guard": lambda words: 1_500 * len(words),

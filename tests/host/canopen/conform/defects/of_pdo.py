@@ -241,6 +241,7 @@ DEFECTS: Final = (
     Defect(
         *("dummies are mapped into TPDOs", ("PC-29",)),
         tolerant(ABORT.NO_OBJECT, *COUNTS, *PLACES),
+        left=True,
     ),
     Defect(
         *("read-only objects go into RPDOs", ("PC-11",)),

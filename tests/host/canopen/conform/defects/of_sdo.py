@@ -277,7 +277,7 @@ DEFECTS: Final = (
         says("585#8000000001000405"),
     ),
     Defect("abort is answered", ("US-06", "SG-02", "DS-10", "BU-12"), answers_aborts),
-    Defect("no new transfer while one runs", ("US-07",), clings_to_transfer),
+    Defect("no new transfer while one runs", ("US-07",), clings_to_transfer, left=True),
     Defect("no SDO time-out", ("US-08",), services={SdoServers: Patient}, left=True),
     Defect("long domains are cut", ("US-09", "BD-10", "BU-11"), forgets_end_of_domains, left=True),
     Defect("announced size is ignored", ("DS-07", "DS-06"), hears("605#21(.*)", r"605#20\1")),
