@@ -152,7 +152,7 @@ class BootFailed(Exception):  # noqa: N818 - what the network did
     """
 
     def __init__(self, slaves: list[NetworkSlave]) -> None:
-        super().__init__("; ".join(_verdict(slave) for slave in slaves))
+        super().__init__("\n".join(map(_failure, slaves)))
         self.slaves = slaves
 
 
@@ -164,6 +164,14 @@ def _verdict(slave: NetworkSlave) -> str:
         return f"{who}: not booted" + (", still tried" if slave.booting else "; nothing was heard")
     status = slave.outcome.status
     return f"{who}: {status.value} {status.text}" if status.value else f"{who}: {status.text}"
+
+
+def _failure(slave: NetworkSlave) -> str:
+    """Say in a line why a slave did not boot."""
+    if not slave.steps:
+        return _verdict(slave)
+    step = slave.steps[-1][1]
+    return f"{_verdict(slave)}; {step.request}: {step.answer}"
 
 
 def _never() -> bool:

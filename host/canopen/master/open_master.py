@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
@@ -13,13 +14,19 @@ from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.links.link import Link
 
+SDO_TIMEOUT_US: Final = 100_000
+"""As Lely's master has it, unless told otherwise."""
 
-def open_master(link: Link[Any], path: Path | str) -> CanopenMaster:
+
+def open_master(
+    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
+) -> CanopenMaster:
     """Return the master of a bus.yml; it has sent nothing yet.
 
     Args:
         link: the bus, as `bench.link`, or `CanLink.open("can0", "socketcan")`.
         path: the bus.yml.
+        sdo_timeout_us: how long to wait for an SDO response; a loaded machine wants more.
 
     Returns:
         A master; close it, or use it in a `with` block.
@@ -33,12 +40,12 @@ def open_master(link: Link[Any], path: Path | str) -> CanopenMaster:
     bus = read_bus_file(Path(path))
     if bus.errors:
         raise ValueError("\n".join(str(one) for one in bus.errors))
-    return master_of(link, bus)
+    return master_of(link, bus, sdo_timeout_us)
 
 
-def master_of(link: Link[Any], bus: BusFile) -> CanopenMaster:
+def master_of(link: Link[Any], bus: BusFile, sdo_timeout_us: int = SDO_TIMEOUT_US) -> CanopenMaster:
     """Return the master of a bus.yml that was read."""
-    master = CanopenMaster(link, plan_of(bus))
+    master = CanopenMaster(link, replace(plan_of(bus), sdo_timeout_us=sdo_timeout_us))
     slaves = bus.slaves.values()
     images = {slave.node_id: ProcessImage(slave.pdos, master.nmt.send) for slave in slaves}
     drives = tuple(
