@@ -18,7 +18,7 @@ from tickrig.host.canopen.bus_file.layout import Layout, read_layout
 from tickrig.host.canopen.bus_file.master_reader import read_master, read_options, watch_master
 from tickrig.host.canopen.bus_file.notes import Notes, Section
 from tickrig.host.canopen.bus_file.pdo_reader import CobIds, pdos_after
-from tickrig.host.canopen.bus_file.sheet import find_sheet
+from tickrig.host.canopen.bus_file.sheet import Sheets
 from tickrig.host.canopen.bus_file.slave_reader import SlaveReader
 from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
 
@@ -125,7 +125,7 @@ class _Reader:
     def __init__(self, path: Path, layout: Layout, notes: Notes, top: Place) -> None:
         self._path, self._layout, self._notes, self._top = path, layout, notes, top
         self._options = read_options(layout.options)
-        self._cob_ids = CobIds()
+        self._cob_ids, self._sheets = CobIds(), Sheets(path.parent, self._options.dcf_path)
 
     def read(self) -> BusFile:
         """Read them all."""
@@ -144,7 +144,7 @@ class _Reader:
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, node: Section, master: BusMaster | None) -> BusSlave | None:
-        sheet = find_sheet(node, self._options.dcf_path, self._path.parent)
+        sheet = self._sheets.find(node)
         if sheet is None:
             return None
         if not sheet.node_id:

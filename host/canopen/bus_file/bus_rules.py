@@ -9,6 +9,7 @@ from tickrig.host.canopen.data_sheet.rule import Rule, Severity
 YAML: Final = "YAML 1.1"
 DCFGEN: Final = "dcfgen"
 COGEN: Final = "cogen"
+READERS: Final = "dcfgen, ros2_canopen"
 CONTAINER: Final = "device container of ros2_canopen"
 
 _ERRORS: Final = (
@@ -18,8 +19,8 @@ _ERRORS: Final = (
     ("yaml-value", YAML, "readers refuse the file", "write what the tag says, or leave it out"),
     ("yaml-merge", YAML, "readers refuse the file", "merge a mapping: <<: *name"),
     ("yaml-loop", YAML, "readers do not end", "write it out"),
-    ("kind", DCFGEN, "dcfgen refuses the file", "write it as it is shown here"),
-    ("no-number", DCFGEN, "dcfgen refuses the file", "write a number, as 10 or 0xA"),
+    ("kind", READERS, "dcfgen or a driver refuses it", "write it as docs/bus-file.md has it"),
+    ("no-number", READERS, "dcfgen or a driver refuses it", "write a number, as 10 or 0xA"),
     ("number-range", DCFGEN, "dcfgen refuses it, or the value is cut off", "give one of its range"),
     ("no-dcf", DCFGEN, "dcfgen refuses the file", "dcf: the name of its EDS or DCF"),
     ("no-file", DCFGEN, "dcfgen refuses the file", "put the EDS beside bus.yml"),

@@ -10,6 +10,7 @@ from typing import Final
 from tickrig.host.canopen.bus_file.item import Place
 from tickrig.host.canopen.bus_file.notes import Section
 from tickrig.host.canopen.eds import open_eds
+from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_device import (
     COMMISSIONING,
     HIGHEST_NODE_ID,
@@ -24,6 +25,7 @@ FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
 """What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
+SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
 
 class Sheet:
@@ -32,13 +34,13 @@ class Sheet:
     Args:
         path: the file.
         file: its sections.
+        device: what they describe.
         node_id: that of the node, 0 where only the file gives one.
     """
 
-    def __init__(self, path: Path, file: EdsFile, node_id: int) -> None:
-        self.path, self.file = path, file
-        self.device: EdsDevice = read_device(file)
-        self.node_id = node_id or self.device.node_id or 0
+    def __init__(self, path: Path, file: EdsFile, device: EdsDevice, node_id: int) -> None:
+        self.path, self.file, self.device = path, file, device
+        self.node_id = node_id or device.node_id or 0
         self._rows: dict[int, dict[int, EntryDescription]] = {}
         for row in self.device.entries:
             self._rows.setdefault(row.index, {})[row.sub] = row
@@ -88,40 +90,73 @@ class Sheet:
         return self.head_number(section, key) or self.value(IDENTITY, sub)
 
 
-def find_sheet(node: Section, dcf_path: str, folder: Path) -> Sheet | None:
-    """Find and read the EDS or DCF of a node.
-
-    It is looked for beside the file, as dcfgen does; then in `dcf_path`; then by its name alone
-    beside the file and one folder up, for a `dcf_path` of a container that is not there.
+class Sheets:
+    """Finds and reads the EDS and DCF files of a bus, each of them once.
 
     Args:
-        node: its section.
-        dcf_path: of the options, for a node that has none of its own.
         folder: of the bus.yml.
-
-    Returns:
-        The sheet; None, and a finding, without one.
+        dcf_path: of the options, for a node that has none of its own.
     """
-    name = node.text("dcf")
-    if not name:
-        if "dcf" not in node:
-            node.note("no-dcf", "dcf", "no dcf: which EDS is it?")
-        return None
-    looked: list[Path] = []
-    for path in _candidates(name, node.text("dcf_path", dcf_path), folder):
-        if path in looked:
-            continue
-        looked.append(path)
-        try:
-            if not path.is_file():
-                continue
-            return _read(node, path, is_first=len(looked) == 1)
-        except (OSError, ValueError) as error:
-            node.note("no-file", "dcf", f"dcf: {_said(path, error)}")
+
+    def __init__(self, folder: Path, dcf_path: str) -> None:
+        self._folder, self._dcf_path = folder, dcf_path
+        self._read: dict[Path, tuple[EdsFile, EdsDevice]] = {}
+
+    def find(self, node: Section) -> Sheet | None:
+        """Return the sheet of a node; None, and a finding, without one.
+
+        It is looked for beside the file, as dcfgen does; then in `dcf_path`; then by its name alone
+        beside the file and one folder up, for a `dcf_path` of a container that is not there.
+        """
+        name = node.text("dcf")
+        if not name:
+            if "dcf" not in node or node.fields["dcf"].value == "":
+                node.note("no-dcf", "dcf", "no dcf: which EDS is it?")
             return None
-    where = ", ".join(dict.fromkeys(shorten(str(path.parent)) for path in looked))
-    node.note("no-file", "dcf", f"dcf: no file {shorten(name)!r}; looked in {where}")
-    return None
+        looked = list(dict.fromkeys(self._candidates(name, node.text("dcf_path", self._dcf_path))))
+        try:
+            path = next((path for path in looked if path.is_file()), None)
+            if path is not None:
+                return self._sheet(node, path, is_first=path == looked[0])
+            node.note("no-file", "dcf", f"dcf: {self._not_found(name, looked)}")
+        except (OSError, EdsError) as error:
+            node.note("no-file", "dcf", f"dcf: {_said(name, error)}")
+        return None
+
+    def _candidates(self, name: str, dcf_path: str) -> Iterator[Path]:
+        """Give the places where a file may be."""
+        folder, given = self._folder, Path(self._expanded(name))
+        yield folder / given
+        if dcf_path:
+            yield folder / self._expanded(dcf_path) / given
+            yield Path(self._expanded(dcf_path)) / given
+        yield folder / given.name
+        yield folder.parent / given.name
+
+    def _expanded(self, text: str) -> str:
+        return os.path.expandvars(text.replace(FOLDER_WORD, str(self._folder)))
+
+    def _not_found(self, name: str, looked: list[Path]) -> str:
+        """Say where a file is not, and which one could be meant."""
+        where = ", ".join(dict.fromkeys(str(path.parent) for path in looked))
+        beside = [path.name for path in self._folder.iterdir() if path.suffix.lower() in SUFFIXES]
+        meant = closest(Path(name).name, sorted(beside))
+        hint = f"; did you mean {shorten(meant[0])!r}?" if meant else ""
+        return f"no file {shorten(name)!r}; looked in {_printable(where)}{hint}"
+
+    def _sheet(self, node: Section, path: Path, *, is_first: bool) -> Sheet | None:
+        if path not in self._read:
+            file = open_eds(path)
+            self._read[path] = file, read_device(file)
+        file, device = self._read[path]
+        if not is_first:
+            text = f"dcf: it is taken from {_printable(str(path.parent))}"
+            node.note("file-elsewhere", "dcf", text)
+        for one in file.errors:
+            where = f"[{shorten(one.section)}] " if one.section else ""
+            place = Place(str(path), one.line)
+            node.notes.note("eds", place, node.name, f"{where}{one.reason}")
+        return Sheet(path, file, device, _node_id(node)) if device.entries else None
 
 
 def _node_id(node: Section) -> int:
@@ -136,35 +171,12 @@ def _node_id(node: Section) -> int:
     return 0
 
 
-def _said(path: Path, error: OSError | ValueError) -> str:
+def _said(name: str, error: OSError | EdsError) -> str:
     if isinstance(error, EdsError):
-        return shorten(str(error))
-    reason = error.strerror if isinstance(error, OSError) else "this is no path"
-    return f"{shorten(str(path))}: {reason}"
+        return _printable(str(error.findings[0]))
+    return f"{shorten(name)!r}: {error.strerror}"
 
 
-def _candidates(name: str, dcf_path: str, folder: Path) -> Iterator[Path]:
-    """Give the places where a file may be."""
-    given = Path(_expanded(name, folder))
-    yield folder / given
-    if dcf_path:
-        yield folder / _expanded(dcf_path, folder) / given
-        yield Path(_expanded(dcf_path, folder)) / given
-    yield folder / given.name
-    yield folder.parent / given.name
-
-
-def _expanded(text: str, folder: Path) -> str:
-    return os.path.expandvars(text.replace(FOLDER_WORD, str(folder)))
-
-
-def _read(node: Section, path: Path, *, is_first: bool) -> Sheet | None:
-    file = open_eds(path)
-    sheet = Sheet(path, file, _node_id(node))
-    if not is_first:
-        node.note("file-elsewhere", "dcf", f"dcf: it is taken from {path.parent}")
-    for one in file.errors:
-        where = f"[{one.section}] " if one.section else ""
-        text = f"{where}{one.reason}"
-        node.notes.note("eds", Place(str(path), one.line), node.name, text)
-    return sheet if sheet.device.entries else None
+def _printable(text: str) -> str:
+    """Return a path that can be printed in a line."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)

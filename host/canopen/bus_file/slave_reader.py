@@ -105,23 +105,30 @@ class SlaveReader:
             if sheet.row(index, sub) is None:
                 text = f"{index:04X}h:{sub:02X} is not in {sheet.path.name}"
                 node.note("no-identity", "dcf", text)
-        checked = [sheet.value(0x1000, 0), sheet.identity("VendorNumber", 1)]
-        checked.append(sheet.identity("ProductNumber", 2))
-        for key, head, sub in (
-            ("revision_number", "RevisionNumber", 3),
-            ("serial_number", "LSS_SerialNumber", 4),
-        ):
-            in_eds = sheet.identity(head, sub)
-            number = node.whole(key, in_eds)
-            if in_eds and number not in {0, in_eds}:
-                where = sheet.place(IDENTITY, sub)
-                text = f"{key}: 0x{number:08X}, but the EDS has 0x{in_eds:08X}: {where}"
-                node.note("identity", key, text)
-            checked.append(number)
-        has = (True, True, *(sheet.row(IDENTITY, sub) is not None for sub in (2, 3, 4)))
+        product = sheet.identity("ProductNumber", 2) if sheet.row(IDENTITY, 2) else 0
         return Identity(
-            *(number if there else 0 for number, there in zip(checked, has, strict=True))
+            sheet.value(0x1000, 0),
+            sheet.identity("VendorNumber", 1),
+            product,
+            self._identity_number("revision_number", "RevisionNumber", 3),
+            self._identity_number("serial_number", "LSS_SerialNumber", 4),
         )
+
+    def _identity_number(self, key: str, head: str, sub: int) -> int:
+        """Return a number that the file may give; without an entry in the EDS none is checked."""
+        node, sheet = self._node, self._sheet
+        in_eds = sheet.identity(head, sub)
+        number = node.whole(key, in_eds)
+        if sheet.row(IDENTITY, sub) is None:
+            if number and key in node:
+                text = f"{key}: {sheet.path.name} has no 1018h:{sub:02X}, so none is checked"
+                node.note("no-object", key, text)
+            return 0
+        if in_eds and number not in {0, in_eds}:
+            where = sheet.place(IDENTITY, sub)
+            text = f"{key}: 0x{number:08X}, but the EDS has 0x{in_eds:08X}: {where}"
+            node.note("identity", key, text)
+        return number
 
     def _check_identity_keys(self) -> None:
         """Note what the master has of the EDS alone."""

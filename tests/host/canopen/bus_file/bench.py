@@ -18,6 +18,17 @@ ROOT = Path(__file__).parents[4]
 EPOS = (ROOT / "examples/eds/epos.eds").read_text("utf-8")
 IO = (ROOT / "examples/io_module.eds").read_text("utf-8")
 
+LAMP = (ROOT / "tests/host/canopen/bus_file/lamp.eds").read_text("utf-8")
+SHEETS = {
+    "epos.eds": EPOS,
+    "io.eds": IO,
+    "lamp.eds": LAMP,
+    "lamp.dcf": f"{LAMP}[DeviceComissioning]\nNodeID=9\n",
+    "broken.eds": LAMP.replace("DefaultValue=0x0000000A", "DefaultValue=ten"),
+    "bare.eds": LAMP.replace("1018", "2018"),
+}
+"""The EDS and DCF files beside a bus.yml, by name."""
+
 MASTER = "master: {node_id: 1}\n"
 NODE = MASTER + "axis:\n  node_id: 5\n  dcf: epos.eds\n"
 """A file with one node, to which keys may be added."""
@@ -25,7 +36,7 @@ NODE = MASTER + "axis:\n  node_id: 5\n  dcf: epos.eds\n"
 
 def write_bus(folder: Path, text: str) -> Path:
     """Write a bus.yml and the EDS files beside it."""
-    for name, eds in (("epos.eds", EPOS), ("io.eds", IO)):
+    for name, eds in SHEETS.items():
         (folder / name).write_text(eds, "utf-8")
     path = folder / "bus.yml"
     path.write_text(text, "utf-8")

@@ -109,4 +109,44 @@ one: {node_id: 1, dcf: epos.eds, heartbeat_consumer: true, heartbeat_producer: 0
 two: {node_id: 2, dcf: epos.eds, heartbeat_consumer: no, heartbeat_multiplier: 1.5}
 """
 
-GOOD: Final = {"plain": PLAIN, "cogen": COGEN, "hidden": HIDDEN, "heartbeats": HEARTBEATS}
+LAMPS: Final = """\
+options: {retry_factor: 7}
+master:
+  node_id: 99
+  heartbeat_producer: 100
+  error_behavior: {1: 2, 2: 1}
+  start: false
+  start_nodes: 0
+one:
+  dcf: lamp.eds
+  node_id: 0x21
+  heartbeat_consumer: true
+  heartbeat_producer: 0
+  guard_time: 100
+  error_behavior: {1: 2}
+  time_cob_id: 256
+  sdo:
+    - {index: 0x2000, value: '7'}
+    - {index: 0x2001, value: 2}
+    - {index: 0x2003, value: true}
+    - {index: 0x1016, sub_index: 1}
+  tpdo:
+    5: {cob_id: auto, sync_start: 3, transmission: 1, mapping: [{index: 0x2000}, {index: 0x2003}]}
+    2: {enabled: "false", cob_id: 640, mapping: [{index: 8192, sub_index: 0}]}
+two:
+  dcf: lamp.dcf
+  heartbeat_consumer: false
+  serial_number: 5
+  revision_number: 6
+  tpdo:
+    1: {cob_id: 0x80000189}
+    5: {cob_id: auto, mapping: [{index: 0x2000}]}
+"""
+
+GOOD: Final = {
+    "plain": PLAIN,
+    "cogen": COGEN,
+    "hidden": HIDDEN,
+    "heartbeats": HEARTBEATS,
+    "lamps": LAMPS,
+}

@@ -1,0 +1,123 @@
+"""Each mistake that a bus.yml can have: the file, the rule that tells it, where, in which words."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from tests.host.canopen.bus_file.bench import MASTER, NODE
+
+
+class Case(NamedTuple):
+    """A file with a mistake.
+
+    Attributes:
+        rule: that tells it.
+        text: of the bus.yml.
+        line: where.
+        said: a part of the finding.
+        alone: whether nothing else is found.
+    """
+
+    rule: str
+    text: str
+    line: int
+    said: str
+    alone: bool = True
+
+
+SLEEPY: Final = MASTER + "lamp:\n  node_id: 9\n  dcf: lamp.eds\n"
+BEATING: Final = SLEEPY.replace("1}", "1, heartbeat_producer: 100}")
+MANY: Final = f"{MASTER}.a: &a {{dcf: lamp.eds, tpdo: {{5: {{cob_id: auto, mapping: []}}}}}}\n"
+ROS: Final = "driver: D\n  package: P\n"
+ROS_NODE: Final = f"master:\n  node_id: 1\n  {ROS}axis:\n  node_id: 5\n  dcf: epos.eds\n  {ROS}"
+MAPPED: Final = NODE + "  tpdo:\n    1:\n      mapping:\n        - "
+
+CORPUS: Final = (
+    Case("yaml", "master: [1\n", 2, "not YAML: expected ',' or ']'"),
+    Case("yaml", "", 1, "the file is empty"),
+    Case("yaml", "master: 1\n--- \nmaster: 2\n", 2, "but found another document"),
+    Case("yaml", "a: \x01\n", 1, "a character that no text has"),
+    Case("yaml", "- " * 2_000, 1, "nest too deep"),
+    Case("yaml-twice", NODE + "  boot: true\n  boot: false\n", 6, "'boot' is there twice: "),
+    Case("yaml-twice", NODE + NODE.removeprefix(MASTER), 5, "'axis' is there twice: "),
+    Case("yaml-key", NODE + "  ? [a]\n  : 1\n", 5, "a key is a text or a number"),
+    Case("yaml-value", NODE + "  boot: !!int x\n", 5, "'x' is no", alone=False),
+    Case("yaml-value", NODE + "  namespace: !!python/object:os.system x\n", 5, "'x' is no "),
+    Case("yaml-merge", NODE + "  <<: 5\n", 5, "<< takes a mapping"),
+    Case("yaml-loop", NODE + "  namespaces: &a [*a]\n", 5, "it holds itself", alone=False),
+    Case("kind", MASTER + "axis: 5\n", 2, "'5' is no mapping", alone=False),
+    Case("kind", "master:\n", 1, "nothing is no mapping"),
+    Case("kind", NODE + "  sdo: {index: 1}\n", 5, "sdo: a mapping is no list"),
+    Case("kind", NODE + "  sdo: [5]\n", 5, "'5' is no mapping", alone=False),
+    Case("kind", NODE + "  sdo: [{value: 5}]\n", 5, "an entry of sdo has an index"),
+    Case("kind", NODE + "  software_file: []\n", 5, "a list is no text"),
+    Case("kind", MASTER + "5: {dcf: epos.eds}\n", 2, "the name of a node is a text"),
+    Case("kind", MASTER + "nodes:\n  - axis: {node_id: 5}\n", 2, "a list is no mapping"),
+    Case("kind", "master: {error_behavior: {a: 1}}\n", 1, "a sub-index of 1029h is a number"),
+    Case("no-number", NODE + "  heartbeat_producer: soon\n", 5, "'soon' is no number"),
+    Case("no-number", NODE + "  heartbeat_producer: '0x10'\n", 5, "'0x10' is no number"),
+    Case("no-number", NODE + "  heartbeat_multiplier: .nan\n", 5, "'.nan' is no number"),
+    Case("number-range", NODE + "  guard_time: 65536\n", 5, "65536 is not in 0..65535"),
+    Case("no-dcf", MASTER + "axis:\n  node_id: 5\n", 2, "no dcf"),
+    Case("no-file", NODE.replace("epos", "epso"), 4, "did you mean 'epos.eds'?"),
+    Case("no-file", NODE.replace("epos.eds", '"a\\0b"'), 4, "no file 'a?b'"),
+    Case("eds", NODE.replace("epos", "broken"), 172, "DefaultValue=ten is no UNSIGNED32"),
+    Case("no-identity", NODE.replace("epos", "bare"), 4, "1018h:01 is not in bare.eds"),
+    Case("object-missing", NODE + "  sdo: [{index: 0x5555}]\n", 5, "epos.eds has no 5555h"),
+    Case("object-missing", NODE + "  sdo: [{index: 0x1018, sub_index: 9}]\n", 5, "epos.eds:"),
+    Case("object-missing", MAPPED + "{index: 0x5555}\n", 8, "5555h:00 is not there"),
+    Case("value-range", NODE + "  sdo: [{index: 0x6060, value: 200}]\n", 5, "200 is no INTEGER8"),
+    Case("value-type", NODE + "  sdo: [{index: 0x1008}]\n", 5, "VISIBLE_STRING", alone=False),
+    Case("pdo-missing", NODE + "  tpdo: {99: {}}\n", 5, "tpdo 99 is not in epos.eds, which has 1,"),
+    Case("pdo-missing", NODE + "  tpdo: {'1': {}}\n", 5, "tpdo 1 is not in epos.eds"),
+    Case(
+        "cob-id-none",
+        MANY + "".join(f"n{node}: {{<<: *a, node_id: {node}}}\n" for node in range(2, 99)),
+        *(2, "none is left, 0x680..0x6DF are taken"),
+    ),
+    Case("event-deadline", NODE + "  rpdo: {1: {event_deadline: 5}}\n", 5, "dcfgen fails at it"),
+    Case("no-node-id", MASTER + "axis: {dcf: epos.eds}\n", 2, "no node_id, and none in epos.eds"),
+    Case("no-node-id", NODE.replace("5", "255"), 3, "dcfgen leaves it out"),
+    Case("no-node-id", ROS_NODE.replace("  node_id: 1\n", ""), 1, "not in the EDS"),
+    Case("node-id", NODE.replace("5", "128"), 3, "128 is not in 1..127"),
+    Case("node-id", "master: {node_id: 128}\n", 1, "128 is not in 1..127"),
+    Case("node-id-twice", NODE + "b: {node_id: 5, dcf: lamp.eds}\n", 5, "5 is that of axis", False),
+    Case("node-id-twice", NODE.replace("5", "1"), 3, "1 is that of master, too: "),
+    Case("no-driver", ROS_NODE.replace("  driver: D\n", "", 1), 1, "no driver"),
+    Case("no-driver", ROS_NODE[: -len("  package: P\n")], 5, "no package"),
+    Case("hidden", ".a: {boot: true}\n" + ROS_NODE, 1, "takes it for a node, too"),
+    Case("node-name", ROS_NODE.replace("axis", "webmaster"), 5, "'master' is in its name"),
+    Case("no-nodes", MASTER + "defaults: {dcf: epos.eds}\n", 2, "defaults, but no nodes"),
+    Case("no-master", NODE.removeprefix(MASTER), 0, "it has no section master"),
+    Case("file-elsewhere", NODE.replace("epos", "install/epos"), 4, "it is taken from "),
+    Case("not-whole", NODE + "  heartbeat_producer: 10.5\n", 5, "10.5 is cut off: 10"),
+    Case("flag-text", NODE + "  boot: 'no'\n", 5, "'no' is not true or false: true is taken"),
+    Case("unknown-key", NODE + "  heartbeat_prodcer: 5\n", 5, "did you mean 'heartbeat_producer'?"),
+    Case("unknown-key", MASTER + "options: {x: 1}\n", 2, "known: dcf_path, "),
+    Case("own-key", NODE + "  colour: red\n", 5, "'colour' is no key that is known"),
+    Case("section-lost", MASTER + "nodes: {}\naxis: {dcf: a}\n", 3, "'axis' stands beside nodes"),
+    Case(
+        "defaults-win",
+        MASTER + "defaults: {dcf: io.eds}\nnodes: {a: {node_id: 5, dcf: epos.eds}}\n",
+        *(3, "dcf is that of defaults: "),
+    ),
+    Case("identity", NODE + "  revision_number: 5\n", 5, "0x00000005, but the EDS has 0x"),
+    Case("identity-key", NODE + "  vendor_id: 0\n", 5, "vendor_id of a node is not read: 0x"),
+    Case("no-object", SLEEPY + "  time_cob_id: 5\n", 5, "lamp.eds has no 1012h"),
+    Case("no-object", SLEEPY + "  software_version: 5\n", 5, "lamp.eds has no 1F56h:01"),
+    Case("no-object", SLEEPY + "  restore_configuration: 9\n", 5, "lamp.eds has no 1011h:09"),
+    Case("no-object", SLEEPY + "  error_behavior: {9: 1}\n", 5, "1029h:9 is not in lamp.eds"),
+    Case("no-object", SLEEPY + "  serial_number: 5\n", 5, "lamp.eds has no 1018h:04"),
+    Case("read-only", NODE + "  sdo: [{index: 0x6041}]\n", 5, "6041h:00 cannot be written: "),
+    Case("value-limits", SLEEPY + "  sdo: [{index: 0x2000, value: 99}]\n", 5, "99 is not in"),
+    Case("not-mappable", MAPPED + "{index: 0x1017}\n", 8, "1017h:00 cannot be mapped: "),
+    Case("direction", MAPPED + "{index: 0x607A}\n", 8, "607Ah:00 cannot be mapped into a TPDO"),
+    Case("mapped-length", MAPPED + "{index: 0x6041, bits: 8}\n", 8, "bits: 8, but 6041h:00 has 16"),
+    Case("pdo-length", MAPPED + "\n        - ".join(["{index: 0x6064}"] * 3) + "\n", 7, "96 bits"),
+    Case("not-enabled", SLEEPY + "  tpdo: {2: {enabled: true}}\n", 5, "with bit 31: it stays off"),
+    Case("not-disabled", NODE + "  tpdo: {1: {enabled: false}}\n", 5, "but not for the master"),
+    Case("cob-id-twice", NODE + "  tpdo: {2: {cob_id: 0x185}}\n", 5, "that of TPDO 1 of axis, too"),
+    Case("cob-id-restricted", NODE + "  tpdo: {2: {cob_id: 0x605}}\n", 5, "0x605 is restricted"),
+    Case("error-control", SLEEPY + "  guard_time: 5\n", 5, "guarding is left out"),
+    Case("no-entry", BEATING + "  heartbeat_consumer: true\n", 5, "no entry of 1016h is free"),
+)

@@ -1,0 +1,41 @@
+"""Whatever a bus.yml is: findings in lines, never a traceback; tools/fuzz-bus does more."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from random import Random
+
+import pytest
+
+from tests.host.canopen.bus_file.bench import NODE, ROOT
+from tests.host.canopen.bus_file.mutations import NAME, judge, mutated
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_mutated_bus_file_is_told_well(seed: int) -> None:
+    chance = Random(seed)
+    for _ in range(12):
+        judge(*mutated(chance))
+
+
+def test_the_tool_judges_files_by_several_processes() -> None:
+    words = [sys.executable, str(ROOT / "tools" / "fuzz-bus"), "--files", "10", "-j", "2"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert said.startswith("seed 1: 10 files, {")
+
+
+def test_noise_is_no_bus() -> None:
+    chance = Random(0)
+    for size in (0, 1, 2, 10, 1_000, 20_000):
+        assert judge(NAME, chance.randbytes(size)) == "wrong"
+
+
+def test_anchors_that_double_sixty_times_are_read_at_once() -> None:
+    lines = ["a0: &a0 [x]", *(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]" for n in range(1, 60))]
+    extra = "  tickrig:\n" + "".join(f"    {line}\n" for line in lines)
+    assert judge(NAME, (NODE + extra).encode()) == "good"
+
+
+def test_a_megabyte_is_no_bus() -> None:
+    assert judge(NAME, NODE.encode() + b"#" * (1 << 20)) == "wrong"
