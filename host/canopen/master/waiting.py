@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Generator, Iterable
+from collections.abc import Callable, Coroutine, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,7 +70,7 @@ class _Wait:
 
 
 def perform(
-    operations: Iterable[Operation],
+    operations: Sequence[Operation],
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
@@ -79,10 +79,23 @@ def perform(
     Raises:
         DriveFailed: one did not get what it waited for; the others are left where they are.
     """
-    waits = [_Wait(operation, now_us()) for operation in operations]
-    while waits := [wait for wait in waits if wait.step is not None]:
-        left_us = min(wait.left_us(now_us()) for wait in waits)
-        wait_until(lambda waits=waits: any(wait.due(now_us()) for wait in waits), left_us)  # type: ignore[misc]
-        for wait in waits:
-            if wait.due(now_us()):
-                wait.go_on(now_us())
+    try:
+        waits = [_Wait(operation, now_us()) for operation in operations]
+        while waits := [wait for wait in waits if wait.step is not None]:
+            _wait(waits, now_us, wait_until)
+    finally:
+        for operation in operations:
+            operation.close()
+
+
+def _wait(
+    waits: Sequence[_Wait],
+    now_us: Callable[[], int],
+    wait_until: Callable[[Callable[[], bool], int], object],
+) -> None:
+    """Wait until one can go on; let all go on that can."""
+    left_us = min(wait.left_us(now_us()) for wait in waits)
+    wait_until(lambda: any(wait.due(now_us()) for wait in waits), left_us)
+    for wait in waits:
+        if wait.due(now_us()):
+            wait.go_on(now_us())
