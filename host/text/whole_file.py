@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -26,6 +27,28 @@ def check_file(path: Path, what: str) -> None:
             check_writable(path.resolve().parent)
         except OSError as error:
             raise ValueError(f"{what} {path}: {error.strerror}") from None
+
+
+def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
+    """See that a file is none of those that a run reads.
+
+    Args:
+        path: of the file.
+        what: it is, for the message, as `--html`.
+        inputs: what is read; what is no file is none.
+
+    Raises:
+        ValueError: it is one of them.
+    """
+    if any(_are_one(path, each) for each in inputs):
+        raise ValueError(f"{what} {path}: the run reads this file, it would be overwritten")
+
+
+def _are_one(path: Path, other: Path) -> bool:
+    try:
+        return path.samefile(other)
+    except (OSError, ValueError):
+        return False
 
 
 def is_special(path: Path) -> bool:

@@ -14,7 +14,7 @@ from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
-from tickrig.host.text.whole_file import check_file, write_whole
+from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
 HTML: Final = "--html"
 JUNIT: Final = "--junit"
@@ -47,17 +47,12 @@ def keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
         files: by the option that names it.
         inputs: what is read; what is no file is none.
     """
+    read = tuple(inputs)
     for option, path in files.items():
-        for each in inputs:
-            if _are_one(path, each):
-                raise Refused(f"{option} {path}: the run reads this file, it would be overwritten")
-
-
-def _are_one(path: Path, other: Path) -> bool:
-    try:
-        return path.samefile(other)
-    except (OSError, ValueError):
-        return False
+        try:
+            check_not_read(path, option, read)
+        except ValueError as error:
+            raise Refused(str(error)) from None
 
 
 def write_files(

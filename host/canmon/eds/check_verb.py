@@ -18,7 +18,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.junit import junit
 from tickrig.host.text.values import counted
-from tickrig.host.text.whole_file import check_file, write_whole
+from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
@@ -52,14 +52,14 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
 
     A finding is a line: file, line, severity, rule, what came and what was allowed,
     what to do, and the clause that says so. Notes never count; warnings do with
-    --strict.
+    --strict. Exit status 2: a file cannot be read, or the report not be written.
 
     \b
     canmon eds check drive.eds
     canmon eds check *.eds *.xdd --strict --junit eds.xml
     canmon eds check drive.eds --json | jq .rule
     """  # noqa: D301 - click wants the backspace
-    _check_report(report)
+    _check_report(report, file)
     documents, unread = _read(file)
     everything: list[RuleFinding] = []
     for document in documents:
@@ -108,11 +108,12 @@ def finding_json(one: RuleFinding) -> str:
     return json.dumps(said, ensure_ascii=False)
 
 
-def _check_report(report: Path | None) -> None:
+def _check_report(report: Path | None, files: Sequence[Path]) -> None:
     """See before the run whether the report could be written."""
     if report is not None:
         try:
             check_file(report, "--junit")
+            check_not_read(report, "--junit", files)
         except ValueError as error:
             raise Refused(str(error)) from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -11,10 +12,12 @@ import click
 
 from tickrig.host.canmon.eds.eds_files import read_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.data_sheet.rule import Place, RuleFinding
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.whole_file import write_whole
+from tickrig.wire.canopen.eds.eds_file import shorten
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
@@ -30,8 +33,9 @@ LEFT: Final = 1
 def command(file: Path, output: Path | None, dry_run: bool) -> None:
     """Mend an EDS; exit status 1 if errors or warnings are left.
 
-    Lines that no finding names stay to the byte. What is mended, and what is left as
-    it needs knowledge of the device, is told. XDD files are not mended.
+    Lines that no finding names stay to the byte. What is mended, with the lines of
+    FILE, and what is left as it needs knowledge of the device, with those of OUT, is
+    told. XDD files are not mended.
 
     \b
     canmon eds fix drive.eds -o mended.eds
@@ -48,9 +52,9 @@ def command(file: Path, output: Path | None, dry_run: bool) -> None:
             for line in _differences(document, fixed.document):
                 click.echo(line)
         for one in fixed.mended:
-            click.echo(f"{one.file}:{max(one.line, 1)}: mended: [{one.rule.name}] {one.text}")
+            click.echo(_mended(one))
         for one in fixed.left:
-            click.echo(str(one))
+            click.echo(str(fixed.before(one) if output is None else replace(one, file=str(output))))
     if output is not None:
         _write(output, fixed.document.data)
     say(f"{len(fixed.mended)} mended, {len(fixed.left)} left")
@@ -66,6 +70,16 @@ def _mendable(file: Path) -> Document:
     if not document.rows:
         raise Refused(f"FILE {file}: no EDS: it describes no object")
     return document
+
+
+def _mended(one: RuleFinding) -> str:
+    """Say what was mended, and what is written instead."""
+    lines = [text for edit in one.edits for text in edit.lines if text]
+    more = f" and {len(lines) - 1} more" if lines[1:] else ""
+    left_out = any(edit.place is Place.REPLACE for edit in one.edits)
+    now = f"; now {shorten(lines[0].strip())}{more}" if lines else "; left out" * left_out
+    where = f"[{one.section}] " if one.section else ""
+    return f"{one.file}:{max(one.line, 1)}: mended: [{one.rule.name}] {where}{one.text}{now}"
 
 
 def _differences(old: Document, new: Document) -> Iterator[str]:

@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text, encoding_of, shorten
+from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK, EdsFile, decode_text, encoding_of, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine
 
 BOM: Final = "\ufeff"
@@ -38,9 +38,10 @@ class Document:
     """
 
     def __init__(self, name: str, data: bytes) -> None:
-        self.name, self.data, self.encoding = name, data, encoding_of(data)
-        text = data.decode(self.encoding, self._lossless)
-        self.has_bom = text.startswith(BOM)
+        coded = data.removeprefix(UTF_8_MARK)
+        self.name, self.data, self.encoding = name, data, encoding_of(coded)
+        text = coded.decode(self.encoding, self._lossless)
+        self.has_bom = coded != data or text.startswith(BOM)
         parts = _END.split(text.removeprefix(BOM))
         self.texts, self.ends = parts[::2], [*parts[1::2], ""]
         self.file = EdsFile(name, decode_text(data))
@@ -124,6 +125,15 @@ class Document:
         """Return the edit that puts lines at the end of a section."""
         numbers = [line.number for line in self._blocks.get(section, ()) if line.content]
         return Edit(max(numbers, default=0), Place.AFTER, tuple(texts))
+
+    def is_again(self, line: EdsLine) -> bool:
+        """Return whether a line stands in a section whose title was there before."""
+        return line not in self._blocks.get(line.section, ())
+
+    @property
+    def head_is_lost(self) -> bool:
+        """Whether what stands before the first title seems to have lost its own."""
+        return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
         """Return the keywords of a section, of the first one of that name."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.check import check, failing
-from tickrig.host.canopen.data_sheet.document import BOM, Document
+from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK
 
 MOST_PASSES: Final = 50
 CUT: Final = "truncated"
@@ -21,11 +23,17 @@ class Fixed:
         document: as it is now.
         mended: what was found and is gone, with the lines of the file as it was.
         left: errors and warnings that are still there, with the lines of the file as it is.
+        origins: the lines of the file before, of each line.
     """
 
     document: Document
     mended: tuple[RuleFinding, ...]
     left: tuple[RuleFinding, ...]
+    origins: tuple[int, ...]
+
+    def before(self, one: RuleFinding) -> RuleFinding:
+        """Return what is left, with the line of the file before."""
+        return replace(one, line=_origin(self.origins, one.line))
 
 
 def fix(document: Document) -> Fixed:
@@ -37,7 +45,7 @@ def fix(document: Document) -> Fixed:
     origins = list(range(1, len(document.texts) + 1))
     left = failing(check(document), strict=True)
     if any(one.rule.name == CUT for one in left):
-        return Fixed(document, (), tuple(left))
+        return Fixed(document, (), tuple(left), tuple(origins))
     for _ in range(MOST_PASSES):
         plan = _Plan()
         taken = [one for one in left if document.changes(one.edits) and plan.take(one.edits)]
@@ -46,10 +54,10 @@ def fix(document: Document) -> Fixed:
         mended += (replace(one, line=_origin(origins, one.line)) for one in taken)
         document, origins = plan.carry_out(document, origins)
         left = failing(check(document), strict=True)
-    return Fixed(document, tuple(dict.fromkeys(mended)), tuple(left))
+    return Fixed(document, tuple(dict.fromkeys(mended)), tuple(left), tuple(origins))
 
 
-def _origin(origins: list[int], line: int) -> int:
+def _origin(origins: Sequence[int], line: int) -> int:
     return origins[line - 1] if 0 < line <= len(origins) else line
 
 
@@ -104,8 +112,9 @@ class _Plan:
     def _encoded(self, document: Document, text: str) -> bytes:
         if document.encoding.startswith("utf-16"):
             return text.encode("utf-8", "replace")
-        mark = BOM if document.has_bom and Place.ENCODING not in self._places else ""
-        return (mark + text).encode(document.encoding, "surrogateescape")
+        keeps = document.has_bom and Place.ENCODING not in self._places
+        coded = text.encode(document.encoding, "surrogateescape")
+        return (UTF_8_MARK if keeps else b"") + coded
 
 
 def _usual_end(ends: list[str]) -> str:

@@ -241,6 +241,8 @@ class EdsFile:
         self._warnings[Finding(self.name, line.section, reason, line.number, rule)] = None
 
 
+UTF_8_MARK: Final = b"\xef\xbb\xbf"
+"""Some editors write it before text of another encoding, too."""
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -271,5 +273,8 @@ def decode_text(data: bytes) -> str:
 
     >>> decode_text("\ufeffµ".encode()), decode_text("µ".encode("cp1252"))
     ('µ', 'µ')
+    >>> decode_text(b"\xef\xbb\xbf[FileInfo]\xb5")
+    '[FileInfo]µ'
     """
-    return data.decode(encoding_of(data), "replace").removeprefix("\ufeff")
+    coded = data.removeprefix(UTF_8_MARK)
+    return coded.decode(encoding_of(coded), "replace").removeprefix("\ufeff")

@@ -55,8 +55,9 @@ def sections(document: Document) -> Iterator[RuleFinding]:
         if title not in document.file.sections and not document.file.is_xml:
             last = len(document.texts)
             first = "SupportedObjects=0" if title == "MandatoryObjects" else f"{NAMES[0]}="
-            edit = Edit(last, Place.AFTER, ("", f"[{title}]", first))
-            yield document.found("section-missing", f"[{title}] is missing", "", 0, edit)
+            added = Edit(last, Place.AFTER, ("", f"[{title}]", first))
+            edits = () if document.head_is_lost else (added,)
+            yield document.found("section-missing", f"[{title}] is missing", "", 0, *edits)
 
 
 def file_info(document: Document) -> Iterator[RuleFinding]:
@@ -117,7 +118,8 @@ def counts(document: Document) -> Iterator[RuleFinding]:
         present = sum(index in area for index in document.device.objects)
         said, line = number(document, title, key), document.keyword(title, key)
         if said is not None and line is not None and said != present:
-            what = f"{key}={said}, but there are {present} of {area[0]:X}h to {area[-1]:X}h"
+            be = "is" if present == 1 else "are"
+            what = f"{key}={said}, but of {area[0]:X}h to {area[-1]:X}h there {be} {present}"
             sound = not document.file.is_xml and (said < present or are_whole(document))
             edits = (document.with_value(line, str(present)),) if sound else ()
             yield document.found("pdo-count", what, title, key, *edits)

@@ -9,6 +9,7 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 RPDO: Final = range(0x1400, 0x1600)
@@ -28,44 +29,70 @@ RESTRICTED: Final = (
 )
 SYNC: Final = 0x1005
 EMCY: Final = 0x1014
+SDO: Final = range(0x1200, 0x1300)
+"""Servers, clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
+DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
+"""The lowest CAN-ID, which the node-ID is added to."""
 NODE: Final = 5
 """The node-ID for which CAN-IDs are compared."""
 
 
 def cob_ids(document: Document) -> Iterator[RuleFinding]:
-    """Judge the COB-IDs of PDOs, SYNC and EMCY."""
+    """Judge the COB-IDs of PDOs, SDO servers and clients, SYNC and EMCY."""
     taken: dict[int, str] = {}
     for row in document.rows.values():
-        is_pdo = row.sub == 1 and (row.index in RPDO or row.index in TPDO)
-        if not is_pdo and (row.index not in (SYNC, EMCY) or row.sub):
-            continue
-        if row.data_type is DataType.UNSIGNED32 and row.has_default:
-            yield from _cob_id(document, row, is_pdo, taken)
+        if _is_cob_id(row) and row.data_type is DataType.UNSIGNED32 and row.has_default:
+            yield from _cob_id(document, row, taken)
+
+
+def _is_cob_id(row: EntryDescription) -> bool:
+    match row.sub:
+        case 0:
+            return row.index in (SYNC, EMCY)
+        case 1:
+            return any(row.index in area for area in (RPDO, TPDO, SDO))
+        case 2:
+            return row.index in SDO
+    return False
 
 
 def _cob_id(
-    document: Document, row: EntryDescription, is_pdo: bool, taken: dict[int, str]
+    document: Document, row: EntryDescription, taken: dict[int, str]
 ) -> Iterator[RuleFinding]:
     place = _section(document, row)
     values = [
         int.from_bytes(row.power_on_data(node), "little") for node in (LOWEST_NODE, HIGHEST_NODE)
     ]
-    if values[0] & (EXTENDED | (INVALID if is_pdo or row.index == EMCY else 0)):
+    if values[0] & (EXTENDED | (0 if row.index == SYNC else INVALID)):
         return
     if values[1] & UPPER_BITS:
         what = f"0x{values[1]:08X} of node {HIGHEST_NODE} has no CAN-ID of 11 bits"
         yield document.found("cob-id-range", what, place, "DefaultValue")
         return
     ids = [value & IDS for value in values]
-    if is_pdo and any(can_id in area for can_id in ids for area in RESTRICTED):
+    base = DEFAULT_SERVER.get((row.index, row.sub))
+    if base is not None and not _is_of_server(document, row, base):
+        said = shorten(document.file.value(place, "DefaultValue"))
+        what = f"DefaultValue={said} is not $NODEID+0x{base:X}"
+        yield document.found("sdo-server", what, place, "DefaultValue")
+    elif base is None and any(can_id in area for can_id in ids for area in RESTRICTED):
         what = f"CAN-ID 0x{ids[0]:03X} to 0x{ids[1]:03X} of nodes 1 to 127 is restricted"
         yield document.found("cob-id-restricted", what, place, "DefaultValue")
+        return
     own = int.from_bytes(row.power_on_data(NODE), "little") & IDS
     who = f"{row.index:04X}h:{row.sub:02X}"
     if own in taken:
         what = f"CAN-ID 0x{own:03X} of node {NODE} is that of {taken[own]}, too"
         yield document.found("cob-id-unique", what, place, "DefaultValue")
     taken.setdefault(own, who)
+
+
+def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
+    """Return whether a default is that of the first server; that of one node is, in a DCF."""
+    default = int.from_bytes(row.default, "little")
+    if document.is_dcf and not row.relative:
+        return default in range(base + LOWEST_NODE, base + HIGHEST_NODE + 1)
+    return row.relative and default == base
 
 
 def halves(document: Document) -> Iterator[RuleFinding]:

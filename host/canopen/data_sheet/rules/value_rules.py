@@ -16,7 +16,7 @@ from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
 from tickrig.wire.canopen.eds.eds_value import NODE_IDS, parse_limit, plain_numbers
-from tickrig.wire.canopen.eds.object_table import EntryDescription
+from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectCode
 
 OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
 NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
@@ -59,6 +59,8 @@ def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFi
     if len(others) == len(terms) - 1 and NODE_ID.fullmatch(mended) and not document.file.is_xml:
         edits = (document.with_value(line, mended),)
     what = f"{shorten(line.content)} is not $NODEID or $NODEID+NUMBER"
+    if edits:
+        what += f": {mended} is meant"
     yield document.found("nodeid-form", what, section, line.number, *edits)
 
 
@@ -115,10 +117,30 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
         edits: tuple[Edit, ...] = ()
         if mend is not None and line is not None and not file.is_xml:
             edits = mend(document, finding, line)
+        if finding.rule == "doubled-key" and line is not None and document.is_again(line):
+            continue  # said of the section
         text = finding.reason
+        if finding.rule == "doubled-section" and line is not None:
+            text = _doubled_text(document, line)
+        elif finding.rule in OF_ONE_ENTRY and _is_compact_record(document, finding.section):
+            text += "; better than adding it, describe each entry of the RECORD"
         yield RuleFinding(
             RULES[finding.rule], document.name, finding.line, finding.section, text, edits
         )
+
+
+def _is_compact_record(document: Document, section: str) -> bool:
+    place = object_section(section)
+    described = document.device.objects.get(place[0]) if place else None
+    compact = document.file.value(section, "CompactSubObj")
+    return described is not None and described.code == ObjectCode.RECORD and compact != ""
+
+
+def _doubled_text(document: Document, title: EdsLine) -> str:
+    others = _contradicting(document, title)
+    more = f" and {len(others) - 1} more" if others[1:] else ""
+    what = "is there twice: of each keyword the first is taken"
+    return f"{what}: {others[0]}{more}" if others else what
 
 
 def _plain(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -163,8 +185,13 @@ def _kind(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ..
 
 
 def _comment(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    """Make the line a comment; before the first section, where one is told, all such lines."""
+    """Make the line a comment; before the first section, where one is told, all such lines.
+
+    What has lost its title stays: as comments its keywords would be lost without a word.
+    """
     lines = [line]
+    if not line.section and document.head_is_lost:
+        return ()
     if not line.section:
         before = takewhile(lambda other: not other.title, document.file.lines)
         lines = [
@@ -182,21 +209,33 @@ def _doubled_key(document: Document, finding: Finding, line: EdsLine) -> tuple[E
 
 def _doubled_section(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
     """Move keywords to the first section, and the title out; unless they contradict it."""
+    if _contradicting(document, line):
+        return ()
     moved: list[str] = []
     edits = [Edit(line.number)]
-    for other in document.file.lines[line.number :]:
-        if other.title:
-            break
-        if other.is_keyword and other.key:
-            first = document.keyword(line.section, other.key)
-            if first is not None and first.number != other.number and first.value != other.value:
-                return ()
-            edits.append(Edit(other.number))
-            if first is None or first.number == other.number:
-                moved.append(document.texts[other.number - 1])
+    for other, first in _again(document, line):
+        edits.append(Edit(other.number))
+        if first is None or first.number == other.number:
+            moved.append(document.texts[other.number - 1])
     if moved:
         edits.append(document.add_to(line.section, moved))
     return tuple(edits)
+
+
+def _again(document: Document, title: EdsLine) -> Iterator[tuple[EdsLine, EdsLine | None]]:
+    """Give the keywords behind a title, each with the line that counts."""
+    for line in takewhile(lambda other: not other.title, document.file.lines[title.number :]):
+        if line.is_keyword and line.key:
+            yield line, document.keyword(title.section, line.key)
+
+
+def _contradicting(document: Document, title: EdsLine) -> list[str]:
+    """Return what a section that is there again says otherwise."""
+    return [
+        f"{shorten(line.content)} against {shorten(first.value)}"
+        for line, first in _again(document, title)
+        if first is not None and first.value != line.value
+    ]
 
 
 def _compact(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -216,6 +255,8 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]
     "compact-record": _compact,
 }
 
+OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
+
 
 def stray_lines(document: Document) -> Iterator[RuleFinding]:
     """Find lines that say nothing, and what is there twice, where the reader does not look."""
@@ -227,14 +268,14 @@ def stray_lines(document: Document) -> Iterator[RuleFinding]:
             if again:
                 finding = Finding(document.name, line.section, "", line.number)
                 edits = _doubled_section(document, finding, line)
-                what = "is there twice: of each keyword the first is taken"
+                what = _doubled_text(document, line)
                 yield document.found("doubled-section", what, line.section, line.number, *edits)
         elif line.content and not describes_device(line.section):
             yield from _stray(document, line, seen)
         elif line.content and not line.section and line.is_keyword and line.key:
             what = f"{shorten(line.content)!r} stands before the first section"
-            edit = document.comment_out(line.number)
-            yield document.found("no-keyword", what, "", line.number, edit)
+            edits = () if document.head_is_lost else (document.comment_out(line.number),)
+            yield document.found("no-keyword", what, "", line.number, *edits)
 
 
 def _stray(document: Document, line: EdsLine, seen: set[tuple[str, str]]) -> Iterator[RuleFinding]:

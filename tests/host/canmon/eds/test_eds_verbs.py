@@ -19,7 +19,7 @@ from tickrig.wire.canopen.eds.eds_file import EdsError
 
 DEFECT = GOOD.replace("NrOfRXPDO=4", "NrOfRXPDO=7").replace("DefaultValue=0x10", "DefaultValue=9")
 COUNT = (
-    ":29: warning: [pdo-count] [DeviceInfo] NrOfRXPDO=7, but there are 4 of 1400h to 15FFh;"
+    ":29: warning: [pdo-count] [DeviceInfo] NrOfRXPDO=7, but of 1400h to 15FFh there are 4;"
     " fix: count the PDO parameters (CiA 306-1, [DeviceInfo])"
 )
 OUT_OF_LIMITS = "default-limits"
@@ -82,7 +82,7 @@ def test_findings_as_json(odd: Path) -> None:
         "severity": "warning",
         "rule": "pdo-count",
         "section": "DeviceInfo",
-        "text": "NrOfRXPDO=7, but there are 4 of 1400h to 15FFh",
+        "text": "NrOfRXPDO=7, but of 1400h to 15FFh there are 4",
         "breaks": "tools show too many or too few",
         "fix": "count the PDO parameters",
         "clause": "CiA 306-1, [DeviceInfo]",
@@ -183,7 +183,7 @@ def test_fix_writes_a_file_and_tells_what_is_left(odd: Path, tmp_path: Path) -> 
     assert result.exit_code == 1
     assert out.read_bytes() == DEFECT.replace("NrOfRXPDO=7", "NrOfRXPDO=4").encode()
     mended, left = result.stdout.splitlines()
-    assert mended.startswith(f"{odd}:29: mended: [pdo-count] NrOfRXPDO=7")
+    assert mended.startswith(f"{odd}:29: mended: [pdo-count] [DeviceInfo] NrOfRXPDO=7")
     assert f"[{OUT_OF_LIMITS}] [2006] the default 9 is not in 16..32" in left
     assert result.stderr == "1 mended, 1 left\n"
 
@@ -271,3 +271,28 @@ def test_a_binary_file_is_told_in_one_line(tmp_path: Path, verb: str) -> None:
     result = run(verb, path)
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr == f"Error: FILE {path}: a binary file: no EDS\n"
+
+
+def test_a_report_does_not_go_into_what_is_checked(good: Path) -> None:
+    before = good.read_bytes()
+    result = run("check", good, "--junit", good)
+    assert result.exit_code == 2
+    assert f"--junit {good}: the run reads this file, it would be overwritten" in result.stderr
+    assert good.read_bytes() == before
+
+
+def test_what_is_left_is_told_with_the_lines_of_where_it_is_written(tmp_path: Path) -> None:
+    file, out = tmp_path / "drive.eds", tmp_path / "out.eds"
+    file.write_text(DEFECT.replace("NrOfRXPDO=7\n", "NrOfRXPDO=4\nNrOfRXPDO=4\n"))
+    line = DEFECT[: DEFECT.index("[2006]")].count("\n") + 1
+    written = run("fix", file, "-o", out).stdout.splitlines()
+    shown = run("fix", file, "--dry-run").stdout.splitlines()
+    (left,) = [one for one in written if OUT_OF_LIMITS in one]
+    at = int(left.removeprefix(f"{out}:").partition(":")[0])
+    assert out.read_text().splitlines()[at - 1] == "DefaultValue=9"
+    assert at > line
+    assert left.replace(f"{out}:{at}", f"{file}:{at + 1}") == shown[-1]
+    assert (
+        f"{file}:30: mended: [doubled-key] [DeviceInfo] NrOfRXPDO is there twice: 4"
+        in (written[0])
+    )

@@ -178,6 +178,12 @@ CORPUS: Final = (
     Deviation("utf-16", lambda text: text.encode("utf-16")),
     Deviation("utf-16", lambda text: text.encode("utf-16-be")),
     Deviation("bom", lambda text: f"\ufeff{text}"),
+    Deviation(
+        "bom",
+        lambda text: b"\xef\xbb\xbf" + put("u8 w", "µ8 w")(text).encode("cp1252"),
+        True,
+        anything,
+    ),
     Deviation("line-ends", lambda text: text.replace("\n", "\r")),
     Deviation("mixed-line-ends", put("\n[DeviceInfo]\n", "\r\n[DeviceInfo]\r\n")),
     Deviation("control-character", put("=Device type", "=Device\x00\x07 type"), True, anything),
@@ -187,9 +193,11 @@ CORPUS: Final = (
     Deviation("no-keyword", put("AccessType=ro\n", "AccessType=ro\nAccess type is ro\n")),
     Deviation("no-keyword", put("AccessType=ro\n", "AccessType=ro\n=ro\n")),
     Deviation("no-keyword", put("[FileInfo]\n", "hello\nFileName=x\n[FileInfo]\n")),
+    Deviation("no-keyword", lambda text: f"x{text}", False, anything),
     Deviation("no-keyword", put("[Comments]\n", "[Comments]\nfree text\n")),
     Deviation("doubled-section", doubled),
     Deviation("doubled-section", section("1017", "AccessType=ro"), False),
+    Deviation("doubled-section", section("1017", "DataType=0x0006", "AccessType=ro"), False),
     Deviation("doubled-section", section("DummyUsage", "Dummy0001=1", "Dummy0010=1")),
     Deviation("doubled-key", put_in("1017", "AccessType=rw", "DataType=0x0006")),
     Deviation(
@@ -400,6 +408,8 @@ CORPUS: Final = (
     # PDOs
     Deviation("cob-id-range", put(COB_ID, "DefaultValue=$NODEID+0x7FF"), False, anything),
     Deviation("cob-id-restricted", put(COB_ID, "DefaultValue=0x180"), False, anything),
+    Deviation("sdo-server", within("1200sub2", "+0x580", "+0x5C0"), False, anything),
+    Deviation("cob-id-restricted", within("1005", "=0x00000080", "=0"), False, anything),
     Deviation("cob-id-unique", put(COB_ID, "DefaultValue=$NODEID+0x300"), False, anything),
     Deviation(
         "pdo-half", lambda text: re.sub(r"\[1603(sub.)?\]\n[^\[]*", "", text), False, lacks(0x1603)
