@@ -31,7 +31,8 @@ nodes:
 """
 
 HOMING = """{index: 0x6098, value: 18}
-    - {index: 0x6099, sub_index: 1, value: 500}
+    - {index: 0x6099, sub_index: 1, value: 2000}
+    - {index: 0x6099, sub_index: 2, value: 200}
     - {index: 0x609A, value: 20000}"""
 
 
